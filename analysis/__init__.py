@@ -50,7 +50,7 @@ if TYPE_CHECKING:
     from ballplate.presentation.files import write_file
     from ballplate.presentation.result import Result
     from ballplate.presentation.table import Table
-    from ballplate.results.fit import Fit
+    from ballplate.results.fits import Fit
     from ballplate.results.groupings import GROUPINGS
     from ballplate.results.prediction import Prediction
     from ballplate.simulator.computing.processes import in_processes
@@ -180,7 +180,7 @@ _KERNEL = {
     "ballplate.presentation.files": ("write_file",),
     "ballplate.presentation.result": ("Result",),
     "ballplate.presentation.table": ("Table",),
-    "ballplate.results.fit": ("Fit",),
+    "ballplate.results.fits": ("Fit",),
     "ballplate.results.prediction": ("Prediction",),
     "ballplate.uncertainty.kernel_quantities": ("QuantityKind",),
     "ballplate.uncertainty.quantities": ("QUANTITIES",),

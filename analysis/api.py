@@ -35,7 +35,7 @@ from .estimators.estimator_choice import (
     takers,
 )
 from .results.groupings import GROUPINGS, Grouping
-from .simulator.experiment.load import load as load_file
+from .simulator.experiment.loading import load as load_file
 from .simulator.experiment.model import Experiment
 
 if TYPE_CHECKING:
@@ -47,7 +47,7 @@ if TYPE_CHECKING:
     from .planning.orders import OrderName
     from .planning.selection import Campaign
     from .presentation.result import FitResult
-    from .results.fit import Fit
+    from .results.fits import Fit
     from .results.prediction import Prediction
     from .simulator.maps.fitted_map import FittedMap
 
@@ -68,7 +68,7 @@ def experiment(sections: Mapping[str, Any], folder: PathLike = ".") -> Experimen
     >>> check(experiment(sections))
     <Prediction of experiment: full rank>
     """
-    from .simulator.experiment.load import written_in_python
+    from .simulator.experiment.loading import written_in_python
 
     if not isinstance(sections, Mapping):
         raise TypeError(f"sections={sections!r}; give a mapping of what a file would hold")
@@ -107,7 +107,7 @@ def check(
     """
 
     from .planning.checked_files import Wanted, checked_design
-    from .simulator.experiment.load import with_pool
+    from .simulator.experiment.loading import with_pool
 
     ensure_positive("a ratio above 0 and at most 1", 1.0, share=share)
     ensure_type(bool, "True or False", suggest=suggest)
@@ -145,7 +145,7 @@ def run(
     """
     from dataclasses import replace
 
-    from .montecarlo.trials import MOST_TRIALS
+    from .montecarlo.trial_runs import MOST_TRIALS
     from .results import study
 
     ensure_whole(2, MOST_TRIALS, trials=trials)
@@ -307,8 +307,8 @@ def fit(
     <AlternativeFit of quickstart: distances, converged, full rank>
     """
     from .estimators.estimator_choice import fit_readings
-    from .montecarlo.trials import MOST_TRIALS
-    from .results.fit import Fit
+    from .montecarlo.trial_runs import MOST_TRIALS
+    from .results.fits import Fit
 
     ensure_one_of(SIGMAS, sigma=sigma)
     ensure_one_of(ESTIMATORS, estimator=str(estimator))
@@ -378,7 +378,7 @@ def compare(
     from ballplate.simulator.inputs.quantities import QuantityError, parse_length
 
     from .estimators.distances import MOST_POINTS, compare_estimators
-    from .montecarlo.trials import MOST_TRIALS
+    from .montecarlo.trial_runs import MOST_TRIALS
 
     ensure_one_of(COMPARED, estimator=str(estimator))
     ensure_type(str, 'a set of pairs of balls, such as "corners"', pairs=pairs)
@@ -440,12 +440,12 @@ def plan(
     >>> plan(quickstart().with_(pool=pool), positions=7)
     <Campaign of quickstart: 7 of 8 candidates, U6 0.137 µm>
     """
-    from .planning.campaign import Request, campaign
+    from .planning.campaign_choice import Request, campaign
     from .planning.constraints import HOUR, Budget
     from .planning.criteria import NAMES
     from .planning.earlier import begun
     from .planning.orders import ORDERS
-    from .simulator.experiment.load import with_pool
+    from .simulator.experiment.loading import with_pool
 
     ensure_one_of(NAMES, criterion=str(criterion))
     ensure_positive("hours above 0", 1e5, hours=hours)

@@ -8,7 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeAlias
 
-from ballplate.simulator.experiment.load import load as load_file
+from ballplate.simulator.experiment.loading import load as load_file
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.inputs.arguments import ensure_path, ensure_type
 from ballplate.simulator.inputs.messages import refused
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from ballplate.simulator.maps.fitted_map import FittedMap
     from ballplate.simulator.readings.observed_readings import ObservedReadings
 
-    from .results.fit import Fit
+    from .results.fits import Fit
 
     # A table of readings, or several; None for those that the experiment names.
     Tables: TypeAlias = PathLike | pandas.DataFrame | Sequence[PathLike | pandas.DataFrame] | None
@@ -121,7 +121,7 @@ def observed_of(
 
 def fit_map_or_path(name: str, given: Fit | FittedMap | PathLike) -> Fit | FittedMap | Path:
     """A map to be compared: the path of a file as such."""
-    from .results.fit import Fit
+    from .results.fits import Fit
     from .simulator.maps.fitted_map import FittedMap
 
     if isinstance(given, str | os.PathLike):
@@ -133,7 +133,7 @@ def fit_map_or_path(name: str, given: Fit | FittedMap | PathLike) -> Fit | Fitte
 
 def map_or_path(name: str, given: Fit | FittedMap | PathLike) -> FittedMap | Path:
     """The map of a fit, or of what its to_map() gives; the path of a file as such."""
-    from .results.fit import Fit
+    from .results.fits import Fit
 
     side = fit_map_or_path(name, given)
     return side.to_map() if isinstance(side, Fit) else side

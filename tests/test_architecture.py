@@ -109,8 +109,8 @@ def functions() -> Iterator[tuple[Path, ast.FunctionDef | ast.AsyncFunctionDef]]
 
 def test_imports_are_found() -> None:
     found = arrows()[Path("analysis/api.py")]
-    assert Path("simulator/experiment/load.py") in found  # at the top
-    assert Path("analysis/montecarlo/trials.py") in found  # for types, or in a function
+    assert Path("simulator/experiment/loading.py") in found  # at the top
+    assert Path("analysis/montecarlo/trial_runs.py") in found  # for types, or in a function
     assert sum(map(len, arrows().values())) > 1000
 
 

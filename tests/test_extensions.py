@@ -8,6 +8,7 @@ import ast
 import subprocess
 import sys
 from collections.abc import Callable, Iterator
+from importlib import import_module
 from pathlib import Path
 
 import ballplate as bp
@@ -15,6 +16,7 @@ import pytest
 from ballplate.extensions import SHIPPED
 from ballplate.simulator.inputs import extensions
 from ballplate.simulator.inputs.extensions import KINDS, Extension
+from ballplate.simulator.inputs.faces import public_names
 
 from tests.test_architecture import EXTENSIONS, arrows, trees
 
@@ -24,6 +26,7 @@ NAMES = tuple(extension.name for extension in SHIPPED)
 # What an extension takes from another one, and why that is no part of the kernel.
 BUILDS_ON = {
     ("campaign", "requirements"): "the next position is chosen for the goals of `reach`",
+    ("certificates", "laboratory"): "both read XML",
     ("pages", "campaign"): "the page of a design has its run sheet",
     ("pages", "maps"): "the page of a design has its map of lengths",
     ("pages", "reliability"): "pages show how gross errors would act",
@@ -32,6 +35,12 @@ BUILDS_ON = {
     ("studio", "repair"): "the studio writes changes into the file as repairs are written",
     ("studio", "sweeps"): "the studio computes sweeps and shows their page",
 }
+
+
+# What has no table of public names: all of it is public, or only its path is asked for.
+WHOLE = ("ballplate", "ballplate.arguments", "ballplate.designs", "ballplate.simulator")
+# Public names that serve extensions of others.
+FOR_OTHERS = set[str]()
 
 
 def extension_of(path: Path) -> str:
@@ -69,6 +78,33 @@ def test_extensions_build_on_few_others() -> None:
         if extension_of(path) and extension_of(other)
     }
     assert {pair for pair in between if pair[0] != pair[1]} == set(BUILDS_ON)
+
+
+def imports(path: Path) -> Iterator[tuple[str, str]]:
+    """Packages or modules, and names that a module of an extension imports from them."""
+    package = ("ballplate", *path.parts[1:-1])
+    for node in ast.walk(trees()[path]):
+        if isinstance(node, ast.ImportFrom):
+            above = package[: len(package) - node.level + 1] if node.level else ()
+            for alias in node.names:
+                yield ".".join((*above, *filter(None, [node.module]))), alias.name
+        elif isinstance(node, ast.Import):
+            yield from ((alias.name, "") for alias in node.names)
+
+
+def test_extensions_import_public_names_alone() -> None:
+    """Of at most twenty packages, the face, and what reads the arguments of functions."""
+    used = dict[str, set[str]]()
+    for path in filter(extension_of, trees()):
+        for module, name in imports(path):
+            if module.startswith("ballplate") and not module.startswith("ballplate.extensions."):
+                used.setdefault(module, set()).add(name)
+    assert len(used) <= 22, sorted(used)
+    for module in set(used) - set(WHOLE):
+        package = import_module(module)
+        public = set(public_names(package.__file__ or ""))
+        assert used[module] <= public and public <= used[module] | FOR_OTHERS, module
+        assert all(hasattr(package, name) for name in public), module
 
 
 def test_no_extension_imports_another_by_its_name() -> None:

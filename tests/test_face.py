@@ -16,7 +16,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from ballplate.cli import main
-from ballplate.results.fit import Fit
+from ballplate.results.fits import Fit
 from ballplate.simulator.computing.steps import ProgressStep
 from matplotlib.colors import to_hex
 

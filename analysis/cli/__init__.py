@@ -10,17 +10,18 @@ from contextlib import suppress
 from functools import partial
 from importlib import import_module
 from types import ModuleType
-from typing import Any, NoReturn
+from typing import TYPE_CHECKING, Any, NoReturn
 
 from ballplate.simulator.inputs.extensions import MissingExtensionError
+from ballplate.simulator.inputs.faces import lazily
 from ballplate.simulator.inputs.unusable import UnusableError
 
 from .completion import SHELLS, PrintCompletion
 from .encoding import write_data_in_utf8, write_readably
 from .interruption import Interruption, files_named, interruptions, leave, tell, written
+from .notes import add_telling, told
 from .outputs import UsageError, check_outputs
 from .streams import StandardOutputError, keep_standard_numbers, lasting_streams
-from .telling import add_telling, told
 
 USAGE, BAD_FILE, INTERNAL = 2, 3, 70
 
@@ -330,3 +331,66 @@ class _Version(argparse.Action):
 
         print(f"ballplate {version('ballplate')}")
         parser.exit()
+
+
+# Public names of this package: extensions import these alone, and its modules are private.
+if TYPE_CHECKING:
+    from .common import (
+        FITTED,
+        add_file,
+        add_formats,
+        add_goal,
+        add_json,
+        add_picture,
+        add_workers,
+        argument_type,
+        at_most,
+        count,
+        coverage_factor,
+        day,
+        experiments,
+        fitted_map,
+        grid,
+        map_path,
+        number,
+        percentage,
+        print_json,
+        print_lines,
+        show,
+        single,
+        trial_count,
+        whole,
+        write_noted,
+        write_picture,
+    )
+    from .excerpts import print_errors
+    from .notes import complain, note, warn
+    from .outputs import (
+        PAGE,
+        PARQUET,
+        Needed,
+        Output,
+        OutputAction,
+        UsageError,
+        Writer,
+        add_force,
+        add_output,
+        check_outputs,
+        check_overwritten,
+        text_writer,
+        write,
+        write_outputs,
+    )
+    from .progress_bars import duration, progress
+    from .reading_options import (
+        add_readings,
+        add_readings_argument,
+        observed_readings,
+        refuse_other_files,
+        refuse_wrong_order,
+        tables,
+        warn_of,
+    )
+    from .table_options import KEYS, add_tables, named_sources, rule, with_options
+
+__getattr__, __dir__ = lazily(__name__, __file__)

@@ -13,8 +13,8 @@ from ballplate.simulator.inputs.extensions import service
 
 from .common import add_file, add_formats, percentage
 from .interruption import signatures, written
+from .notes import complain, note, tell_notes, warn
 from .outputs import UsageError
-from .telling import complain, note, tell_notes, warn
 
 if TYPE_CHECKING:
     from ..planning.checked_files import CheckedFile
@@ -107,7 +107,7 @@ def run(options: Namespace) -> int:
     from ..planning.checked_files import Wanted, check_files
     from .common import print_json
     from .file_patterns import matching_files
-    from .progress import progress
+    from .progress_bars import progress
 
     goals = _goals(options)
     is_repairing = options.fix or options.diff

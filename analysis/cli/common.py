@@ -13,8 +13,8 @@ from functools import wraps
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
+from .notes import complain, note, tell_notes, warn
 from .outputs import PICTURE, Contents, UsageError, Writer, add_output, write
-from .telling import complain, note, tell_notes, warn
 
 if TYPE_CHECKING:
     from ballplate.simulator.experiment.model import Experiment
@@ -113,7 +113,7 @@ def at_most(number: int, most: int, things: str) -> int:
 
 def trial_count(text: str) -> int:
     """Read a number of synthetic data sets from the command line."""
-    from ..montecarlo.trials import MOST_TRIALS
+    from ..montecarlo.trial_runs import MOST_TRIALS
 
     return at_most(count(text), MOST_TRIALS, "data sets")
 
@@ -239,7 +239,7 @@ def experiments(options: Namespace, planning: bool = False) -> list[Experiment]:
 
     :raises ExperimentError: the errors of all files together.
     """
-    from ballplate.simulator.experiment.load import load
+    from ballplate.simulator.experiment.loading import load
     from ballplate.simulator.experiment.variants import unknown_variants
     from ballplate.simulator.inputs.messages import ExperimentError, Message
 
@@ -291,7 +291,7 @@ def fitted_map(path: Path) -> FittedMap:
     """
     from ballplate.simulator.experiment.map_files import read_map
 
-    from ..results.fit_of_file import fit_of_file, kind_of_file
+    from ..results.fit_files import fit_of_file, kind_of_file
 
     if kind_of_file(path) != "experiment":
         return read_map(path)

@@ -87,7 +87,7 @@ def run(options: Namespace) -> int:
     """
     from ..estimators.distances import compare_estimators
     from .common import experiments, print_json, print_lines
-    from .progress import progress
+    from .progress_bars import progress
 
     published = {"rms": options.published_rms, "maximum": options.published_maximum}
     found = []

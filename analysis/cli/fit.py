@@ -27,15 +27,15 @@ from .common import (
     whole,
 )
 from .compare import add_pairs
+from .notes import warn
 from .outputs import UsageError, Writer, add_force, add_output, write
 from .reading_options import add_readings, observed_readings, warn_of
-from .telling import warn
 
 if TYPE_CHECKING:
     from ballplate.simulator.computing.steps import ProgressStep
     from ballplate.simulator.experiment.model import Experiment
 
-    from ..results.fit import Fit
+    from ..results.fits import Fit
 
 GROUP = "evaluate"
 HELP = "estimate machine errors, balls and poses from readings"
@@ -147,7 +147,7 @@ def run(options: Namespace) -> int:
     """Fit one experiment; 1 if there is something to complain of."""
     from ballplate.simulator.experiment.map_files import write_map
 
-    from ..results.fit import Fit
+    from ..results.fits import Fit
     from ..results.map_of_fit import left_out_words
     from .common import show
 
@@ -185,7 +185,7 @@ def _with_trials(options: Namespace, result: Fit, experiment: Experiment) -> Fit
     from ballplate.simulator.computing.processes import processors
     from ballplate.simulator.inputs.messages import refused
 
-    from .progress import progress
+    from .progress_bars import progress
 
     seed = experiment.seed if options.seed is None else options.seed
     with progress(options) as shown:

@@ -8,7 +8,7 @@ from pathlib import Path
 from ballplate.simulator.inputs.messages import in_lines, in_one_line
 
 from ..planning.checked_files import CheckedDesign, CheckedFile
-from ..results.parts import scale_lines, scale_warnings, target_lines, verdict_lines
+from ..results.text_blocks import scale_lines, scale_warnings, target_lines, verdict_lines
 
 
 def annotation_lines(checked: CheckedFile, workspace: Path | None = None) -> list[str]:

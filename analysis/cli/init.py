@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from argparse import ArgumentParser, Namespace
 
+from .notes import note
 from .outputs import add_force, add_output, write
-from .telling import note
 
 GROUP = "plan"
 HELP = "write a commented experiment or machine file to start from"

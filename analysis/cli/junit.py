@@ -9,7 +9,7 @@ from xml.etree import ElementTree
 from ballplate.simulator.inputs.messages import in_one_line
 
 from ..planning.checked_files import CheckedDesign, CheckedFile
-from ..results.parts import verdict_lines
+from ..results.text_blocks import verdict_lines
 
 # No XML document can hold these, not even as character references.
 NOT_IN_XML = re.compile("[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")

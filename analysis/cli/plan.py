@@ -21,8 +21,8 @@ from .common import (
     single,
     whole,
 )
+from .notes import note
 from .outputs import Writer, add_force, add_output, write
-from .telling import note
 
 if TYPE_CHECKING:
     from ..planning.selection import Campaign
@@ -186,11 +186,11 @@ def run(options: Namespace) -> int:
     from ballplate.simulator.computing.processes import processors
     from ballplate.simulator.inputs.messages import ExperimentError
 
-    from ..planning.campaign import Request, campaign
+    from ..planning.campaign_choice import Request, campaign
     from ..planning.constraints import HOUR, Budget
     from ..planning.earlier import begun
     from .excerpts import print_errors
-    from .progress import progress
+    from .progress_bars import progress
 
     experiment = single(options, planning=True)
     offered, earlier = begun(experiment, options.done, options.moved, options.earlier)

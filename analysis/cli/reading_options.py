@@ -8,9 +8,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from .common import add_file, single
+from .notes import complain, note, warn
 from .outputs import UsageError
 from .table_options import add_tables, named_sources, with_options
-from .telling import complain, note, warn
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -6,8 +6,8 @@ from argparse import ArgumentParser, ArgumentTypeError, Namespace
 from typing import TYPE_CHECKING, Any
 
 from .common import add_file, add_json, add_page, add_workers, percentage, trial_count, whole
+from .notes import complain
 from .outputs import UsageError, add_force, write
-from .telling import complain
 
 if TYPE_CHECKING:
     from ballplate.simulator.computing.steps import ProgressStep
@@ -100,7 +100,7 @@ def run(options: Namespace) -> int:
 def _write_page(options: Namespace, prediction: Prediction) -> None:
     from ballplate.simulator.inputs.extensions import function
 
-    from .progress import progress
+    from .progress_bars import progress
 
     with progress(options) as shown:
         text = function("page")(prediction, report=shown.show)
@@ -111,8 +111,8 @@ def _trials(experiment: Experiment, options: Namespace) -> Trials:
     from ballplate.simulator.computing.processes import processors
 
     from ..montecarlo.experiments import trials
-    from ..montecarlo.trials import MOST_TRIALS
-    from .progress import progress
+    from ..montecarlo.trial_runs import MOST_TRIALS
+    from .progress_bars import progress
 
     with progress(options) as shown:
 

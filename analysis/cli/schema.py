@@ -36,7 +36,7 @@ def run(options: Namespace) -> int:
 
 
 def _experiment() -> dict[str, Any]:
-    from ballplate.simulator.experiment.schema import schema
+    from ballplate.simulator.experiment.json_schema import schema
 
     return schema()
 

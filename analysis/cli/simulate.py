@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import TextIO
 
 from .common import add_file, whole
+from .notes import note
 from .outputs import add_force, add_output, text_writer, write
-from .telling import note
 
 GROUP = "measure"
 HELP = "write synthetic readings of a design"

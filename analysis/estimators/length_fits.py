@@ -28,9 +28,9 @@ from ballplate.simulator.readings.observed_readings import ObservedReadings
 
 from ..presentation.formatting import aligned, as_data, number, picked
 from ..presentation.result import FitResult
-from ..rank.verdict import rank_complaint
+from ..rank.verdicts import rank_complaint
 from ..results.adjustments import Adjustment, adjustments, few_degrees_of_freedom, freedom_words
-from ..results.parts import adjustment_data, adjustment_lines
+from ..results.text_blocks import adjustment_data, adjustment_lines
 
 FACTORS = ("e1", "e2", "e3", "e4", "e5", "e6")
 

@@ -35,7 +35,7 @@ from ballplate.simulator.readings.observed_readings import ObservedReadings
 from numpy.typing import NDArray
 
 from ..results.estimates import ParameterEstimate
-from ..results.fit import Fit
+from ..results.fits import Fit
 from ..results.plates import axes_of_plates
 from ..results.study import fit
 from .reversal_result import ReversalFit, of_all_balls

@@ -26,8 +26,8 @@ from ..presentation.formatting import (
 from ..presentation.result import FitResult
 from ..presentation.vectors import Vectors, draw_vectors
 from ..results.estimates import ParameterEstimate
-from ..results.fit import Fit
-from ..results.parts import MOST_BALLS
+from ..results.fits import Fit
+from ..results.text_blocks import MOST_BALLS
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -13,9 +13,9 @@ from ballplate.simulator.computing.threads import single_threaded
 from ballplate.simulator.estimation.linearisation import Linearisation, linearise
 from ballplate.simulator.machines.protocol import Array, Integers
 
+from .bias_patterns import patterns
 from .events import SLIP, Cause, cause, event_groups, whole
-from .leftover import HIDDEN, Columns, Leftover, leftover, orthonormal
-from .patterns import patterns
+from .remainders import HIDDEN, Columns, Leftover, leftover, orthonormal
 from .scatter import Scatter, log_chances, ratio, scatters, with_scatter
 from .smooth import Smooth, smooth_errors
 from .suspects import Diagnosis, MoreScatter, Suspect, Unexplained

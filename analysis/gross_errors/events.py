@@ -10,7 +10,7 @@ import numpy as np
 from ballplate.simulator.design.observations.distances import CalibratedDistances
 from ballplate.simulator.machines.protocol import Integers
 
-from .patterns import Patterns
+from .bias_patterns import Patterns
 
 # Kinds whose patterns come one for each axis, of one subject together.
 BY_AXIS: tuple[str, ...] = ("reading", "end", "ball", "moved", "probe")

@@ -9,7 +9,7 @@ from ballplate.simulator.design.observations.lengths import length_name
 from ballplate.simulator.geometry.motions import AXIS_NAMES
 from ballplate.simulator.machines.protocol import Integers
 
-from .patterns import Patterns
+from .bias_patterns import Patterns
 
 
 def name(given: Patterns, k: int, with_position: bool = True) -> str:

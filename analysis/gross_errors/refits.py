@@ -31,10 +31,10 @@ from ballplate.simulator.readings.wrong_offsets import (
     with_offsets,
 )
 
+from .bias_patterns import patterns
 from .cause_search import FAMILY, LOG_ODDS_LIMIT, Search
 from .exact_values import diagnosis_of_all
-from .leftover import leftover
-from .patterns import patterns
+from .remainders import leftover
 from .suspects import Diagnosis, Refit
 from .tails import log_chance, normal_equivalent
 

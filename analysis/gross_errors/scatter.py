@@ -8,7 +8,7 @@ import numpy as np
 from ballplate.simulator.design.arrays import Design, measured, reading_uncertainties
 from ballplate.simulator.machines.protocol import Array, Integers
 
-from .leftover import Leftover
+from .remainders import Leftover
 
 
 @dataclass(frozen=True)

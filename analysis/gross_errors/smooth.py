@@ -14,7 +14,7 @@ from ballplate.simulator.geometry.motions import AXIS_NAMES
 from ballplate.simulator.machines.protocol import Array
 from numpy.polynomial import legendre
 
-from .patterns import LinearisedDesign
+from .bias_patterns import LinearisedDesign
 
 # Scale readings closer than this (m) count as the same place on a scale.
 SAME_PLACE = 1e-3

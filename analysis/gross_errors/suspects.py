@@ -10,7 +10,7 @@ import numpy as np
 from ballplate.simulator.design.arrays import Design
 from ballplate.simulator.machines.protocol import Array, Integers, Unit
 
-from .patterns import Patterns
+from .bias_patterns import Patterns
 from .scatter import Scatter
 
 

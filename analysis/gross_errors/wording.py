@@ -17,9 +17,9 @@ from ballplate.simulator.machines.protocol import Integers
 
 from ..presentation.formatting import SHOWN, number, picked
 from ..rank.proposed_bars import listed
+from .bias_patterns import Patterns, position_order
 from .cause_search import FAMILY, MOST
 from .names import common_ball, length_name, name, reading_name
-from .patterns import Patterns, position_order
 from .suspects import Diagnosis, MoreScatter, Refit, Suspect, Unexplained
 
 # A direction of a cause is told from so many standard uncertainties on.

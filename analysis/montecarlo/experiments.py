@@ -28,7 +28,7 @@ from ballplate.simulator.readings.simulated import on_stated_machine
 from .accumulator import Accumulator
 from .figures import MonteCarloOutcome, outcome, power_of_difference, power_of_misfit
 from .targets import targets
-from .trials import TASK, run_trials, sum_of_task
+from .trial_runs import TASK, run_trials, sum_of_task
 
 
 @dataclass(frozen=True)

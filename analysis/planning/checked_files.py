@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from ballplate.simulator.computing.steps import Report, counted, unreported
-from ballplate.simulator.experiment.load import load
+from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.experiment.variants import unknown_variants
 from ballplate.simulator.inputs.extensions import service

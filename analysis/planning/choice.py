@@ -11,9 +11,9 @@ from ballplate.simulator.experiment.model import Candidate, Experiment, Pool
 from ..results.prediction import Prediction
 from .constraints import Budget, Spent
 from .criteria import CriterionName
-from .done import REST
 from .drift_in_orders import DriftEffect, DriftSize
 from .orders import LEAST_CHANGE_OVER, ReadingOrder
+from .positions_read import REST
 from .schedule import Completion
 from .whole_pool import PoolGap
 

@@ -10,14 +10,14 @@ from typing import Any, cast
 import numpy as np
 from ballplate.simulator.design.observations.calibration import Calibration
 from ballplate.simulator.design.observations.whitening import CovarianceRoot
-from ballplate.simulator.experiment.load import load
+from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.experiment.model import Experiment, Position
 from ballplate.simulator.inputs.messages import ExperimentError, Message, refused
 from ballplate.simulator.inputs.settings import hint
 from ballplate.simulator.inputs.yamltree import GivenText
 
-from .done import done_candidates
 from .offer import Offer, offer
+from .positions_read import done_candidates
 from .short_names import names_of_plan
 
 

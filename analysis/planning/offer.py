@@ -13,8 +13,8 @@ from dataclasses import dataclass, field
 
 from ballplate.simulator.experiment.model import AtMost, Candidate, Experiment, Pool, Position
 
-from .done import REST, SetUp, base_name, next_name, renamed
 from .information import Information
+from .positions_read import REST, SetUp, base_name, next_name, renamed
 
 
 @dataclass(frozen=True)

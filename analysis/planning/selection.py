@@ -16,10 +16,10 @@ from ..presentation.result import Result
 from .choice import CurvePoint, Gain, Selection
 from .constraints import HOUR, Spent
 from .criteria import DESCRIPTIONS
-from .done import base_name
 from .drift_in_orders import DriftEffect, in_order_settings, in_time, is_of_plates
 from .experiment_file import experiment_text
 from .orders import ORDERS
+from .positions_read import base_name
 from .run_sheet_tables import sheet_data, sheet_lines
 from .schedule import RunSheet, run_sheet
 

@@ -8,7 +8,7 @@ from typing import Any
 
 from ballplate.simulator.experiment.model import Candidate, Experiment, Position
 
-from .done import base_name
+from .positions_read import base_name
 
 # A column whose name begins so has the rest of it in all rows.
 OF_ALL = "="

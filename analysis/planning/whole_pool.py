@@ -15,7 +15,7 @@ from ballplate.simulator.inputs.extensions import optional_service, service
 from ballplate.simulator.inputs.messages import ExperimentError
 from ballplate.simulator.inputs.settings import listing
 
-from ..rank.verdict import Verdict, changed_names
+from ..rank.verdicts import Verdict, changed_names
 from ..results.study import check
 from .information import Information
 

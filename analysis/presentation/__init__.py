@@ -1,1 +1,70 @@
 """Forms of tables and pictures in which results are shown."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from ballplate.simulator.inputs.faces import lazily
+
+# Public names of this package: extensions import these alone, and its modules are private.
+if TYPE_CHECKING:
+    from .files import write_file
+    from .formats import FORMATS
+    from .formatting import (
+        SHOWN,
+        aligned,
+        amount_of,
+        as_data,
+        ascii_units,
+        csv_lines,
+        finite,
+        fixed,
+        micro,
+        number,
+        percent,
+        picked,
+        records,
+        shown_unit,
+        to_uncertainty,
+        uncertainty_words,
+    )
+    from .paper import escaped, on_paper, pitch
+    from .pictures import draw_box, draw_scene, scene_figure
+    from .result import FitResult, Result
+    from .scenes import (
+        MOST_BALLS,
+        RISE,
+        TURN,
+        Box,
+        DrawnPosition,
+        Scene,
+        box,
+        box_edges,
+        hull,
+        names_fit,
+        projection,
+        scene,
+    )
+    from .svg import (
+        DASHES,
+        INK,
+        MARKERS,
+        MUTED,
+        PAPER,
+        SERIES,
+        WIDTH,
+        blank_axes,
+        common_legend,
+        drawing,
+        legend_above,
+        placed_axes,
+        round_number,
+        save,
+        scale_bar,
+        scaled_axis,
+        sticks,
+    )
+    from .table import Block, Entry, Row, Table
+    from .vectors import Vectors, draw_vectors
+
+__getattr__, __dir__ = lazily(__name__, __file__)

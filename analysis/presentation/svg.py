@@ -6,11 +6,9 @@ from __future__ import annotations
 
 import io
 import math
-import re
 import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
-from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -27,10 +25,6 @@ if TYPE_CHECKING:
 # Stand-ins that the page's colours replace, so that drawings follow its light and dark schemes.
 INK, MUTED, PAPER = "#010203", "#808182", "#fdfcfb"
 SERIES = ("#0a72b1", "#d55e01", "#019e74", "#cc79a8", "#e69f02", "#57b4e8")
-COLOURS = {INK: "--ink", MUTED: "--muted", PAPER: "--paper"} | {
-    colour: f"--series-{k}" for k, colour in enumerate(SERIES)
-}
-
 # Lines are told apart by these as well, so that nothing depends on colour.
 DASHES = ("-", "--", ":", "-.", (0, (5, 1, 1, 1, 1, 1)), (0, (8, 3)))
 MARKERS = ("o", "s", "^", "D", "v", "P")
@@ -161,44 +155,6 @@ def common_legend(figure: Figure, axes: Axes, **more: Any) -> None:
     figure.legend(handles, labels, **more)
 
 
-def as_svg(figure: Figure, name: str, words: str) -> str:
-    """The figure as an element of a page, with `name` in front of its ids and a text for those who
-    do not see it.
-    """
-    found = io.StringIO()
-    figure.savefig(
-        found,
-        format="svg",
-        transparent=True,
-        metadata=dict.fromkeys(("Date", "Creator", "Format", "Type")),
-    )
-    body = found.getvalue()
-    body = body[body.index("<svg") :]
-    size = re.search(r'viewBox="0 0 ([\d.]+) ([\d.]+)"', body)
-    assert size is not None
-    inner = body[body.index(">") + 1 :]
-    inner = re.sub(r"<metadata>.*?</metadata>", "", inner, flags=re.DOTALL)
-    inner = re.sub(r"<!--.*?-->\s*", "", inner, flags=re.DOTALL)
-    # A style inside would hold for the whole page, which has it in its own.
-    inner = re.sub(r"<defs>\s*<style.*?</style>\s*</defs>", "", inner, flags=re.DOTALL)
-    # Groups that nothing refers to need no id.
-    used = set(re.findall(r'(?:xlink:href="#|url\(#)([^")]+)', inner))
-    inner = re.sub(
-        r' id="([^"]+)"', lambda m: f' id="{name}-{m[1]}"' if m[1] in used else "", inner
-    )
-    inner = re.sub(r'xlink:href="#([^"]+)"', rf'href="#{name}-\1"', inner)
-    inner = re.sub(r"url\(#([^)]+)\)", rf"url(#{name}-\1)", inner)
-    for colour, variable in COLOURS.items():
-        inner = inner.replace(colour, f"var({variable})")
-    inner = re.sub(r"font: ([\d.]+)px [^;\"]*", r"font: \1px sans-serif", inner)
-    inner = re.sub(r"\n\s*", "\n", inner)
-    start = (
-        f'<svg viewBox="0 0 {size[1]} {size[2]}" role="img"'
-        f' aria-label="{escape(words, quote=True)}">'
-    )
-    return start + inner.strip()
-
-
 PICTURES = (".svg", ".png", ".pdf")
 
 
@@ -237,3 +193,23 @@ def save(figure: Figure, path: str | Path | None, words: str) -> Figure:
         figure.savefig(whole, format=kind[1:], facecolor="white", dpi=200, metadata=metadata)
     write_file(path, whole.getvalue())
     return figure
+
+
+# Ratio of the largest to the smallest value above which an axis is logarithmic.
+WIDE = 20.0
+
+
+def scaled_axis(axes: Axes, values: Array, axis: str) -> None:
+    """A logarithmic axis for values that are far apart, otherwise one that starts at zero."""
+    known = values[np.isfinite(values)]
+    if not len(known):
+        return
+    if known.min() > 0.0 and known.max() > WIDE * known.min():
+        from matplotlib.ticker import NullLocator
+
+        (axes.set_xscale if axis == "x" else axes.set_yscale)("log")
+        along = axes.xaxis if axis == "x" else axes.yaxis
+        along.set_major_formatter("{x:g}")
+        along.set_minor_locator(NullLocator())
+    elif known.min() >= 0.0:
+        (axes.set_xlim if axis == "x" else axes.set_ylim)(0.0, None)

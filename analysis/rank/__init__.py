@@ -1,1 +1,25 @@
 """Null directions of a design, and their description in words."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from ballplate.simulator.inputs.faces import lazily
+
+# Public names of this package: extensions import these alone, and its modules are private.
+if TYPE_CHECKING:
+    from .proposed_bars import bar_directions, listed
+    from .verdicts import (
+        Direction,
+        Verdict,
+        changed_names,
+        effects,
+        independent_mixture,
+        length,
+        null_changes,
+        verdict,
+        weak_changes,
+        weak_limit,
+    )
+
+__getattr__, __dir__ = lazily(__name__, __file__)

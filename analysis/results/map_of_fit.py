@@ -28,7 +28,10 @@ from ballplate.simulator.maps.fitted_map import (
     determined_only,
 )
 from ballplate.simulator.readings.observed_readings import ObservedReadings
-from ballplate.simulator.readings.same_readings import fingerprint, position_fingerprints
+from ballplate.simulator.readings.readings_in_common import (
+    fingerprint,
+    position_fingerprints,
+)
 
 from ..presentation.formatting import number
 from .estimates import ParameterEstimate

@@ -15,12 +15,12 @@ from ballplate.simulator.inputs.settings import number_of
 
 from ..presentation.formatting import picked
 from ..presentation.result import Result
-from ..rank.verdict import Verdict
+from ..rank.verdicts import Verdict
 from ..uncertainty.scale import Scale
 from ..uncertainty.summaries import Quantity, tasks_of
 from ..uncertainty.tasks import TaskUncertainty
 from .influences import InfluenceUncertainty, influence_data, influence_table
-from .parts import (
+from .text_blocks import (
     map_lines,
     quantities_data,
     quantity_data,

@@ -19,7 +19,7 @@ from ballplate.simulator.machines.plane import PlaneModel
 from ballplate.simulator.machines.protocol import Array
 from ballplate.simulator.machines.spatial_metric import SpatialMetricModel
 
-from ..rank.verdict import verdict
+from ..rank.verdicts import verdict
 from ..uncertainty.scale import scale_of
 from ..uncertainty.summaries import Quantity, tasks_of, uncertainties
 from ..uncertainty.tasks import TaskUncertainty
@@ -31,8 +31,8 @@ from .prediction import Prediction
 if TYPE_CHECKING:
     from ballplate.simulator.readings.observed_readings import ObservedReadings
 
-    from .campaign_sigmas import CampaignSigmas
-    from .fit import Fit
+    from .fits import Fit
+    from .sigmas_by_campaign import CampaignSigmas
 
 
 @dataclass(frozen=True)
@@ -117,15 +117,15 @@ def fit(
     # Loaded only now, so that what plans and checks need not load answers sooner.
     from ballplate.simulator.estimation.gauss_newton import estimate, linearised_fit
 
-    from ..gross_errors.leftover import too_many_entries
     from ..gross_errors.refits import diagnosis_with_refits
+    from ..gross_errors.remainders import too_many_entries
     from ..gross_errors.suspects import Diagnosis
-    from .campaign_sigmas import campaign_sigmas
     from .estimates import estimated_functions, parameter_estimates
-    from .fit import Fit, lack_of_fit
+    from .fits import Fit, lack_of_fit
     from .observation_groups import groups_of, reweighted
     from .plates import plate_coordinates
     from .residuals import largest_residuals
+    from .sigmas_by_campaign import campaign_sigmas
 
     is_estimated = (sigma or experiment.sigma) == "estimated"
     campaigns = campaign_sigmas(experiment, observed) if is_estimated and not reweight else None

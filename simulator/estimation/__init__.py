@@ -1,1 +1,32 @@
 """Estimation from a design and its readings: blocks, elimination, Gauss-Newton, starting values."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from ballplate.simulator.inputs.faces import lazily
+
+# Public names of this package: extensions import these alone, and its modules are private.
+if TYPE_CHECKING:
+    from .corrections import corrected_points, correction_rows
+    from .covariance import MICROMETRE
+    from .functions import (
+        BallPlaces,
+        Coordinates,
+        Displacements,
+        Distances,
+        Functions,
+        MeasuredPoints,
+        Parameters,
+        Places,
+        displacements,
+        function_name,
+        linear_functions,
+    )
+    from .gauss_newton import Solution, Status, estimate, linearised_fit
+    from .hat import hat_rows, row_count, row_places, whitened_residuals
+    from .linearisation import LinearFunctions, Linearisation, linearise
+    from .spheres import FEWEST_POINTS, SphereFit, closest_sphere
+    from .substitution import in_order
+
+__getattr__, __dir__ = lazily(__name__, __file__)

@@ -1,1 +1,45 @@
 """Experiment files: their keys, loading, and messages about errors in them."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from ballplate.simulator.inputs.faces import lazily
+
+# Public names of this package: extensions import these alone, and its modules are private.
+if TYPE_CHECKING:
+    from .changes import node_of
+    from .curve_files import read_curves
+    from .error_tables import LineError, parse_line, parse_point
+    from .json_schema import DRAFT, schema, tidied
+    from .layout import lay_out
+    from .loading import build, load, trees_of, with_pool
+    from .machine_file import load_machine
+    from .map_files import BINARY, read_map, write_map
+    from .model import Candidate, ChangeTimes, Experiment, Pool, Position, Probe, ReadingGroup
+    from .model_files import absolute
+    from .modules import python_models, runs_code
+    from .name_rules import PLACE, check_rule
+    from .named_files import (
+        existing_file,
+        files_of_machine,
+        is_rooted,
+        keyed_paths,
+        model_modules,
+        module_files,
+        named_in,
+    )
+    from .pool import placed_only, with_chosen
+    from .pools import seconds_of
+    from .readings_section import ColumnsSettings, Coordinate, ReadingsSettings
+    from .sections import Line, Seed
+    from .variants import (
+        is_same_place,
+        node_at,
+        override,
+        place_of,
+        variant_trees,
+        with_present_keys,
+    )
+
+__getattr__, __dir__ = lazily(__name__, __file__)

@@ -52,7 +52,7 @@ def lay_out(experiment: Experiment, is_pool: bool = False) -> Design:
     """Design of an experiment, or of a pool of positions that are never solved for together.
 
     >>> from pathlib import Path
-    >>> from ballplate.simulator.experiment.load import load
+    >>> from ballplate.simulator.experiment.loading import load
     >>> lay_out(load(Path("designs/quickstart.yaml"))[0]).dimension
     3
     """

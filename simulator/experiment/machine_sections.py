@@ -264,7 +264,7 @@ class DescribedMachineSettings(Settings):
 
 def machine_schema() -> dict[str, Any]:
     """Return the JSON Schema (draft 2020-12) of a machine file."""
-    from .schema import DRAFT, tidied
+    from .json_schema import DRAFT, tidied
 
     found: dict[str, Any] = tidied(DescribedMachineSettings.model_json_schema())
     return {"$schema": DRAFT, **found, "title": "ballplate machine"}

@@ -12,7 +12,7 @@ from ..inputs.quantities import Length
 from ..inputs.settings import NonEmpty, Settings, Text
 from ..machines.protocol import Unit
 from ..machines.settings import ErrorModelSettings
-from .schema import DRAFT, tidied
+from .json_schema import DRAFT, tidied
 from .sections import Line, VolumeSettings
 
 Sha256 = Annotated[str, StringConstraints(pattern="^[0-9a-f]{64}$")]

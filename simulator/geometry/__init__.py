@@ -1,1 +1,35 @@
 """Places of balls: on their artefact, and in the machine for each position of the artefact."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from ballplate.simulator.inputs.faces import lazily
+
+# Public names of this package: extensions import these alone, and its modules are private.
+if TYPE_CHECKING:
+    from .artefacts import BryanGaugeSettings, GridSettings, SquareSettings, TwoSpheresSettings
+    from .axes import PlateAxes, axes_words, plate_axes
+    from .ball_layouts import ArtefactSettings, BallLayout, Name, frozen, pairs
+    from .grids import even_grid, grid_points
+    from .motions import (
+        AXIS_NAMES,
+        Array,
+        cross_matrices,
+        fit_motion,
+        fixes_pose,
+        pose_size,
+        rigid_motions,
+        without_rigid_motion,
+    )
+    from .positions import (
+        AXIS_INDEX,
+        IN_PLANE_AXES,
+        QUARTER_TURNS,
+        Axis,
+        Pose,
+        ball_coordinates,
+        plane_rotation,
+    )
+
+__getattr__, __dir__ = lazily(__name__, __file__)

@@ -1,3 +1,115 @@
 """Files as text, numbers with units, and messages about errors in them; independent of ball
 plates.
 """
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from ballplate.simulator.inputs.faces import lazily
+
+# Public names of this package: extensions import these alone, and its modules are private.
+if TYPE_CHECKING:
+    from .arguments import (
+        ensure_one_of,
+        ensure_path,
+        ensure_positive,
+        ensure_report,
+        ensure_type,
+        ensure_whole,
+    )
+    from .covariances import (
+        MOST_NAMES,
+        Floats,
+        NamedMatrix,
+        half_digit,
+        matrix_problems,
+        unit_of_area,
+    )
+    from .days import stated_day
+    from .decoding import LINE_END, decoded, refuse_controls, text_and_encoding
+    from .extensions import function, optional_service
+    from .messages import (
+        MORE_ERRORS,
+        MOST_MESSAGES,
+        ExperimentError,
+        Message,
+        Step,
+        Steps,
+        format_path,
+        in_lines,
+        in_one_line,
+        refused,
+    )
+    from .problems import Problems
+    from .quantities import (
+        ANGLE_UNITS,
+        BASE_UNITS,
+        DURATION_UNITS,
+        LENGTH_UNITS,
+        QUANTITY,
+        UNITS,
+        Angle,
+        Length,
+        LengthFunction,
+        PositiveAngle,
+        PositiveLength,
+        QuantityError,
+        Ratio,
+        Target,
+        exact_number,
+        format_length,
+        length_text,
+        metres_or_radians,
+        parse_angle,
+        parse_length,
+        parse_length_function,
+        parse_positive_angle,
+        parse_positive_length,
+        parse_ratio,
+        plain_number,
+        plain_unit,
+        power_of_ten,
+        typed_length,
+    )
+    from .settings import Forms, NonEmpty, Settings, hint, listing, number_of, shorten
+    from .spreadsheets import CsvWriter, cell_of_text, text_of_cell
+    from .tables import (
+        MOST_COLUMNS,
+        MOST_ROWS,
+        FileRow,
+        header_cells,
+        header_names,
+        header_texts,
+        read_number,
+        read_table,
+        split_cells,
+        table_lines,
+        wrong_count,
+    )
+    from .trust import OPENED, UNKNOWN, Trust
+    from .unusable import UnusableError
+    from .validation import validated
+    from .yamltree import (
+        LOADER,
+        GivenText,
+        Mapping,
+        Mark,
+        Node,
+        Scalar,
+        Sequence,
+        child,
+        mark_of,
+        parse_tree,
+        read_bytes,
+        read_text,
+        read_tree,
+        resolve_scalar,
+        to_list,
+        to_python,
+        utf8_text,
+        walk,
+        written,
+    )
+
+__getattr__, __dir__ = lazily(__name__, __file__)

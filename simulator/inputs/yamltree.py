@@ -167,10 +167,10 @@ def read_text(path: Path | GivenText) -> str:
     """
     if isinstance(path, GivenText):
         return path.text
-    return decoded(read_bytes(path), str(path))
+    return utf8_text(read_bytes(path), str(path))
 
 
-def decoded(content: bytes, file: str) -> str:
+def utf8_text(content: bytes, file: str) -> str:
     """The text of a UTF-8 file's content; ``file`` is named in messages.
 
     :raises ExperimentError: it is not UTF-8, or has too long a line.

@@ -15,7 +15,7 @@ from typing import ClassVar, Literal
 
 import numpy as np
 
-from ..splines.pieces import pieces
+from ..splines.polynomial_pieces import pieces
 from ..splines.space import SplineSpace
 from ..splines.spline_fit import SplineFit, fit
 from .arrangement import Arrangement

@@ -171,7 +171,8 @@ def kind_of(settings: Settings) -> ErrorModelKind:
     """The kind of error model that the settings describe."""
     if type(settings) in _KINDS:
         return _KINDS[type(settings)]
-    kind: ErrorModelKind = provided("error_models", vars(settings)["kind"], "ERROR_MODEL")
+    kind: Any = provided("error_models", vars(settings)["kind"], "ERROR_MODEL")
+    assert isinstance(kind, ErrorModelKind)
     return kind
 
 

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 import yaml
 from ballplate.rank.missing_bars import _told
-from ballplate.rank.verdict import Verdict
+from ballplate.rank.verdicts import Verdict
 from ballplate.results.study import check, predict
-from ballplate.simulator.experiment.load import load
+from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.experiment.model import Experiment
 
 FOLDER = Path("designs/hurt_foss")

@@ -11,10 +11,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 from ballplate.rank.canonical import elementary_mixture, principal_directions
-from ballplate.rank.verdict import null_directions, verdict
+from ballplate.rank.verdicts import null_directions, verdict
 from ballplate.simulator.estimation.linearisation import Linearisation, linearise
 from ballplate.simulator.experiment.layout import lay_out
-from ballplate.simulator.experiment.load import load
+from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.inputs.quantities import LengthFunction, Target
 from hypothesis import given, settings
 from hypothesis import strategies as st

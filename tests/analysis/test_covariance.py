@@ -12,7 +12,7 @@ import ballplate as bp
 import numpy as np
 import pytest
 from ballplate.results.estimates import EstimatedFunctions, correct, estimated_functions
-from ballplate.results.fit import Fit
+from ballplate.results.fits import Fit
 from ballplate.simulator.design.arrays import Design, State, nominal_state
 from ballplate.simulator.estimation.gauss_newton import estimate, linearised_fit, moved
 from ballplate.simulator.estimation.linearisation import Linearisation, linearise

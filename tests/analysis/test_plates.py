@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import yaml
-from ballplate.results.fit import Fit
+from ballplate.results.fits import Fit
 from ballplate.results.plates import axes_of_plates, plate_coordinates
 from ballplate.results.study import fit
 from ballplate.simulator.design.arrays import Design
@@ -19,7 +19,7 @@ from ballplate.simulator.design.observations.distances import CalibratedDistance
 from ballplate.simulator.estimation.gauss_newton import gauss_newton, linearised_fit
 from ballplate.simulator.estimation.initial import initial_state
 from ballplate.simulator.experiment.layout import lay_out
-from ballplate.simulator.experiment.load import load
+from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.geometry.axes import PlateAxes, in_plate_axes
 from ballplate.simulator.machines.protocol import Array

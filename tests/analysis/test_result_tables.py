@@ -11,7 +11,7 @@ import ballplate as bp
 import numpy as np
 import pytest
 from ballplate.presentation.result import Result
-from ballplate.results.fit import Fit
+from ballplate.results.fits import Fit
 from ballplate.results.prediction import Prediction
 
 from tests.reference.tables import read_table

@@ -17,7 +17,7 @@ from ballplate.simulator.design.objects import Volume
 from ballplate.simulator.estimation.functions import Distances, MeasuredPoints, linear_functions
 from ballplate.simulator.estimation.linearisation import Linearisation, linearise
 from ballplate.simulator.experiment.layout import lay_out
-from ballplate.simulator.experiment.load import load
+from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.inputs.messages import ExperimentError
 from ballplate.simulator.machines.protocol import Parameter, Reported

@@ -14,7 +14,7 @@ import pytest
 from ballplate.cli import main
 from ballplate.extensions.maps.length_map import LengthMapSettings, length_map
 from ballplate.presentation.formatting import percent
-from ballplate.rank.verdict import Verdict, weak_limit
+from ballplate.rank.verdicts import Verdict, weak_limit
 from ballplate.results.study import check, predict
 from ballplate.simulator.design.arrays import nominal_state
 from ballplate.simulator.design.parameters import shared_layout
@@ -22,7 +22,7 @@ from ballplate.simulator.estimation.corrections import correction_rows
 from ballplate.simulator.estimation.covariance import spectrum
 from ballplate.simulator.estimation.elimination import eliminate
 from ballplate.simulator.experiment.layout import lay_out
-from ballplate.simulator.experiment.load import load
+from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.experiment.model import Experiment
 
 QUICKSTART = Path("designs/quickstart.yaml").read_text(encoding="utf-8")

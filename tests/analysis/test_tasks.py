@@ -16,7 +16,7 @@ from ballplate.simulator.design.parameters import SharedLayout, shared_layout
 from ballplate.simulator.estimation.functions import displacements, linear_functions
 from ballplate.simulator.estimation.linearisation import linearise
 from ballplate.simulator.experiment.layout import lay_out
-from ballplate.simulator.experiment.load import load
+from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.inputs.quantities import Target
 from ballplate.uncertainty.kernel_quantities import task_distances

@@ -13,7 +13,7 @@ import ballplate as bp
 import numpy as np
 import pytest
 import yaml
-from ballplate.rank.verdict import (
+from ballplate.rank.verdicts import (
     Direction,
     FunctionPart,
     PositionPart,

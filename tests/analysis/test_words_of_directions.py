@@ -8,7 +8,7 @@ from itertools import product
 import numpy as np
 import pytest
 from ballplate.rank.proposed_bars import bar_directions
-from ballplate.rank.verdict import deformation, shape
+from ballplate.rank.verdicts import deformation, shape
 
 GRID = np.array([[0.1 * x, 0.15 * y, 0.0] for x in range(4) for y in range(3)])
 # Equal moments, so that a shear is half a turn and half a symmetric strain.

@@ -10,10 +10,10 @@ from typing import Any
 import ballplate as bp
 import numpy as np
 import pytest
-from ballplate.planning.campaign import Request, campaign
+from ballplate.planning.campaign_choice import Request, campaign
 from ballplate.simulator.design.arrays import Design
 from ballplate.simulator.estimation.functions import Coordinates, Distances, Parameters
-from ballplate.simulator.experiment.load import with_pool
+from ballplate.simulator.experiment.loading import with_pool
 from ballplate.uncertainty.kernel_quantities import QuantityKind, evaluation_points
 from ballplate.uncertainty.quantities import QUANTITIES
 

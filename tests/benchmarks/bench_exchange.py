@@ -16,7 +16,7 @@ from ballplate.planning.information import Information, pool_information
 from ballplate.planning.search import Losses, SelectionProblem, best_addition, full_root
 from ballplate.results.study import predict
 from ballplate.simulator.computing.threads import single_threaded
-from ballplate.simulator.experiment.load import load
+from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.experiment.pool import with_chosen
 from ballplate.simulator.machines.protocol import Array
 

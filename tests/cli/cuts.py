@@ -24,7 +24,7 @@ from typing import Any
 
 from ballplate import cli
 from ballplate.extensions.sweeps import task as sweep_task
-from ballplate.planning import campaign
+from ballplate.planning import campaign_choice as campaign
 
 EVENTS = ("open", "os.link", "os.rename", "os.remove")
 # Further events, which are raised here: statements to stores, and that a studio has acted.

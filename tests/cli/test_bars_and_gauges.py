@@ -11,7 +11,7 @@ import pytest
 from ballplate.cli import main
 from ballplate.extensions.sweeps.fingerprint import fingerprint
 from ballplate.simulator.experiment.layout import lay_out
-from ballplate.simulator.experiment.load import load
+from ballplate.simulator.experiment.loading import load
 from scipy.optimize import least_squares
 
 FOLDER = Path("designs/hurt_foss")

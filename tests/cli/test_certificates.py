@@ -15,7 +15,7 @@ from ballplate.cli import main
 from ballplate.simulator.design.arrays import Design
 from ballplate.simulator.estimation.gauss_newton import estimate
 from ballplate.simulator.experiment.layout import lay_out
-from ballplate.simulator.experiment.load import load
+from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.inputs.messages import ExperimentError
 from ballplate.simulator.readings.certificate_files import certified_values, read_certificate
 from ballplate.simulator.readings.reading_files import read_readings

@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 from ballplate.cli import GROUPS, commands_of_all, main
 from ballplate.simulator.experiment.layout import lay_out
-from ballplate.simulator.experiment.load import load
+from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.machines.truth import true_parameters
 
 QUICKSTART = "designs/quickstart.yaml"

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from ballplate.cli import main
-from ballplate.simulator.experiment.load import load
+from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.experiment.machine_file import load_machine
 from ballplate.simulator.inputs.messages import ExperimentError
 from ballplate.simulator.machines.description import reference_functions

@@ -7,13 +7,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from ballplate.results.fit import Fit
+from ballplate.results.fits import Fit
 from ballplate.results.prediction import Prediction
 from ballplate.results.study import fit, predict
 from ballplate.simulator.design.arrays import State
 from ballplate.simulator.estimation.gauss_newton import linearised_fit
 from ballplate.simulator.experiment.layout import lay_out
-from ballplate.simulator.experiment.load import load
+from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.machines.truth import true_machine
 from ballplate.simulator.readings.generate import (

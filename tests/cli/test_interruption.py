@@ -66,7 +66,7 @@ def test_one_that_was_swallowed_ends_a_sweep(
 def test_one_that_was_swallowed_ends_monte_carlo(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    from ballplate.montecarlo import trials
+    from ballplate.montecarlo import trial_runs as trials
 
     accuracy_of = trials.accuracy_of
 

@@ -276,7 +276,7 @@ def idle(monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.fixture
 def planned_once(monkeypatch: pytest.MonkeyPatch, shelf: Path) -> None:
     """The search of `plan` is done once for all tests: what is tested is what comes after it."""
-    from ballplate.planning import campaign
+    from ballplate.planning import campaign_choice as campaign
 
     search = campaign.campaign
 

@@ -10,7 +10,7 @@ import pytest
 from ballplate.cli import main
 from ballplate.results.study import fit
 from ballplate.simulator.experiment.layout import lay_out
-from ballplate.simulator.experiment.load import load
+from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.readings.reading_files import read_readings
 
 NUMBER = count()

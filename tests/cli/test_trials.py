@@ -15,7 +15,7 @@ from pathlib import Path
 import ballplate as bp
 import pytest
 from ballplate.cli import main
-from ballplate.cli.progress import progress
+from ballplate.cli.progress_bars import progress
 from ballplate.simulator.computing.steps import ProgressStep
 
 from tests.extensions.sweeps.support import hearing_interruptions

@@ -19,8 +19,8 @@ from ballplate.extensions.splines import error_curve as curve
 from ballplate.extensions.splines import read_points as read
 from ballplate.extensions.sweeps import axes, bundle, load
 from ballplate.extensions.sweeps import sweep_settings as settings
-from ballplate.gross_errors import leftover
-from ballplate.montecarlo import trials
+from ballplate.gross_errors import remainders as leftover
+from ballplate.montecarlo import trial_runs as trials
 from ballplate.planning import criteria, information
 from ballplate.simulator.design import lookup
 from ballplate.simulator.design.observations import distances, joint_values

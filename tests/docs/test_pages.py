@@ -17,8 +17,8 @@ from typing import Any
 import pytest
 import yaml
 from ballplate.cli import parser
+from ballplate.simulator.experiment.json_schema import schema
 from ballplate.simulator.experiment.machine_sections import machine_schema
-from ballplate.simulator.experiment.schema import schema
 
 DOCS = Path("docs")
 GUARD = (DOCS / "how-to/guard-designs.md").read_text(encoding="utf-8")

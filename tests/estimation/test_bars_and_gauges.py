@@ -18,7 +18,7 @@ from ballplate.simulator.estimation.gauss_newton import moved
 from ballplate.simulator.estimation.length_equations import LengthEstimator, length_estimate
 from ballplate.simulator.estimation.spheres import fit_sphere
 from ballplate.simulator.experiment.layout import lay_out
-from ballplate.simulator.experiment.load import load
+from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.machines.truth import true_machine
 from ballplate.simulator.readings.generate import exact_readings, on_true_machine, true_artefacts

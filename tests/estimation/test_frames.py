@@ -13,7 +13,7 @@ from ballplate.simulator.design.arrays import Design, nominal_state
 from ballplate.simulator.design.observations.coordinates import CalibratedCoordinates
 from ballplate.simulator.design.observations.readings import reading_blocks
 from ballplate.simulator.experiment.layout import lay_out
-from ballplate.simulator.experiment.load import load
+from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.geometry.motions import vector_from_rotation
 
 TOP = Path(__file__).parents[2]

@@ -19,7 +19,7 @@ from ballplate.simulator.estimation.elimination import eliminate
 from ballplate.simulator.estimation.gauss_newton import gauss_newton
 from ballplate.simulator.estimation.initial import initial_state
 from ballplate.simulator.experiment.layout import lay_out
-from ballplate.simulator.experiment.load import written_in_python
+from ballplate.simulator.experiment.loading import written_in_python
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.inputs.messages import ExperimentError
 from ballplate.simulator.readings.gross_errors import find_gross_errors

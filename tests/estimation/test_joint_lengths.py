@@ -28,7 +28,7 @@ from ballplate.simulator.estimation.elimination import eliminate
 from ballplate.simulator.estimation.gauss_newton import gauss_newton, newton_step
 from ballplate.simulator.estimation.length_equations import length_estimate
 from ballplate.simulator.experiment.layout import lay_out
-from ballplate.simulator.experiment.load import load
+from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.geometry.motions import rotation_from_vector
 from ballplate.simulator.machines.spatial_metric import SpatialMetricModel

@@ -12,7 +12,7 @@ from ballplate.results.study import predict
 from ballplate.simulator.design.arrays import nominal_state
 from ballplate.simulator.design.observations.lengths import Lengths
 from ballplate.simulator.experiment.layout import lay_out
-from ballplate.simulator.experiment.load import load
+from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.readings.generate import noisy_certificate
 

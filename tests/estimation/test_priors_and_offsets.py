@@ -19,7 +19,7 @@ from ballplate.simulator.estimation.gauss_newton import gauss_newton, linearised
 from ballplate.simulator.estimation.initial import initial_state
 from ballplate.simulator.estimation.linearisation import linearise
 from ballplate.simulator.experiment.layout import lay_out
-from ballplate.simulator.experiment.load import load
+from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.inputs.messages import ExperimentError
 from ballplate.simulator.machines.truth import true_parameters
 from ballplate.simulator.readings.generate import exact_readings, noisy_certificate, noisy_readings

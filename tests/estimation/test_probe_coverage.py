@@ -15,7 +15,7 @@ import yaml
 from ballplate.simulator.design.arrays import Design, nominal_state
 from ballplate.simulator.design.observations.distances import CalibratedDistances
 from ballplate.simulator.experiment.layout import lay_out
-from ballplate.simulator.experiment.load import written_in_python
+from ballplate.simulator.experiment.loading import written_in_python
 from ballplate.simulator.experiment.model import Experiment
 
 from tests.influences.campaigns import Shares, assert_covered, shares_of

@@ -12,7 +12,7 @@ from ballplate.results.study import fit, predict
 from ballplate.simulator.design.arrays import nominal_state
 from ballplate.simulator.design.observations.readings import reading_weights
 from ballplate.simulator.experiment.layout import lay_out
-from ballplate.simulator.experiment.load import load
+from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.inputs.messages import ExperimentError
 from ballplate.simulator.readings.generate import exact_readings, noisy_readings
 from ballplate.simulator.readings.reading_files import read_readings, write_readings

@@ -10,7 +10,7 @@ import pytest
 
 PROGRAM = """
 from ballplate.results.study import predict
-from ballplate.simulator.experiment.load import load
+from ballplate.simulator.experiment.loading import load
 (experiment,) = load("designs/quickstart.yaml")
 found = predict(experiment)
 print([(q.maximum.hex(), q.average.hex()) for q in found.quantities.values()], found.verdict.singular_values.tobytes())

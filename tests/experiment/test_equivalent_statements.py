@@ -23,7 +23,7 @@ from ballplate.simulator.estimation.functions import linear_functions
 from ballplate.simulator.estimation.gauss_newton import estimate, linearised_fit
 from ballplate.simulator.estimation.linearisation import linearise
 from ballplate.simulator.experiment.layout import lay_out
-from ballplate.simulator.experiment.load import load
+from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.experiment.model import Position
 from ballplate.simulator.readings.reading_files import read_readings, write_readings
 from ballplate.simulator.readings.simulated import simulated_readings

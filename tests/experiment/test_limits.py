@@ -15,7 +15,7 @@ import pytest
 from ballplate.simulator.design.parameters import shared_layout
 from ballplate.simulator.estimation.elimination import SMALL, eliminate
 from ballplate.simulator.experiment.layout import lay_out
-from ballplate.simulator.experiment.load import load
+from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.geometry.ball_layouts import BallLayout, coincident_balls
 from ballplate.simulator.inputs.decoding import MOST_IN_LINE, refuse_long_lines
 from ballplate.simulator.inputs.messages import MOST_MESSAGES, ExperimentError
@@ -435,7 +435,9 @@ def test_variants_that_are_too_large_together(
     text = f"{GOOD}evaluation: {{points: {{random: 20, seed: 1}}, probe: down}}\nvariants:\n"
     names = [f"  v{k}: {{seed: {k}}}\n" for k in range(most + 5)]
     path = tmp_path / "e.yaml"
-    monkeypatch.setattr(modules["ballplate.simulator.experiment.load"], "MOST_OF_ALL", most * each)
+    monkeypatch.setattr(
+        modules["ballplate.simulator.experiment.loading"], "MOST_OF_ALL", most * each
+    )
     path.write_text(text + "".join(names[:most]), encoding="utf-8")
     assert len(load(path)) == most
     (line,) = refusals(tmp_path, text + "".join(names))
@@ -446,6 +448,6 @@ def test_variants_that_are_too_large_together(
         " put some of the variants into a file of their own"
     )
     # A single experiment has the other limits alone.
-    monkeypatch.setattr(modules["ballplate.simulator.experiment.load"], "MOST_OF_ALL", each - 1)
+    monkeypatch.setattr(modules["ballplate.simulator.experiment.loading"], "MOST_OF_ALL", each - 1)
     path.write_text(text + names[0], encoding="utf-8")
     assert len(load(path)) == 1

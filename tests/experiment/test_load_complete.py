@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from ballplate.simulator.design.observations.coordinates import CoordinateCalibration
 from ballplate.simulator.design.observations.distances import DistanceCalibration
-from ballplate.simulator.experiment.load import load
+from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.experiment.sections import ExperimentSettings
 from ballplate.simulator.inputs.quantities import LengthFunction, Target

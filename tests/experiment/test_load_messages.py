@@ -4,7 +4,7 @@ import json
 from pathlib import Path
 
 import pytest
-from ballplate.simulator.experiment.load import load
+from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.inputs.messages import ExperimentError, Message
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st

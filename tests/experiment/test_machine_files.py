@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from ballplate.extensions.maps.volumetric_errors import Volumetric
-from ballplate.simulator.experiment.load import load
+from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.experiment.machine_file import load_machine
 from ballplate.simulator.inputs.messages import ExperimentError
 from ballplate.simulator.machines.curves import Points

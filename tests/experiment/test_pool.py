@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from ballplate.results.study import check
 from ballplate.simulator.experiment.checks import excess
-from ballplate.simulator.experiment.load import load
+from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.experiment.model import AtMost, Candidate, Experiment, Pool, Position
 from ballplate.simulator.experiment.pool import placed_only
 from ballplate.simulator.geometry.positions import ball_coordinates

@@ -4,7 +4,7 @@ import json
 from collections.abc import Iterator
 from typing import Any
 
-from ballplate.simulator.experiment.schema import schema
+from ballplate.simulator.experiment.json_schema import schema
 from ballplate.simulator.experiment.sections import ExperimentSettings
 from ballplate.simulator.geometry.artefacts import ARTEFACTS
 

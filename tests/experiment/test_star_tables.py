@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 import yaml
 from ballplate.simulator.design.observations.star import Star
-from ballplate.simulator.experiment.load import load
+from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.experiment.star_tables import doubt_of_table
 from scipy.spatial.transform import Rotation
 

@@ -16,7 +16,7 @@ from ballplate.simulator.design.observations.distances import CalibratedDistance
 from ballplate.simulator.design.observations.priors import Priors
 from ballplate.simulator.estimation.functions import linear_functions
 from ballplate.simulator.estimation.gauss_newton import estimate, linearised_fit
-from ballplate.simulator.experiment.load import load
+from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.readings.generate import scale_readings
 from ballplate.uncertainty.quantities import QUANTITIES

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 import yaml
 from ballplate.montecarlo.experiments import trials
-from ballplate.rank.verdict import verdict
+from ballplate.rank.verdicts import verdict
 from ballplate.simulator.design.arrays import Design, nominal_state
 from ballplate.simulator.design.observations.readings import reading_blocks
 from ballplate.simulator.estimation.functions import linear_functions

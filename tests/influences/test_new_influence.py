@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 import yaml
 from ballplate.simulator.experiment.layout import lay_out
-from ballplate.simulator.experiment.load import load
+from ballplate.simulator.experiment.loading import load
 
 from tests.reference import dense
 from tests.reference.package_copies import documented, package_copy, said_by_copy

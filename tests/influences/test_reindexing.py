@@ -13,7 +13,7 @@ import yaml
 from ballplate.results.study import predict
 from ballplate.simulator.design.arrays import Design
 from ballplate.simulator.experiment.layout import lay_out
-from ballplate.simulator.experiment.load import written_in_python
+from ballplate.simulator.experiment.loading import written_in_python
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.inputs.messages import ExperimentError
 

@@ -13,12 +13,12 @@ import pytest
 import yaml
 from ballplate.cli import main
 from ballplate.montecarlo.experiments import trials
-from ballplate.rank.verdict import verdict
+from ballplate.rank.verdicts import verdict
 from ballplate.simulator.design.arrays import Design, influence_shifts, nominal_state
 from ballplate.simulator.estimation.functions import linear_functions
 from ballplate.simulator.estimation.linearisation import linearise
 from ballplate.simulator.experiment.layout import lay_out
-from ballplate.simulator.experiment.load import load
+from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.inputs.messages import ExperimentError
 from ballplate.uncertainty.quantities import QUANTITIES

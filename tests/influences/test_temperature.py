@@ -16,7 +16,7 @@ import yaml
 from ballplate.cli import main
 from ballplate.estimators.estimator_choice import fit_readings
 from ballplate.montecarlo.experiments import trials
-from ballplate.rank.verdict import verdict
+from ballplate.rank.verdicts import verdict
 from ballplate.simulator.design.arrays import Design, State, nominal_state
 from ballplate.simulator.design.observations.distances import CalibratedDistances
 from ballplate.simulator.design.observations.readings import reading_blocks
@@ -24,7 +24,7 @@ from ballplate.simulator.estimation.functions import linear_functions
 from ballplate.simulator.estimation.gauss_newton import estimate
 from ballplate.simulator.estimation.linearisation import linearise
 from ballplate.simulator.experiment.layout import lay_out
-from ballplate.simulator.experiment.load import load
+from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.inputs.messages import ExperimentError
 from ballplate.simulator.readings.generate import scale_readings

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from ballplate.results.study import check
 from ballplate.simulator.experiment.layout import lay_out
-from ballplate.simulator.experiment.load import load
+from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.inputs.messages import ExperimentError
 from ballplate.simulator.machines import custom
 

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from ballplate.simulator.experiment.layout import lay_out
-from ballplate.simulator.experiment.load import load
+from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.inputs.messages import ExperimentError
 from ballplate.simulator.machines.truth import TrueMachine, true_machine

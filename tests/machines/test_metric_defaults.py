@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 from ballplate.extensions.sweeps.fingerprint import fingerprint
-from ballplate.simulator.experiment.load import load
+from ballplate.simulator.experiment.loading import load
 
 
 @pytest.mark.parametrize(

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from ballplate.extensions.judgement.containing_models import linear_map
 from ballplate.extensions.sweeps.fingerprint import fingerprint
-from ballplate.simulator.experiment.load import load
+from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.inputs.messages import ExperimentError
 from ballplate.simulator.machines.arrangement import ARRANGEMENTS
 from ballplate.simulator.machines.bases import Polynomial, Spline

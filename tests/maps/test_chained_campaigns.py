@@ -13,7 +13,7 @@ from typing import Any
 import ballplate as bp
 import numpy as np
 import pytest
-from ballplate.results.campaign_sigmas import compared
+from ballplate.results.sigmas_by_campaign import compared
 from ballplate.results.study import fit
 from ballplate.simulator.design.parameters import shared_layout
 from ballplate.simulator.estimation.gauss_newton import moved

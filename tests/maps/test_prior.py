@@ -13,10 +13,10 @@ import numpy as np
 import pandas
 import pytest
 from ballplate.extensions.sweeps.fingerprint import fingerprint
-from ballplate.results import campaign_sigmas
+from ballplate.results import sigmas_by_campaign as campaign_sigmas
 from ballplate.simulator.estimation.linearisation import linearise
 from ballplate.simulator.experiment.layout import lay_out
-from ballplate.simulator.experiment.load import load
+from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.inputs.trust import UNKNOWN
 from ballplate.simulator.maps.fitted_map import FittedMap
 from ballplate.simulator.maps.map_prior import (

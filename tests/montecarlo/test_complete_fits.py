@@ -20,7 +20,7 @@ from ballplate.montecarlo.figures import MonteCarloOutcome, outcome
 from ballplate.montecarlo.reference import Reference, reference
 from ballplate.montecarlo.replicates import BATCH, draw, estimate_batch
 from ballplate.montecarlo.targets import targets
-from ballplate.montecarlo.trials import sum_of_task
+from ballplate.montecarlo.trial_runs import sum_of_task
 from ballplate.simulator.computing.processes import in_processes
 from ballplate.simulator.design.arrays import Design
 from ballplate.simulator.estimation.gauss_newton import estimate

@@ -26,7 +26,7 @@ from ballplate.montecarlo.figures import (
 from ballplate.montecarlo.reference import Reference, reference
 from ballplate.montecarlo.replicates import BATCH, Estimates, estimate_batch
 from ballplate.montecarlo.targets import MonteCarloQuantity, sample_of_pairs, targets
-from ballplate.montecarlo.trials import run_trials
+from ballplate.montecarlo.trial_runs import run_trials
 from ballplate.results.study import predict
 from ballplate.simulator.design.arrays import Design, nominal_state
 from ballplate.simulator.design.observations.distances import CalibratedDistances
@@ -34,7 +34,7 @@ from ballplate.simulator.design.observations.readings import expected_readings, 
 from ballplate.simulator.design.parameters import shared_layout
 from ballplate.simulator.estimation.linearisation import linearise
 from ballplate.simulator.experiment.layout import lay_out
-from ballplate.simulator.experiment.load import load
+from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.uncertainty.summaries import uncertainties
 

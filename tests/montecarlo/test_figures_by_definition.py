@@ -22,7 +22,7 @@ from ballplate.montecarlo.figures import outcome
 from ballplate.montecarlo.reference import Reference, Truth, reference
 from ballplate.montecarlo.replicates import BATCH, Estimates, draw, estimate_batch
 from ballplate.montecarlo.targets import MonteCarloQuantity, targets
-from ballplate.montecarlo.trials import TASK, accuracy_of, run_trials
+from ballplate.montecarlo.trial_runs import TASK, accuracy_of, run_trials
 from ballplate.simulator.computing.steps import ProgressStep
 from ballplate.simulator.design.noise import Noise
 from ballplate.simulator.design.observations.coordinates import CalibratedCoordinates

@@ -11,7 +11,7 @@ import pytest
 from ballplate.montecarlo.experiments import true_experiment
 from ballplate.montecarlo.reference import reference
 from ballplate.montecarlo.targets import targets
-from ballplate.simulator.experiment.load import load
+from ballplate.simulator.experiment.loading import load
 
 SHIPPED = Path("designs/park")
 KEYS = {

@@ -16,7 +16,7 @@ from ballplate.simulator.design.observations.joint_values import JointValues
 from ballplate.simulator.estimation.gauss_newton import estimate
 from ballplate.simulator.estimation.linearisation import linearise
 from ballplate.simulator.experiment.layout import lay_out
-from ballplate.simulator.experiment.load import load
+from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.experiment.model import Experiment
 from numpy.typing import NDArray
 from scipy.linalg import null_space

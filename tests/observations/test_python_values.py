@@ -13,7 +13,7 @@ import pytest
 from ballplate.extensions.reliability.redundancy import reliability
 from ballplate.simulator.design.observations.joint_values import JointValues
 from ballplate.simulator.experiment.layout import lay_out
-from ballplate.simulator.experiment.load import load
+from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.experiment.named_files import named_by
 from ballplate.simulator.inputs.messages import ExperimentError
 from ballplate.simulator.inputs.trust import UNKNOWN

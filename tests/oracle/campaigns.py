@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import yaml
 from ballplate.simulator.experiment.layout import lay_out
-from ballplate.simulator.experiment.load import load
+from ballplate.simulator.experiment.loading import load
 from numpy.typing import NDArray
 
 from tests.reference import dense

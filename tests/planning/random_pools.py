@@ -13,15 +13,15 @@ from typing import Any
 
 import numpy as np
 import yaml
-from ballplate.planning.campaign import Request, campaign
+from ballplate.planning.campaign_choice import Request, campaign
 from ballplate.planning.constraints import HOUR, Budget
 from ballplate.planning.criteria import NAMES, CriterionName
-from ballplate.planning.done import SetUp, done_candidates
 from ballplate.planning.offer import offer
+from ballplate.planning.positions_read import SetUp, done_candidates
 from ballplate.planning.selection import Campaign
 from ballplate.simulator.design.arrays import nominal_state
 from ballplate.simulator.experiment.layout import lay_out
-from ballplate.simulator.experiment.load import load
+from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.experiment.model import Experiment, Position
 from ballplate.simulator.readings.generate import exact_readings
 from ballplate.simulator.readings.reading_files import write_readings

@@ -11,9 +11,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 from ballplate.planning import criteria, information
-from ballplate.planning.campaign import Request, campaign
+from ballplate.planning.campaign_choice import Request, campaign
 from ballplate.planning.criteria import Criterion, CriterionName, Linear, Pairs, Several
-from ballplate.simulator.experiment.load import load
+from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.inputs.messages import ExperimentError
 from ballplate.simulator.machines.protocol import Array
 

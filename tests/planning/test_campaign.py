@@ -13,16 +13,16 @@ import numpy as np
 import pytest
 from ballplate.cli import main
 from ballplate.planning.bound import Bound
-from ballplate.planning.campaign import Request, campaign
+from ballplate.planning.campaign_choice import Request, campaign
 from ballplate.planning.constraints import HOUR, Budget
-from ballplate.planning.done import done_candidates
 from ballplate.planning.earlier import earlier_choice
 from ballplate.planning.offer import offer
+from ballplate.planning.positions_read import done_candidates
 from ballplate.planning.search import SelectionProblem
 from ballplate.results.study import predict
 from ballplate.simulator.computing.internal_error import InternalError
 from ballplate.simulator.computing.steps import ProgressStep
-from ballplate.simulator.experiment.load import load
+from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.experiment.pool import with_chosen
 from ballplate.simulator.inputs.messages import ExperimentError
@@ -295,7 +295,7 @@ def test_a_choice_better_than_its_bound_is_an_internal_error(
     positions: int, drawn: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """A bound that is wrong on purpose, of the choice itself and of a point of the curve."""
-    from ballplate.planning import campaign as planning
+    from ballplate.planning import campaign_choice as planning
 
     right = planning.bound
 

@@ -5,12 +5,12 @@ from __future__ import annotations
 import io
 from pathlib import Path
 
-from ballplate.planning.done import SetUp, done_candidates
 from ballplate.planning.experiment_file import experiment_text
+from ballplate.planning.positions_read import SetUp, done_candidates
 from ballplate.planning.schedule import run_sheet
 from ballplate.simulator.design.arrays import nominal_state
 from ballplate.simulator.experiment.layout import lay_out
-from ballplate.simulator.experiment.load import load
+from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.experiment.model import Experiment, Position
 from ballplate.simulator.readings.generate import exact_readings
 from ballplate.simulator.readings.reading_files import write_readings

@@ -15,7 +15,7 @@ from ballplate.planning.experiment_file import experiment_text
 from ballplate.planning.schedule import run_sheet
 from ballplate.simulator.design.arrays import Design
 from ballplate.simulator.experiment.layout import lay_out
-from ballplate.simulator.experiment.load import load
+from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.experiment.model import Candidate, Experiment, Position
 from ballplate.simulator.experiment.pool import with_chosen
 

@@ -12,15 +12,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 from ballplate.cli import main
-from ballplate.planning.campaign import Request, campaign
+from ballplate.planning.campaign_choice import Request, campaign
 from ballplate.planning.constraints import Budget
-from ballplate.planning.done import done_candidates
 from ballplate.planning.information import pool_information
 from ballplate.planning.offer import offer
+from ballplate.planning.positions_read import done_candidates
 from ballplate.planning.schedule import run_sheet
 from ballplate.planning.selection import Campaign
 from ballplate.results.study import predict
-from ballplate.simulator.experiment.load import load
+from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.experiment.model import Experiment, Position
 from ballplate.simulator.experiment.pool import with_chosen
 

@@ -22,7 +22,7 @@ from ballplate.simulator.design.arrays import nominal_state
 from ballplate.simulator.design.observations.readings import expected_readings
 from ballplate.simulator.estimation.gauss_newton import estimate
 from ballplate.simulator.experiment.layout import lay_out
-from ballplate.simulator.experiment.load import load
+from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.experiment.model import Candidate, Position
 from ballplate.simulator.experiment.pool import with_chosen
 from ballplate.simulator.inputs.messages import ExperimentError

@@ -12,7 +12,7 @@ import pytest
 import yaml
 from ballplate.planning.search import value
 from ballplate.results.study import predict
-from ballplate.simulator.experiment.load import load
+from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.experiment.model import Position
 from ballplate.simulator.experiment.pool import with_chosen
 

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from ballplate.planning.campaign import TINY_POOL
+from ballplate.planning.campaign_choice import TINY_POOL
 from ballplate.planning.constraints import Spent
 from ballplate.planning.criteria import CriterionName
 from ballplate.planning.experiment_file import experiment_text
@@ -21,7 +21,7 @@ from ballplate.planning.selection import Campaign
 from ballplate.results.study import planned_uncertainty, predict
 from ballplate.simulator.estimation.linearisation import linearise
 from ballplate.simulator.experiment.layout import lay_out
-from ballplate.simulator.experiment.load import load
+from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.experiment.model import Candidate, Experiment, Position
 from ballplate.simulator.experiment.pool import with_chosen
 from ballplate.simulator.inputs.messages import ExperimentError

@@ -13,7 +13,7 @@ from ballplate.planning.changeover import MOST_PLACES, Setup, changeover, cheape
 from ballplate.planning.constraints import Budget, constraints
 from ballplate.planning.run_sheet_tables import summary
 from ballplate.planning.schedule import ordered, run_sheet
-from ballplate.simulator.experiment.load import load
+from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.experiment.model import Candidate, ChangeTimes, Position, ReadingGroup
 from ballplate.simulator.geometry.positions import Pose
 from hypothesis import given, settings

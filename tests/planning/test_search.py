@@ -12,12 +12,12 @@ from tempfile import TemporaryDirectory
 import numpy as np
 import pytest
 from ballplate.planning.bound import _Tangent, _whole, bound
-from ballplate.planning.campaign import Request, _budgets, campaign
+from ballplate.planning.campaign_choice import Request, _budgets, campaign
 from ballplate.planning.constraints import HOUR, Budget, Constraints, constraints
 from ballplate.planning.criteria import CriterionName, criterion, is_about_balls
 from ballplate.planning.information import pool_information
 from ballplate.planning.search import Losses, SelectionProblem, improve, starts, value
-from ballplate.simulator.experiment.load import load
+from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.experiment.model import AtMost, Experiment
 from ballplate.simulator.inputs.messages import ExperimentError
 from ballplate.simulator.machines.protocol import Array

@@ -13,9 +13,9 @@ import ballplate as bp
 import numpy as np
 import pytest
 from ballplate.cli import main
-from ballplate.planning.done import renamed
+from ballplate.planning.positions_read import renamed
 from ballplate.planning.short_names import short_names
-from ballplate.simulator.experiment.load import load
+from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.experiment.model import Position
 
 POOL = """

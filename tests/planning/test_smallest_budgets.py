@@ -12,14 +12,14 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 import pytest
-from ballplate.planning.campaign import TINY_POOL, Request, campaign
+from ballplate.planning.campaign_choice import TINY_POOL, Request, campaign
 from ballplate.planning.constraints import Budget, constraints
 from ballplate.planning.criteria import CriterionName, criterion, is_about_balls
 from ballplate.planning.information import pool_information
 from ballplate.planning.search import LARGE, SMALL_POOL, Losses, SelectionProblem, full_root, value
 from ballplate.simulator.estimation.linearisation import linearise
 from ballplate.simulator.experiment.layout import lay_out
-from ballplate.simulator.experiment.load import load
+from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.experiment.model import Candidate, Experiment, Position
 from ballplate.simulator.experiment.pool import with_chosen
 from ballplate.simulator.inputs.messages import ExperimentError

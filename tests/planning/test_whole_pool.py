@@ -17,7 +17,7 @@ from ballplate.planning.information import pool_information
 from ballplate.planning.whole_pool import PoolGap, pool_gap, spanning
 from ballplate.results.study import planned_uncertainty
 from ballplate.simulator.experiment.layout import lay_out
-from ballplate.simulator.experiment.load import load
+from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.experiment.model import Experiment, Position
 from ballplate.simulator.experiment.pool import placed_only, with_chosen
 from ballplate.simulator.inputs.messages import refused

@@ -16,7 +16,7 @@ from ballplate.extensions.splines.error_curve import (
     fit_curve,
 )
 from ballplate.extensions.splines.read_points import choose_points, read_points
-from ballplate.simulator.splines.pieces import pieces
+from ballplate.simulator.splines.polynomial_pieces import pieces
 
 from tests.reference import truncated_powers
 

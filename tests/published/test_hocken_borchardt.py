@@ -22,10 +22,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 from ballplate.estimators.reversal_fits import ReversalFit, fit_reversal
-from ballplate.results.fit import Fit
+from ballplate.results.fits import Fit
 from ballplate.results.study import fit
 from ballplate.simulator.experiment.layout import lay_out
-from ballplate.simulator.experiment.load import load
+from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.machines.metric import Scale
 from ballplate.simulator.readings.reading_files import read_readings
 

@@ -18,7 +18,7 @@ from ballplate.simulator.design.arrays import Design
 from ballplate.simulator.design.observations.lengths import Lengths
 from ballplate.simulator.estimation.length_equations import LengthEstimator, length_estimate
 from ballplate.simulator.experiment.layout import lay_out
-from ballplate.simulator.experiment.load import load
+from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.geometry.directions import directions
 from ballplate.simulator.machines.spatial_metric import SpatialMetricModel, parameters_of_metric

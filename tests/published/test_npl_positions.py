@@ -24,7 +24,7 @@ import pytest
 from ballplate.extensions.reproduction.published import npl
 from ballplate.simulator.computing.threads import single_threaded
 from ballplate.simulator.experiment.layout import lay_out
-from ballplate.simulator.experiment.load import load
+from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.machines.arrangement import ARRANGEMENTS
 from ballplate.simulator.machines.kinematic import HELD_AT_FAR_END, kinematic_model
 from numpy.typing import NDArray

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from ballplate.extensions.reproduction.published_quantities import tabulated_quantities
 from ballplate.simulator.experiment.layout import lay_out
-from ballplate.simulator.experiment.load import load
+from ballplate.simulator.experiment.loading import load
 
 from tests.reference import dense
 

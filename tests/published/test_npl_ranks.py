@@ -9,7 +9,7 @@ from ballplate.extensions.reproduction.compare import compare_rank
 from ballplate.extensions.reproduction.published import npl
 from ballplate.extensions.reproduction.shipped import Shipped
 from ballplate.results.study import check
-from ballplate.simulator.experiment.load import load
+from ballplate.simulator.experiment.loading import load
 
 STATEMENTS = [(one, design) for one in npl().statements.ranks for design in one.designs]
 # Deficiencies for which the report has no number.

@@ -22,10 +22,10 @@ from ballplate.extensions.reproduction.shipped import (
     shipped_experiment,
     sums_of_squares,
 )
-from ballplate.rank.verdict import Verdict
-from ballplate.results.fit import Fit
+from ballplate.rank.verdicts import Verdict
+from ballplate.results.fits import Fit
 from ballplate.results.study import check
-from ballplate.simulator.experiment.load import load
+from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.experiment.model import Experiment
 
 # The tests below look at few fits, each of which is computed once.

@@ -12,7 +12,7 @@ import pandas
 import pytest
 import yaml
 from ballplate.simulator.experiment.layout import lay_out
-from ballplate.simulator.experiment.load import load
+from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.readings.offsets_applied import judge_offsets
 from ballplate.simulator.readings.reading_files import read_readings
 from scipy.spatial.distance import pdist

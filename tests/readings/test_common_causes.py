@@ -9,7 +9,7 @@ import numpy as np
 import pandas
 import pytest
 from ballplate.simulator.experiment.layout import lay_out
-from ballplate.simulator.experiment.load import load
+from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.inputs.yamltree import GivenText
 from ballplate.simulator.readings.reading_files import read_readings
 

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 import yaml
-from ballplate.simulator.experiment.load import load
+from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.experiment.model import Experiment
 
 PROBES = {

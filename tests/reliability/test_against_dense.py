@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from ballplate.extensions.reliability.redundancy import reliability_of
 from ballplate.extensions.reliability.reliability_result import Reliability
-from ballplate.gross_errors.patterns import Patterns, patterns
+from ballplate.gross_errors.bias_patterns import Patterns, patterns
 from ballplate.simulator.design.arrays import Design, State, nominal_state
 from ballplate.simulator.design.observations.coordinates import CalibratedCoordinates
 from ballplate.simulator.design.observations.distances import CalibratedDistances
@@ -22,7 +22,7 @@ from ballplate.simulator.design.parameters import shared_layout
 from ballplate.simulator.estimation.gauss_newton import gauss_newton, moved
 from ballplate.simulator.estimation.hat import row_places, whitened_residuals
 from ballplate.simulator.experiment.layout import lay_out
-from ballplate.simulator.experiment.load import load
+from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.geometry.motions import rotation_from_vector
 from numpy.typing import NDArray
 

@@ -11,8 +11,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from ballplate.gross_errors.bias_patterns import patterns
 from ballplate.gross_errors.cause_search import Search, diagnosis
-from ballplate.gross_errors.patterns import patterns
 from ballplate.gross_errors.tails import log_chance
 from ballplate.gross_errors.wording import diagnosis_words
 from ballplate.simulator.design.arrays import nominal_state
@@ -20,7 +20,7 @@ from ballplate.simulator.design.observations.readings import expected_readings
 from ballplate.simulator.estimation.gauss_newton import estimate, linearised_fit
 from ballplate.simulator.estimation.linearisation import Linearisation
 from ballplate.simulator.experiment.layout import lay_out
-from ballplate.simulator.experiment.load import load
+from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.machines.truth import true_machine
 from ballplate.simulator.readings.generate import noisy_certificate, noisy_readings, on_true_machine

@@ -18,7 +18,7 @@ from ballplate.simulator.design.observations.distances import CalibratedDistance
 from ballplate.simulator.estimation.gauss_newton import Solution, estimate, linearised_fit
 from ballplate.simulator.estimation.hat import whitened_residuals
 from ballplate.simulator.experiment.layout import lay_out
-from ballplate.simulator.experiment.load import load
+from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.machines.truth import true_machine
 from ballplate.simulator.readings.generate import exact_readings, on_true_machine
 from ballplate.simulator.readings.observed_readings import ObservedReadings, observe

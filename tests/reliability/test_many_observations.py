@@ -9,13 +9,13 @@ import pytest
 from ballplate.extensions.reliability import effects
 from ballplate.extensions.reliability.redundancy import reliability
 from ballplate.extensions.reliability.response import responses
-from ballplate.gross_errors.leftover import entries, leftover
-from ballplate.gross_errors.patterns import patterns
+from ballplate.gross_errors.bias_patterns import patterns
+from ballplate.gross_errors.remainders import entries, leftover
 from ballplate.results.study import fit
 from ballplate.simulator.estimation.functions import BallPlaces, Distances, displacements
 from ballplate.simulator.estimation.linearisation import linearise
 from ballplate.simulator.experiment.layout import lay_out
-from ballplate.simulator.experiment.load import load
+from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.inputs.messages import ExperimentError
 from ballplate.simulator.readings.reading_files import read_readings
 
@@ -38,7 +38,7 @@ def test_the_entries_are_those_that_are_kept() -> None:
 def test_reliability_of_too_many(monkeypatch: pytest.MonkeyPatch) -> None:
     (experiment,) = load(QUICKSTART)
     rows, columns = entries(lay_out(experiment))
-    monkeypatch.setattr("ballplate.gross_errors.leftover.MOST_ENTRIES", rows * columns - 1)
+    monkeypatch.setattr("ballplate.gross_errors.remainders.MOST_ENTRIES", rows * columns - 1)
     with pytest.raises(ExperimentError) as caught:
         reliability(experiment)
     assert (
@@ -47,7 +47,7 @@ def test_reliability_of_too_many(monkeypatch: pytest.MonkeyPatch) -> None:
         f" many to test for gross errors; at most {rows - 1} are possible with {columns} parameters"
         " of machine, poses and tied balls: read fewer balls, or in fewer positions"
     )
-    monkeypatch.setattr("ballplate.gross_errors.leftover.MOST_ENTRIES", rows * columns)
+    monkeypatch.setattr("ballplate.gross_errors.remainders.MOST_ENTRIES", rows * columns)
     reliability(experiment)
 
 
@@ -55,10 +55,10 @@ def test_fit_of_too_many(monkeypatch: pytest.MonkeyPatch) -> None:
     (experiment,) = load(CERTIFIED / "three-planes.yaml")
     observed = read_readings(CERTIFIED / "three-planes.csv", lay_out(experiment))
     rows, columns = entries(observed.design)
-    monkeypatch.setattr("ballplate.gross_errors.leftover.MOST_ENTRIES", rows * columns)
+    monkeypatch.setattr("ballplate.gross_errors.remainders.MOST_ENTRIES", rows * columns)
     tested = fit(experiment, observed)
     assert tested.untested == "" and tested.cautions == ()
-    monkeypatch.setattr("ballplate.gross_errors.leftover.MOST_ENTRIES", rows * columns - 1)
+    monkeypatch.setattr("ballplate.gross_errors.remainders.MOST_ENTRIES", rows * columns - 1)
     found = fit(experiment, observed)
     assert (
         f"at most {rows - 1} are possible" in found.cautions[0]

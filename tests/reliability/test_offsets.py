@@ -12,7 +12,7 @@ from ballplate.cli import main
 from ballplate.extensions.reliability.effects import changes_of
 from ballplate.extensions.reliability.redundancy import reliability_of
 from ballplate.extensions.reliability.response import responses
-from ballplate.gross_errors.patterns import patterns
+from ballplate.gross_errors.bias_patterns import patterns
 from ballplate.simulator.design.arrays import Design, State, nominal_state
 from ballplate.simulator.design.observations.priors import Priors
 from ballplate.simulator.design.observations.readings import expected_readings

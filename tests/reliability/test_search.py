@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from ballplate.gross_errors.cause_search import Search
-from ballplate.gross_errors.leftover import leftover
+from ballplate.gross_errors.remainders import leftover
 from ballplate.gross_errors.scatter import log_chances, ratio, scatters, with_scatter
 from ballplate.simulator.design.arrays import Design, State
 from ballplate.simulator.design.parameters import shared_layout

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from ballplate.extensions.sweeps.sweep_schema import schema as sweep_schema
-from ballplate.simulator.experiment.schema import schema
+from ballplate.simulator.experiment.json_schema import schema
 
 from tests.robustness.mutations import vocabulary
 from tests.robustness.worker import complaint

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from ballplate.simulator.splines.constraints import Constraint, periodic, prescribed, rows, straight
 from ballplate.simulator.splines.knots import at_every, with_boundaries
-from ballplate.simulator.splines.pieces import pieces
+from ballplate.simulator.splines.polynomial_pieces import pieces
 from ballplate.simulator.splines.space import SplineSpace
 from ballplate.simulator.splines.spline_fit import SplineFit, fit
 from ballplate.simulator.splines.spline_problems import SplineError

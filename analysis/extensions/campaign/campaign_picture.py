@@ -11,25 +11,23 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
-from ballplate.planning.choice import Gain, Selection
-from ballplate.planning.constraints import HOUR, Budget, Spent
-from ballplate.planning.criteria import DESCRIPTIONS
-from ballplate.presentation.formatting import number
-from ballplate.presentation.pictures import draw_scene
-from ballplate.presentation.scene import scene
-from ballplate.presentation.svg import (
+from ballplate.planning import DESCRIPTIONS, HOUR, Budget, Gain, Selection, Spent
+from ballplate.presentation import (
     DASHES,
     INK,
     MARKERS,
     MUTED,
     PAPER,
     SERIES,
+    draw_scene,
     drawing,
     legend_above,
+    number,
     placed_axes,
     save,
+    scene,
 )
-from ballplate.simulator.experiment.model import Candidate
+from ballplate.simulator.experiment import Candidate
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

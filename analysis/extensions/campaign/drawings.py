@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from ballplate.presentation.paper import escaped
-from ballplate.simulator.experiment.model import Candidate, Experiment, Position
-from ballplate.simulator.geometry.positions import AXIS_INDEX, ball_coordinates
+from ballplate.presentation import escaped
+from ballplate.simulator.experiment import Candidate, Experiment, Position
+from ballplate.simulator.geometry import AXIS_INDEX, ball_coordinates
 
 SIZE, MARGIN = 170.0, 22.0
 # A name longer than this is told by a number instead.

@@ -8,7 +8,7 @@ from ballplate.arguments import (
     PathLike,
     experiment_of,
 )
-from ballplate.simulator.experiment.model import Experiment
+from ballplate.simulator.experiment import Experiment
 
 if TYPE_CHECKING:
     from .sheet import Sheet
@@ -27,7 +27,7 @@ def sheet(experiment: Experiment | PathLike) -> Sheet:
     >>> bp.sheet(bp.quickstart()).template().splitlines()[:2]
     ['position,ball,probe,x_mm,y_mm,z_mm', 'z low,r1c1,down,,,']
     """
-    from ballplate.simulator.experiment.load import with_pool
+    from ballplate.simulator.experiment import with_pool
 
     from .sheet import sheet_of
 

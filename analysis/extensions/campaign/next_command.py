@@ -8,14 +8,22 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ballplate.cli.common import add_file, add_goal, add_json, number, show, single
-from ballplate.cli.outputs import UsageError
-from ballplate.cli.reading_options import add_readings_argument, refuse_wrong_order
-from ballplate.cli.table_options import add_tables
+from ballplate.cli import (
+    UsageError,
+    add_file,
+    add_goal,
+    add_json,
+    add_readings_argument,
+    add_tables,
+    number,
+    refuse_wrong_order,
+    show,
+    single,
+)
 
 if TYPE_CHECKING:
     from ballplate.extensions.requirements.goals import Goal
-    from ballplate.simulator.experiment.model import Experiment
+    from ballplate.simulator.experiment import Experiment
 
     from .next_result import NextStep
 
@@ -67,9 +75,9 @@ def run(options: Namespace) -> int:
     """Print the answer, or one each time in a folder; 0 once the target is met, otherwise 1."""
     from dataclasses import replace
 
-    from ballplate.cli.table_options import named_sources, with_options
+    from ballplate.cli import named_sources, with_options
     from ballplate.extensions.requirements.goals import GoalError, parse_goal
-    from ballplate.simulator.inputs.quantities import QuantityError, Target, parse_length_function
+    from ballplate.simulator.inputs import QuantityError, Target, parse_length_function
 
     if options.interval is not None and options.watch is None:
         raise UsageError("--interval goes with --watch; leave it out")
@@ -96,8 +104,7 @@ def run(options: Namespace) -> int:
 def _judged(
     options: Namespace, experiment: Experiment, goal: Goal, sources: Sequence[Path]
 ) -> NextStep:
-    from ballplate.cli.progress import progress
-    from ballplate.cli.telling import complain
+    from ballplate.cli import complain, progress
 
     from .next_position import next_step
 
@@ -114,10 +121,8 @@ def _watch(options: Namespace, experiment: Experiment, goal: Goal) -> int:
     """
     import time
 
-    from ballplate.cli.common import print_lines
-    from ballplate.cli.excerpts import print_errors
-    from ballplate.cli.telling import note
-    from ballplate.simulator.inputs.messages import ExperimentError
+    from ballplate.cli import note, print_errors, print_lines
+    from ballplate.simulator.inputs import ExperimentError
 
     from .watching_command import settled
 

@@ -10,25 +10,16 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from ballplate.extensions.requirements.goals import Goal, check_goal, judge
-from ballplate.gross_errors.wording import diagnosis_words
-from ballplate.planning.done import groups_taken
-from ballplate.results.adjustments import FEW
-from ballplate.results.campaign_sigmas import with_sigmas
-from ballplate.results.fit import Fit
-from ballplate.results.study import PlannedUncertainty
-from ballplate.results.study import fit as fit_observed
-from ballplate.simulator.computing.steps import Report, counted, unreported
-from ballplate.simulator.computing.threads import single_threaded
-from ballplate.simulator.estimation.linearisation import Linearisation, linearise
-from ballplate.simulator.experiment.layout import lay_out
-from ballplate.simulator.experiment.model import Experiment, Pool, Position
-from ballplate.simulator.experiment.pool import placed_only
-from ballplate.simulator.inputs.messages import refused
-from ballplate.simulator.inputs.settings import listing
-from ballplate.simulator.readings.observed_readings import ObservedReadings
-from ballplate.simulator.readings.reading_files import read_readings
-from ballplate.simulator.readings.reading_sources import Source
-from ballplate.uncertainty.summaries import uncertainties
+from ballplate.gross_errors import diagnosis_words
+from ballplate.planning import groups_taken
+from ballplate.results import FEW, Fit, PlannedUncertainty, with_sigmas
+from ballplate.results import fit as fit_observed
+from ballplate.simulator.computing import Report, counted, single_threaded, unreported
+from ballplate.simulator.estimation import Linearisation, linearise
+from ballplate.simulator.experiment import Experiment, Pool, Position, lay_out, placed_only
+from ballplate.simulator.inputs import listing, refused
+from ballplate.simulator.readings import ObservedReadings, Source, read_readings
+from ballplate.uncertainty import uncertainties
 
 from .next_result import NextStep, Offered
 

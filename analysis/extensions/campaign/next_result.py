@@ -8,15 +8,12 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from ballplate.extensions.requirements.goals import Goal, Judgement
-from ballplate.presentation.formatting import finite, number
-from ballplate.presentation.result import Result
-from ballplate.results.adjustments import freedom_words
-from ballplate.results.fit import Fit
-from ballplate.results.study import PlannedUncertainty
-from ballplate.simulator.computing.rounding import comparable
-from ballplate.simulator.inputs.settings import listing, number_of
-from ballplate.simulator.readings.observed_readings import ObservedReadings
-from ballplate.uncertainty.scale import can_stretch
+from ballplate.presentation import Result, finite, number
+from ballplate.results import Fit, PlannedUncertainty, freedom_words
+from ballplate.simulator.computing import comparable
+from ballplate.simulator.inputs import listing, number_of
+from ballplate.simulator.readings import ObservedReadings
+from ballplate.uncertainty import can_stretch
 
 
 @dataclass(frozen=True)

@@ -12,15 +12,12 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from ballplate.planning.schedule import RunSheet, Step
-from ballplate.simulator.experiment.layout import lay_out
-from ballplate.simulator.experiment.model import Experiment, Position
-from ballplate.simulator.geometry.positions import ball_coordinates
-from ballplate.simulator.inputs.messages import in_one_line, refused
-from ballplate.simulator.inputs.quantities import DURATION_UNITS
-from ballplate.simulator.inputs.spreadsheets import CsvWriter
-from ballplate.simulator.machines.protocol import Array
-from ballplate.simulator.readings.reading_files import AXES
+from ballplate.planning import RunSheet, Step
+from ballplate.simulator.experiment import Experiment, Position, lay_out
+from ballplate.simulator.geometry import ball_coordinates
+from ballplate.simulator.inputs import DURATION_UNITS, CsvWriter, in_one_line, refused
+from ballplate.simulator.machines import Array
+from ballplate.simulator.readings import AXES
 
 # What names of features keep; anything else becomes a hyphen.
 UNUSUAL = re.compile(r"[^A-Za-z0-9.]+")

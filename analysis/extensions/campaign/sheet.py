@@ -7,13 +7,19 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from ballplate.planning.run_sheet_tables import sheet_data, sheet_lines, summary
-from ballplate.planning.schedule import RunSheet, Step, ball_words, change_over, place_words
-from ballplate.presentation.result import Result
-from ballplate.simulator.experiment.model import Candidate, ChangeTimes, Experiment, Position
-from ballplate.simulator.inputs.messages import refused
-from ballplate.simulator.inputs.quantities import length_text
-from ballplate.simulator.inputs.yamltree import to_python
+from ballplate.planning import (
+    RunSheet,
+    Step,
+    ball_words,
+    change_over,
+    place_words,
+    sheet_data,
+    sheet_lines,
+    summary,
+)
+from ballplate.presentation import Result
+from ballplate.simulator.experiment import Candidate, ChangeTimes, Experiment, Position
+from ballplate.simulator.inputs import length_text, refused, to_python
 
 from .reading_lists import planned_readings, points_csv, points_dmis, template_csv
 from .sheet_forms import sheet_csv, sheet_markdown, sheet_text

@@ -5,8 +5,17 @@ from __future__ import annotations
 from argparse import ArgumentParser, ArgumentTypeError, Namespace
 from pathlib import Path
 
-from ballplate.cli.common import add_file, add_json, argument_type, show, single, write_noted
-from ballplate.cli.outputs import UsageError, add_force, add_output
+from ballplate.cli import (
+    UsageError,
+    add_file,
+    add_force,
+    add_json,
+    add_output,
+    argument_type,
+    show,
+    single,
+    write_noted,
+)
 
 SHEETS, DMIS, POINTS = (".html", ".md", ".csv", ".txt"), (".dmi", ".dmis"), (".csv",)
 
@@ -67,7 +76,7 @@ def _points(text: str) -> Path:
 
 @argument_type
 def _diameter(text: str) -> float:
-    from ballplate.simulator.inputs.quantities import parse_length
+    from ballplate.simulator.inputs import parse_length
 
     value = parse_length(text)
     if not 0.0 < value < 1.0:

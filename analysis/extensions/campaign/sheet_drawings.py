@@ -7,12 +7,10 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 import numpy as np
-from ballplate.presentation.paper import escaped, on_paper, pitch
-from ballplate.presentation.scene import Box, DrawnPosition, scene
-from ballplate.presentation.svg import SERIES
-from ballplate.simulator.design.arrays import Design
-from ballplate.simulator.geometry.ball_layouts import BallLayout
-from ballplate.simulator.machines.protocol import Array
+from ballplate.presentation import SERIES, Box, DrawnPosition, escaped, on_paper, pitch, scene
+from ballplate.simulator.design import Design
+from ballplate.simulator.geometry import BallLayout
+from ballplate.simulator.machines import Array
 
 from .drawings import LONGEST_NAME
 

@@ -4,12 +4,10 @@ from __future__ import annotations
 
 import io
 
-from ballplate.planning.run_sheet_tables import price, sheet_lines, summary, times
-from ballplate.planning.schedule import RunSheet, Step
-from ballplate.presentation.formatting import aligned
-from ballplate.simulator.experiment.model import Experiment
-from ballplate.simulator.inputs.messages import in_one_line
-from ballplate.simulator.inputs.spreadsheets import CsvWriter
+from ballplate.planning import RunSheet, Step, price, sheet_lines, summary, times
+from ballplate.presentation import aligned
+from ballplate.simulator.experiment import Experiment
+from ballplate.simulator.inputs import CsvWriter, in_one_line
 
 from .reading_lists import sequence
 from .sheet_head import BLANKS, NOTES, known_fields, stylus_rows

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 from importlib.metadata import version
 
 import numpy as np
-from ballplate.planning.schedule import RunSheet
-from ballplate.simulator.experiment.model import Experiment, Position, Probe
-from ballplate.simulator.machines.protocol import Array
+from ballplate.planning import RunSheet
+from ballplate.simulator.experiment import Experiment, Position, Probe
+from ballplate.simulator.machines import Array
 
 # To be written in by hand: at the head of a sheet, and in each position.
 BLANKS = ("machine", "operator", "date", "temperature, start", "temperature, end", "readings in")

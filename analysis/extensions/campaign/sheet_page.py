@@ -4,14 +4,11 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from ballplate.planning.run_sheet_tables import price, summary, times
-from ballplate.planning.schedule import RunSheet, Step
-from ballplate.presentation.paper import escaped
-from ballplate.simulator.experiment.layout import lay_out
-from ballplate.simulator.experiment.model import Experiment, Position
-from ballplate.simulator.experiment.pool import with_chosen
-from ballplate.simulator.geometry.ball_layouts import BallLayout
-from ballplate.simulator.inputs.settings import number_of
+from ballplate.planning import RunSheet, Step, price, summary, times
+from ballplate.presentation import escaped
+from ballplate.simulator.experiment import Experiment, Position, lay_out, with_chosen
+from ballplate.simulator.geometry import BallLayout
+from ballplate.simulator.inputs import number_of
 
 from .drawings import LONGEST_NAME, place_drawing
 from .reading_lists import sequence

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-from ballplate.planning.schedule import Step
-from ballplate.simulator.experiment.model import Experiment, Position
-from ballplate.simulator.geometry.positions import ball_coordinates
-from ballplate.simulator.inputs.settings import number_of
+from ballplate.planning import Step
+from ballplate.simulator.experiment import Experiment, Position
+from ballplate.simulator.geometry import ball_coordinates
+from ballplate.simulator.inputs import number_of
 
 
 def set_up_rows(step: Step, experiment: Experiment) -> list[tuple[str, str]]:

@@ -6,9 +6,19 @@ from argparse import Action, ArgumentParser, ArgumentTypeError, Namespace
 from pathlib import Path
 from typing import Any
 
-from ballplate.cli.common import add_json, coverage_factor, show, write_noted
-from ballplate.cli.outputs import Output, OutputAction, UsageError, add_force
-from ballplate.cli.reading_options import add_readings, observed_readings, warn_of
+from ballplate.cli import (
+    Output,
+    OutputAction,
+    UsageError,
+    add_force,
+    add_json,
+    add_readings,
+    coverage_factor,
+    observed_readings,
+    show,
+    warn_of,
+    write_noted,
+)
 
 ENDINGS = (".html", ".csv", ".xml", ".json")
 
@@ -113,7 +123,7 @@ def _stated(text: str) -> tuple[str, str]:
 
 def run(options: Namespace) -> int:
     """Print or write the certificate; 1 if there is something to complain of."""
-    from ballplate.results.study import fit
+    from ballplate.results import fit
 
     experiment, observed = observed_readings(options)
     result = fit(experiment, observed, options.sigma)

@@ -7,8 +7,7 @@ from __future__ import annotations
 import io
 from decimal import Decimal
 
-from ballplate.simulator.inputs.messages import in_one_line
-from ballplate.simulator.inputs.spreadsheets import CsvWriter
+from ballplate.simulator.inputs import CsvWriter, in_one_line
 
 from .certified_balls import CertifiedBalls
 

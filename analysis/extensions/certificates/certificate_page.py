@@ -6,10 +6,9 @@ from collections.abc import Sequence
 from html import escape
 
 import numpy as np
-from ballplate.presentation.formatting import number
-from ballplate.presentation.paper import escaped, on_paper, pitch
-from ballplate.simulator.geometry.motions import fit_motion
-from ballplate.simulator.machines.protocol import Array
+from ballplate.presentation import escaped, number, on_paper, pitch
+from ballplate.simulator.geometry import fit_motion
+from ballplate.simulator.machines import Array
 
 from .certificate_csv import coordinate_names
 from .certified_balls import NO_ACCREDITATION, CertifiedBalls

@@ -8,11 +8,10 @@ from importlib.metadata import version
 from typing import Any
 
 import numpy as np
-from ballplate.presentation.formatting import aligned, finite, number, to_uncertainty
-from ballplate.presentation.result import Result
-from ballplate.results.adjustments import freedom_words
-from ballplate.simulator.inputs.settings import listing
-from ballplate.simulator.machines.protocol import Array
+from ballplate.presentation import Result, aligned, finite, number, to_uncertainty
+from ballplate.results import freedom_words
+from ballplate.simulator.inputs import listing
+from ballplate.simulator.machines import Array
 
 NO_ACCREDITATION = (
     "This states results of a fit to readings, as the program computed them. It is not a"

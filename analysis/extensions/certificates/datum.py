@@ -11,15 +11,17 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from ballplate.simulator.geometry.axes import PlateAxes, axes_words, plate_axes
-from ballplate.simulator.geometry.ball_layouts import BallLayout
-from ballplate.simulator.geometry.motions import (
+from ballplate.simulator.geometry import (
     Array,
+    BallLayout,
+    PlateAxes,
+    axes_words,
     fit_motion,
+    plate_axes,
     rigid_motions,
     without_rigid_motion,
 )
-from ballplate.simulator.inputs.settings import hint
+from ballplate.simulator.inputs import hint
 from numpy.typing import NDArray
 
 # A ball nearer to the line of two others than this fraction of how far it is along fixes no plane.

@@ -15,19 +15,21 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-from ballplate.simulator.inputs.covariances import (
+from ballplate.extensions.laboratory.xmltree import Element, read_xml
+from ballplate.simulator.inputs import (
     MOST_NAMES,
+    ExperimentError,
     Floats,
+    Mark,
+    Message,
     NamedMatrix,
+    QuantityError,
     half_digit,
     matrix_problems,
+    metres_or_radians,
+    shorten,
     unit_of_area,
 )
-from ballplate.simulator.inputs.messages import ExperimentError, Message
-from ballplate.simulator.inputs.quantities import QuantityError, metres_or_radians
-from ballplate.simulator.inputs.settings import shorten
-from ballplate.simulator.inputs.xmltree import Element, read_xml
-from ballplate.simulator.inputs.yamltree import Mark
 
 from .dsi_units import celsius, length_factor
 

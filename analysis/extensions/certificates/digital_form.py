@@ -10,7 +10,7 @@ from importlib.metadata import version
 from xml.sax.saxutils import escape
 
 import numpy as np
-from ballplate.simulator.inputs.messages import in_one_line
+from ballplate.simulator.inputs import in_one_line
 
 from .certificate_csv import coordinate_names, scaled
 from .certified_balls import NO_ACCREDITATION, CertifiedBalls

@@ -7,14 +7,8 @@ import re
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
-from ballplate.simulator.design.lookup import References
-from ballplate.simulator.design.observations.stated_values import (
-    CertificateEntry,
-    FileValues,
-    value_name,
-)
-from ballplate.simulator.inputs.messages import ExperimentError, Steps
-from ballplate.simulator.inputs.settings import listing, shorten
+from ballplate.simulator.design import CertificateEntry, FileValues, References, value_name
+from ballplate.simulator.inputs import ExperimentError, Steps, listing, shorten
 
 if TYPE_CHECKING:
     from .digital_certificates import DigitalResult, DigitalValue

@@ -9,8 +9,7 @@ from __future__ import annotations
 import re
 from fractions import Fraction
 
-from ballplate.simulator.inputs.quantities import QuantityError
-from ballplate.simulator.inputs.settings import shorten
+from ballplate.simulator.inputs import QuantityError, shorten
 
 PREFIXES = {
     "kilo": 3,

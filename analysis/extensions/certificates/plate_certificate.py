@@ -10,26 +10,17 @@ from pathlib import Path
 from typing import Protocol
 
 import numpy as np
-from ballplate.presentation.files import write_file
-from ballplate.results.map_of_fit import MappedFit, data_of
-from ballplate.simulator.computing.rounding import blank
-from ballplate.simulator.computing.threads import single_threaded
-from ballplate.simulator.design.influences.temperature import TemperaturesSettings
-from ballplate.simulator.estimation.covariance import MICROMETRE
-from ballplate.simulator.estimation.functions import BallPlaces, displacements
-from ballplate.simulator.estimation.linearisation import Linearisation
-from ballplate.simulator.experiment.model import Experiment
-from ballplate.simulator.geometry.axes import plate_axes
-from ballplate.simulator.geometry.ball_layouts import BallLayout
-from ballplate.simulator.inputs.covariances import MOST_NAMES
-from ballplate.simulator.inputs.messages import refused
-from ballplate.simulator.inputs.settings import hint, listing
-from ballplate.simulator.inputs.yamltree import to_python
-from ballplate.simulator.machines.protocol import Array, Integers
-from ballplate.simulator.readings.certificate_files import certified_values
-from ballplate.uncertainty.pairs import pairs_of
-from ballplate.uncertainty.scale import OWN_SCALES, scale_of
-from ballplate.uncertainty.tasks import expansion
+from ballplate.presentation import write_file
+from ballplate.results import MappedFit, data_of
+from ballplate.simulator.computing import blank, single_threaded
+from ballplate.simulator.design import TemperaturesSettings
+from ballplate.simulator.estimation import MICROMETRE, BallPlaces, Linearisation, displacements
+from ballplate.simulator.experiment import Experiment
+from ballplate.simulator.geometry import BallLayout, plate_axes
+from ballplate.simulator.inputs import MOST_NAMES, hint, listing, refused, to_python
+from ballplate.simulator.machines import Array, Integers
+from ballplate.simulator.readings import certified_values
+from ballplate.uncertainty import OWN_SCALES, expansion, pairs_of, scale_of
 
 from .certificate_csv import coordinates_csv, covariance_csv
 from .certificate_page import certificate_page

@@ -11,13 +11,20 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
-from ballplate.simulator.machines.arrangement import Arrangement
-from ballplate.simulator.machines.curves import Points, curves_model
-from ballplate.simulator.machines.error_names import AXIS_ERRORS
-from ballplate.simulator.machines.kinematic import KinematicModel, carried_vectors
-from ballplate.simulator.machines.plane import PlaneModel
-from ballplate.simulator.machines.protocol import Array, ErrorModel, TrueMachine
-from ballplate.simulator.machines.volumetric import Field, VolumetricModel
+from ballplate.simulator.machines import (
+    AXIS_ERRORS,
+    Arrangement,
+    Array,
+    ErrorModel,
+    Field,
+    KinematicModel,
+    PlaneModel,
+    Points,
+    TrueMachine,
+    VolumetricModel,
+    carried_vectors,
+    curves_model,
+)
 
 Corner = tuple[float, ...]
 

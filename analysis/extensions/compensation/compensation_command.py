@@ -6,16 +6,18 @@ from argparse import ArgumentParser, Namespace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ballplate.cli.common import add_json, argument_type, show
-from ballplate.cli.outputs import (
+from ballplate.cli import (
     Output,
     UsageError,
     add_force,
+    add_json,
     add_output,
+    argument_type,
     check_outputs,
+    complain,
+    show,
     write,
 )
-from ballplate.cli.telling import complain
 
 if TYPE_CHECKING:
     from .compensation_tables import CompensationTable

@@ -10,22 +10,19 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from ballplate.presentation.formatting import aligned, as_data
-from ballplate.presentation.result import Result
-from ballplate.simulator.experiment.machine_file import load_machine
-from ballplate.simulator.experiment.map_files import BINARY, read_map
-from ballplate.simulator.geometry.grids import grid_points
-from ballplate.simulator.inputs.messages import Message, refused
-from ballplate.simulator.inputs.quantities import format_length, parse_length
-from ballplate.simulator.inputs.settings import listing
-from ballplate.simulator.inputs.yamltree import read_text
-from ballplate.simulator.machines.arrangement import AXES
-from ballplate.simulator.machines.curves import Points
-from ballplate.simulator.machines.description import true_volumetric
-from ballplate.simulator.machines.error_names import AXIS_ERRORS
-from ballplate.simulator.machines.protocol import Array
-from ballplate.simulator.maps.fit_verdict import verdict_line
-from ballplate.simulator.maps.fitted_map import FittedMap
+from ballplate.presentation import Result, aligned, as_data
+from ballplate.simulator.experiment import BINARY, load_machine, read_map
+from ballplate.simulator.geometry import grid_points
+from ballplate.simulator.inputs import (
+    Message,
+    format_length,
+    listing,
+    parse_length,
+    read_text,
+    refused,
+)
+from ballplate.simulator.machines import AXES, AXIS_ERRORS, Array, Points, true_volumetric
+from ballplate.simulator.maps import FittedMap, verdict_line
 
 from .axis_tables import AxisTables, NotOfAxesError, names_of, tool_chain
 from .formats import FORMATS

@@ -17,11 +17,17 @@ from fractions import Fraction
 from pathlib import Path
 
 import numpy as np
-from ballplate.simulator.inputs.messages import ExperimentError, Message, refused
-from ballplate.simulator.inputs.settings import listing, shorten
-from ballplate.simulator.inputs.tables import read_number
-from ballplate.simulator.inputs.yamltree import Mark, read_text
-from ballplate.simulator.machines.arrangement import AXES
+from ballplate.simulator.inputs import (
+    ExperimentError,
+    Mark,
+    Message,
+    listing,
+    read_number,
+    read_text,
+    refused,
+    shorten,
+)
+from ballplate.simulator.machines import AXES
 
 from .axis_tables import AxisTable, AxisTables
 from .table_formats import Sense, StatedTable, Table, TableFormat, in_columns

@@ -12,15 +12,11 @@ from ballplate.arguments import (
     PathLike,
     map_or_path,
 )
-from ballplate.simulator.inputs.arguments import (
-    ensure_one_of,
-    ensure_type,
-)
-from ballplate.simulator.inputs.quantities import QuantityError
+from ballplate.simulator.inputs import QuantityError, ensure_one_of, ensure_type
 
 if TYPE_CHECKING:
-    from ballplate.results.fit import Fit
-    from ballplate.simulator.maps.fitted_map import FittedMap
+    from ballplate.results import Fit
+    from ballplate.simulator.maps import FittedMap
 
     from .compensation_tables import (
         MadeCompensation,

@@ -17,18 +17,19 @@ from itertools import product
 from pathlib import Path
 
 import numpy as np
-from ballplate.simulator.inputs.messages import (
+from ballplate.simulator.inputs import (
     MOST_MESSAGES,
     ExperimentError,
+    Mark,
     Message,
+    hint,
+    listing,
+    read_number,
+    read_text,
     refused,
+    shorten,
 )
-from ballplate.simulator.inputs.settings import hint, listing, shorten
-from ballplate.simulator.inputs.tables import read_number
-from ballplate.simulator.inputs.yamltree import Mark, read_text
-from ballplate.simulator.machines.arrangement import AXES, Arrangement
-from ballplate.simulator.machines.error_names import AXIS_ERRORS, SQUARENESS_ERRORS
-from ballplate.simulator.machines.protocol import Array
+from ballplate.simulator.machines import AXES, AXIS_ERRORS, SQUARENESS_ERRORS, Arrangement, Array
 
 from .axis_tables import AxisTable, names_of, tool_chain
 from .table_formats import (

@@ -7,14 +7,17 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
-from ballplate.simulator.experiment.curve_files import read_curves
-from ballplate.simulator.experiment.error_tables import LineError, parse_point
-from ballplate.simulator.inputs.messages import ExperimentError, Message, refused
-from ballplate.simulator.inputs.quantities import format_length
-from ballplate.simulator.inputs.settings import listing
-from ballplate.simulator.inputs.yamltree import Mark, read_text
-from ballplate.simulator.machines.arrangement import AXES, Arrangement
-from ballplate.simulator.machines.error_names import AXIS_ERRORS
+from ballplate.simulator.experiment import LineError, parse_point, read_curves
+from ballplate.simulator.inputs import (
+    ExperimentError,
+    Mark,
+    Message,
+    format_length,
+    listing,
+    read_text,
+    refused,
+)
+from ballplate.simulator.machines import AXES, AXIS_ERRORS, Arrangement
 
 from .axis_tables import AxisTable, AxisTables, Corner, names_of
 from .table_formats import (

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 from itertools import product
 
 import numpy as np
-from ballplate.simulator.computing.threads import single_threaded
-from ballplate.simulator.geometry.grids import grid_points
-from ballplate.simulator.machines.protocol import Array, ErrorModel
+from ballplate.simulator.computing import single_threaded
+from ballplate.simulator.geometry import grid_points
+from ballplate.simulator.machines import Array, ErrorModel
 
 from .axis_tables import (
     AxisTable,

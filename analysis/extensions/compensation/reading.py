@@ -8,10 +8,14 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-from ballplate.simulator.inputs.messages import refused
-from ballplate.simulator.machines.arrangement import ARRANGEMENTS, Arrangement
-from ballplate.simulator.machines.error_names import AXIS_ERRORS, SQUARENESS_ERRORS
-from ballplate.simulator.machines.protocol import Array
+from ballplate.simulator.inputs import refused
+from ballplate.simulator.machines import (
+    ARRANGEMENTS,
+    AXIS_ERRORS,
+    SQUARENESS_ERRORS,
+    Arrangement,
+    Array,
+)
 
 from .axis_tables import (
     AxisTable,

@@ -9,9 +9,8 @@ from pathlib import Path
 from typing import Literal, get_args
 
 import numpy as np
-from ballplate.simulator.inputs.settings import listing
-from ballplate.simulator.machines.arrangement import ARRANGEMENTS, AXES, Arrangement
-from ballplate.simulator.machines.protocol import Array
+from ballplate.simulator.inputs import listing
+from ballplate.simulator.machines import ARRANGEMENTS, AXES, Arrangement, Array
 
 from .axis_tables import AxisTable, AxisTables, Corner
 from .volume_tables import VolumeTable

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from itertools import product
 
 import numpy as np
-from ballplate.simulator.geometry.grids import grid_points
-from ballplate.simulator.machines.protocol import Array, ErrorModel
+from ballplate.simulator.geometry import grid_points
+from ballplate.simulator.machines import Array, ErrorModel
 
 # Of numerical derivatives by the probe offset, in metres: errors are nearly linear in it.
 OFFSET = 0.1

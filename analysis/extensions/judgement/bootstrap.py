@@ -6,22 +6,26 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from ballplate.presentation.formatting import (
+from ballplate.presentation import (
+    Result,
     aligned,
     amount_of,
     as_data,
     number,
     to_uncertainty,
 )
-from ballplate.presentation.result import Result
-from ballplate.results.estimates import EstimatedFunctions, Function, estimated_functions
-from ballplate.simulator.computing.processes import in_processes
-from ballplate.simulator.computing.steps import ProgressStep, Report, unreported
-from ballplate.simulator.computing.threads import single_threaded
-from ballplate.simulator.design.arrays import Design, State, reading_noise
-from ballplate.simulator.estimation.gauss_newton import Status, estimate, linearised_fit
-from ballplate.simulator.machines.protocol import Array
-from ballplate.simulator.readings.generate import NoReadingError, true_readings
+from ballplate.results import EstimatedFunctions, Function, estimated_functions
+from ballplate.simulator.computing import (
+    ProgressStep,
+    Report,
+    in_processes,
+    single_threaded,
+    unreported,
+)
+from ballplate.simulator.design import Design, State, reading_noise
+from ballplate.simulator.estimation import Status, estimate, linearised_fit
+from ballplate.simulator.machines import Array
+from ballplate.simulator.readings import NoReadingError, true_readings
 
 # Data sets of a task: the progress is told after each.
 AT_ONCE = 16

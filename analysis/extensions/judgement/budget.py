@@ -7,25 +7,21 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from ballplate.presentation.formatting import aligned, finite, number
-from ballplate.presentation.result import Result
-from ballplate.results.adjustments import few_degrees_of_freedom
-from ballplate.results.fit import Fit
-from ballplate.results.groupings import Grouping
-from ballplate.simulator.computing.rounding import comparable
-from ballplate.simulator.computing.threads import single_threaded
-from ballplate.simulator.estimation.functions import (
+from ballplate.presentation import Result, aligned, finite, number
+from ballplate.results import Fit, Grouping, few_degrees_of_freedom
+from ballplate.simulator.computing import comparable, single_threaded
+from ballplate.simulator.estimation import (
     Coordinates,
     Distances,
+    LinearFunctions,
+    Linearisation,
     MeasuredPoints,
     linear_functions,
+    linearise,
 )
-from ballplate.simulator.estimation.linearisation import LinearFunctions, Linearisation, linearise
-from ballplate.simulator.experiment.layout import lay_out
-from ballplate.simulator.experiment.model import Experiment
-from ballplate.simulator.machines.protocol import Array, Integers
-from ballplate.uncertainty.kernel_quantities import evaluation_points, task_distances
-from ballplate.uncertainty.tasks import expansion
+from ballplate.simulator.experiment import Experiment, lay_out
+from ballplate.simulator.machines import Array, Integers
+from ballplate.uncertainty import evaluation_points, expansion, task_distances
 
 from .source_sums import SourceSums, source_sums, sources_of
 

@@ -4,11 +4,17 @@ from __future__ import annotations
 
 from argparse import ArgumentParser, Namespace
 
-from ballplate.cli.common import add_json, show, single
-from ballplate.cli.outputs import UsageError
-from ballplate.cli.reading_options import add_readings, observed_readings, warn_of
-from ballplate.cli.table_options import KEYS
-from ballplate.results.groupings import GROUPINGS
+from ballplate.cli import (
+    KEYS,
+    UsageError,
+    add_json,
+    add_readings,
+    observed_readings,
+    show,
+    single,
+    warn_of,
+)
+from ballplate.results import GROUPINGS
 
 GROUP = "more"
 HELP = "split uncertainties by their sources: readings, certificates, probes, influences"
@@ -40,7 +46,7 @@ def add_options(parser: ArgumentParser) -> None:
 
 def run(options: Namespace) -> int:
     """Print the budget of one experiment."""
-    from ballplate.results.study import fit
+    from ballplate.results import fit
 
     from .budget import budget
 

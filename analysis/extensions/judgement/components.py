@@ -7,15 +7,13 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from ballplate.gross_errors.leftover import leftover, too_many_entries
-from ballplate.presentation.formatting import aligned, finite, number, picked
-from ballplate.presentation.result import Result
-from ballplate.results.groupings import Grouping
-from ballplate.results.observation_groups import ObservationGroup, groups_of
-from ballplate.simulator.computing.threads import single_threaded
-from ballplate.simulator.design.arrays import Design
-from ballplate.simulator.estimation.linearisation import Linearisation
-from ballplate.simulator.machines.protocol import Array, Integers
+from ballplate.gross_errors import leftover, too_many_entries
+from ballplate.presentation import Result, aligned, finite, number, picked
+from ballplate.results import Grouping, ObservationGroup, groups_of
+from ballplate.simulator.computing import single_threaded
+from ballplate.simulator.design import Design
+from ballplate.simulator.estimation import Linearisation
+from ballplate.simulator.machines import Array, Integers
 
 from .restricted_likelihood import (
     SMALLEST,

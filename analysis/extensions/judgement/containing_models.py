@@ -6,9 +6,13 @@ NPL Report CISE 15/98, section 2.3: every kinematic model is a special case of s
 from __future__ import annotations
 
 import numpy as np
-from ballplate.simulator.machines.empirical import USUAL_OFFSET, EmpiricalModel
-from ballplate.simulator.machines.kinematic import KinematicModel
-from ballplate.simulator.machines.protocol import Array, ErrorModel
+from ballplate.simulator.machines import (
+    USUAL_OFFSET,
+    Array,
+    EmpiricalModel,
+    ErrorModel,
+    KinematicModel,
+)
 
 # Largest part of a parameter's effect that may be left over where its model counts as contained.
 CONTAINED = 1e-9

@@ -12,29 +12,34 @@ from dataclasses import dataclass
 from typing import Any, Literal
 
 import numpy as np
-from ballplate.presentation.formatting import aligned, as_data, number, picked
-from ballplate.presentation.result import FitResult
-from ballplate.results.campaign_sigmas import campaign_sigmas
-from ballplate.results.campaign_tests import (
+from ballplate.presentation import FitResult, aligned, as_data, number, picked
+from ballplate.results import (
     TOO_ALIKE,
     TOO_RARE,
     EstimatedSigma,
     Roots,
     SigmaPair,
+    campaign_sigmas,
     joint_difference,
     with_common,
 )
-from ballplate.simulator.computing.threads import single_threaded
-from ballplate.simulator.design.observations.readings import rotation_sensitivity
-from ballplate.simulator.estimation.corrections import corrected_points, correction_rows
-from ballplate.simulator.estimation.gauss_newton import estimate, linearised_fit
-from ballplate.simulator.estimation.hat import hat_rows, row_count, row_places
-from ballplate.simulator.estimation.linearisation import Linearisation
-from ballplate.simulator.experiment.model import Experiment
-from ballplate.simulator.inputs.messages import refused
-from ballplate.simulator.machines.protocol import Array
-from ballplate.simulator.readings.observed_readings import ObservedReadings
-from ballplate.simulator.readings.same_readings import (
+from ballplate.simulator.computing import single_threaded
+from ballplate.simulator.design import rotation_sensitivity
+from ballplate.simulator.estimation import (
+    Linearisation,
+    corrected_points,
+    correction_rows,
+    estimate,
+    hat_rows,
+    linearised_fit,
+    row_count,
+    row_places,
+)
+from ballplate.simulator.experiment import Experiment
+from ballplate.simulator.inputs import refused
+from ballplate.simulator.machines import Array
+from ballplate.simulator.readings import (
+    ObservedReadings,
     read_once_words,
     same_positions,
     same_readings,

@@ -10,19 +10,15 @@ from ballplate.arguments import (
     experiment_of,
     observed_of,
 )
-from ballplate.results.groupings import GROUPINGS, Grouping
-from ballplate.simulator.computing.steps import Report, unreported
-from ballplate.simulator.experiment.model import Experiment
-from ballplate.simulator.inputs.arguments import (
-    ensure_one_of,
-    ensure_report,
-    ensure_whole,
-)
+from ballplate.results import GROUPINGS, Grouping
+from ballplate.simulator.computing import Report, unreported
+from ballplate.simulator.experiment import Experiment
+from ballplate.simulator.inputs import ensure_one_of, ensure_report, ensure_whole
 
 if TYPE_CHECKING:
     import pandas
     from ballplate.arguments import Tables
-    from ballplate.results.fit import Fit
+    from ballplate.results import Fit
 
     from .budget import UncertaintyBudget
     from .cross_validation import CrossValidation
@@ -113,7 +109,7 @@ def budget(given: Experiment | PathLike | Fit, by: Grouping = "calibration") -> 
     >>> bp.budget(bp.fit(bp.quickstart(), bp.simulate(bp.quickstart())), by="probe").sources[0]
     'calibration[0]: distances of plate'
     """
-    from ballplate.results.fit import Fit
+    from ballplate.results import Fit
 
     from .budget import budget as budget_of
 

@@ -5,9 +5,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from ballplate.simulator.design.arrays import Design, State, measured, reading_uncertainties
-from ballplate.simulator.design.observations.readings import reading_blocks
-from ballplate.simulator.machines.protocol import Array
+from ballplate.simulator.design import (
+    Design,
+    State,
+    measured,
+    reading_blocks,
+    reading_uncertainties,
+)
+from ballplate.simulator.machines import Array
 
 
 @dataclass(frozen=True)

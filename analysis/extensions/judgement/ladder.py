@@ -11,22 +11,21 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from ballplate.gross_errors.exact_values import diagnosis_of_all
-from ballplate.gross_errors.leftover import too_many_entries
-from ballplate.gross_errors.refits import diagnosis_with_refits
-from ballplate.gross_errors.wording import refit_words, suspect_words
-from ballplate.simulator.computing.steps import ProgressStep, Report, unreported
-from ballplate.simulator.computing.threads import single_threaded
-from ballplate.simulator.design.arrays import Design, State
-from ballplate.simulator.estimation.corrections import corrected_points
-from ballplate.simulator.estimation.gauss_newton import estimate, linearised_fit
-from ballplate.simulator.estimation.linearisation import Linearisation
-from ballplate.simulator.experiment.model import Experiment
-from ballplate.simulator.inputs.messages import refused
-from ballplate.simulator.machines.kinematic_settings import KinematicSettings
-from ballplate.simulator.machines.protocol import Array, ErrorModel
-from ballplate.simulator.readings.observed_readings import ObservedReadings
-from ballplate.uncertainty.summaries import uncertainties
+from ballplate.gross_errors import (
+    diagnosis_of_all,
+    diagnosis_with_refits,
+    refit_words,
+    suspect_words,
+    too_many_entries,
+)
+from ballplate.simulator.computing import ProgressStep, Report, single_threaded, unreported
+from ballplate.simulator.design import Design, State
+from ballplate.simulator.estimation import Linearisation, corrected_points, estimate, linearised_fit
+from ballplate.simulator.experiment import Experiment
+from ballplate.simulator.inputs import refused
+from ballplate.simulator.machines import Array, ErrorModel, KinematicSettings
+from ballplate.simulator.readings import ObservedReadings
+from ballplate.uncertainty import uncertainties
 
 from .lack_of_fit import PureError, chance_of, chance_words, pure_error
 from .ladder_result import Ladder, LengthChange, Rung

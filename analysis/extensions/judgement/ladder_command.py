@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from argparse import ArgumentParser, ArgumentTypeError, Namespace
 
-from ballplate.cli.common import add_json, whole
-from ballplate.cli.reading_options import add_readings, observed_readings, warn_of
+from ballplate.cli import add_json, add_readings, observed_readings, warn_of, whole
 
 GROUP = "evaluate"
 HELP = "compare error models on readings: which one do they call for?"
@@ -40,8 +39,7 @@ def _coefficients(text: str) -> int:
 
 def run(options: Namespace) -> int:
     """Compare error models; 1 if none is recommended."""
-    from ballplate.cli.common import show
-    from ballplate.cli.progress import progress
+    from ballplate.cli import progress, show
 
     from .ladder import ladder
     from .rungs import MOST_COEFFICIENTS

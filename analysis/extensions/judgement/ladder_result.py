@@ -6,11 +6,10 @@ import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from ballplate.presentation.formatting import aligned, finite, number, picked
-from ballplate.presentation.result import FitResult
-from ballplate.results.adjustments import freedom_words
-from ballplate.simulator.readings.observed_readings import ObservedReadings
-from ballplate.uncertainty.summaries import Quantity
+from ballplate.presentation import FitResult, aligned, finite, number, picked
+from ballplate.results import freedom_words
+from ballplate.simulator.readings import ObservedReadings
+from ballplate.uncertainty import Quantity
 
 from .lack_of_fit import PureError, chance_words
 from .rung_choice import FALSE_STEP, Beaten, Criteria

@@ -14,30 +14,33 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
-from ballplate.results.campaign_sigmas import campaign_sigmas
-from ballplate.simulator.computing.steps import ProgressStep, Report, unreported
-from ballplate.simulator.computing.threads import single_threaded
-from ballplate.simulator.design.arrays import (
+from ballplate.results import campaign_sigmas
+from ballplate.simulator.computing import ProgressStep, Report, single_threaded, unreported
+from ballplate.simulator.design import (
     Design,
+    Flags,
+    Lengths,
     Observations,
     measured,
     reading_uncertainties,
 )
-from ballplate.simulator.design.objects import Flags
-from ballplate.simulator.design.observations.lengths import Lengths
-from ballplate.simulator.estimation.functions import (
+from ballplate.simulator.estimation import (
     Distances,
+    Linearisation,
     MeasuredPoints,
+    estimate,
+    hat_rows,
     linear_functions,
+    linearised_fit,
+    row_count,
+    row_places,
+    whitened_residuals,
 )
-from ballplate.simulator.estimation.gauss_newton import estimate, linearised_fit
-from ballplate.simulator.estimation.hat import hat_rows, row_count, row_places, whitened_residuals
-from ballplate.simulator.estimation.linearisation import Linearisation
-from ballplate.simulator.experiment.model import Experiment
-from ballplate.simulator.geometry.motions import AXIS_NAMES
-from ballplate.simulator.inputs.messages import refused
-from ballplate.simulator.machines.protocol import Array, Integers
-from ballplate.simulator.readings.observed_readings import ObservedReadings
+from ballplate.simulator.experiment import Experiment
+from ballplate.simulator.geometry import AXIS_NAMES
+from ballplate.simulator.inputs import refused
+from ballplate.simulator.machines import Array, Integers
+from ballplate.simulator.readings import ObservedReadings
 
 from .lack_of_fit import chance_of
 from .left_out_result import LengthDifference, PredictedGroup, PredictedReading, Validation

@@ -5,9 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from ballplate.presentation.formatting import aligned, as_data, number, picked
-from ballplate.presentation.result import FitResult
-from ballplate.simulator.readings.observed_readings import ObservedReadings
+from ballplate.presentation import FitResult, aligned, as_data, number, picked
+from ballplate.simulator.readings import ObservedReadings
 
 from .lack_of_fit import chance_words
 

@@ -11,11 +11,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from ballplate.simulator.computing.threads import single_threaded
-from ballplate.simulator.design.objects import Flags
-from ballplate.simulator.estimation.linearisation import Linearisation
-from ballplate.simulator.estimation.substitution import in_order
-from ballplate.simulator.machines.protocol import Array, Integers
+from ballplate.simulator.computing import single_threaded
+from ballplate.simulator.design import Flags
+from ballplate.simulator.estimation import Linearisation, in_order
+from ballplate.simulator.machines import Array, Integers
 
 # Share of the largest singular value below which a direction of scaled columns counts as none.
 NOTHING = 1e-10

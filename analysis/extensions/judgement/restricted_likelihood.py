@@ -17,10 +17,10 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from ballplate.gross_errors.leftover import Leftover
-from ballplate.results.observation_groups import ObservationGroup
-from ballplate.simulator.computing.threads import scipy_linalg
-from ballplate.simulator.machines.protocol import Array, Integers
+from ballplate.gross_errors import Leftover
+from ballplate.results import ObservationGroup
+from ballplate.simulator.computing import scipy_linalg
+from ballplate.simulator.machines import Array, Integers
 
 # Ratios of variances that are looked at; outside these, a group has no scatter or no weight.
 SMALLEST, LARGEST = 1e-4, 1e6

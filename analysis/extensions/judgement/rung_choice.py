@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from ballplate.simulator.design.objects import Flags
-from ballplate.simulator.machines.kinematic import ErrorFunction
+from ballplate.simulator.design import Flags
+from ballplate.simulator.machines import ErrorFunction
 
 from .lack_of_fit import chance_of
 from .nested import NestedSums

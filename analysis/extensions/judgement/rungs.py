@@ -8,19 +8,20 @@ from functools import lru_cache
 from typing import Any, Literal
 
 import numpy as np
-from ballplate.simulator.design.arrays import Design
-from ballplate.simulator.design.observations.priors import Priors
-from ballplate.simulator.estimation.linearisation import linearise
-from ballplate.simulator.experiment.model import Experiment
-from ballplate.simulator.inputs.messages import refused
-from ballplate.simulator.inputs.settings import Settings
-from ballplate.simulator.machines.bases import Basis
-from ballplate.simulator.machines.empirical_settings import EmpiricalSettings
-from ballplate.simulator.machines.kinematic import KinematicModel
-from ballplate.simulator.machines.kinematic_settings import FunctionsSettings, KinematicSettings
-from ballplate.simulator.machines.plane import PlaneModel
-from ballplate.simulator.machines.protocol import ErrorModel
-from ballplate.simulator.machines.settings import build_error_model
+from ballplate.simulator.design import Design, Priors
+from ballplate.simulator.estimation import linearise
+from ballplate.simulator.experiment import Experiment
+from ballplate.simulator.inputs import Settings, refused
+from ballplate.simulator.machines import (
+    Basis,
+    EmpiricalSettings,
+    ErrorModel,
+    FunctionsSettings,
+    KinematicModel,
+    KinematicSettings,
+    PlaneModel,
+    build_error_model,
+)
 
 from .containing_models import NotContainedError, linear_map
 

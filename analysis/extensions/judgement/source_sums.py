@@ -14,19 +14,21 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from ballplate.results.groupings import Grouping
-from ballplate.results.observation_groups import ObservationGroup, groups_of, kinds_of_rows
-from ballplate.simulator.computing.threads import single_threaded
-from ballplate.simulator.design.arrays import Design, Observations
-from ballplate.simulator.design.observations.coordinates import CalibratedCoordinates
-from ballplate.simulator.design.observations.joint_values import JointValues
-from ballplate.simulator.design.observations.lengths import Lengths, length_whitening
-from ballplate.simulator.design.observations.priors import Priors
-from ballplate.simulator.design.observations.star import Stars
-from ballplate.simulator.estimation.hat import hat_rows, row_count, row_places
-from ballplate.simulator.estimation.linearisation import Linearisation
-from ballplate.simulator.experiment.model import Experiment
-from ballplate.simulator.machines.protocol import Array
+from ballplate.results import Grouping, ObservationGroup, groups_of, kinds_of_rows
+from ballplate.simulator.computing import single_threaded
+from ballplate.simulator.design import (
+    CalibratedCoordinates,
+    Design,
+    JointValues,
+    Lengths,
+    Observations,
+    Priors,
+    Stars,
+    length_whitening,
+)
+from ballplate.simulator.estimation import Linearisation, hat_rows, row_count, row_places
+from ballplate.simulator.experiment import Experiment
+from ballplate.simulator.machines import Array
 
 # Lengths of standards are formed of readings and compared with certificates; each row mixes both.
 READ_STANDARDS = "readings of length standards"

@@ -5,9 +5,9 @@ from __future__ import annotations
 from argparse import ArgumentParser, Namespace
 from pathlib import Path
 
-from ballplate.cli.common import add_json
-from ballplate.cli.outputs import UsageError
-from ballplate.cli.reading_options import (
+from ballplate.cli import (
+    UsageError,
+    add_json,
     add_readings,
     observed_readings,
     refuse_other_files,
@@ -48,9 +48,8 @@ def add_options(parser: ArgumentParser) -> None:
 
 def run(options: Namespace) -> int:
     """Validate a fit; 1 if a prediction fails, or two campaigns differ."""
-    from ballplate.cli.common import show
-    from ballplate.cli.progress import progress
-    from ballplate.presentation.result import FitResult
+    from ballplate.cli import progress, show
+    from ballplate.presentation import FitResult
 
     if options.other_plate and not options.against:
         raise UsageError("--other-plate goes with --against only; leave it out")

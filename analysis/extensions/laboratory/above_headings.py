@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable
 
-from ballplate.simulator.inputs.settings import shorten
+from ballplate.simulator.inputs import shorten
 
 from .headings import HeadingError
 

@@ -9,32 +9,31 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-from ballplate.simulator.experiment.readings_section import Coordinate, ReadingsSettings
-from ballplate.simulator.inputs.decoding import (
+from ballplate.simulator.experiment import Coordinate, ReadingsSettings
+from ballplate.simulator.inputs import (
+    LENGTH_UNITS,
     LINE_END,
-    refuse_controls,
-)
-from ballplate.simulator.inputs.messages import (
     MORE_ERRORS,
     MOST_MESSAGES,
+    MOST_ROWS,
     ExperimentError,
+    FileRow,
+    GivenText,
+    Mark,
     Message,
-    refused,
-)
-from ballplate.simulator.inputs.quantities import (
-    LENGTH_UNITS,
     QuantityError,
+    listing,
     metres_or_radians,
     parse_positive_length,
     plain_number,
     plain_unit,
     power_of_ten,
+    refuse_controls,
+    refused,
+    shorten,
+    text_of_cell,
 )
-from ballplate.simulator.inputs.settings import listing, shorten
-from ballplate.simulator.inputs.spreadsheets import text_of_cell
-from ballplate.simulator.inputs.tables import MOST_ROWS, FileRow
-from ballplate.simulator.inputs.yamltree import GivenText, Mark
-from ballplate.simulator.machines.protocol import Array
+from ballplate.simulator.machines import Array
 
 from .above_headings import said_above
 from .clock_times import ClockError, ReadTime, clock_time

@@ -7,9 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
 
-from ballplate.simulator.inputs.messages import Message
-from ballplate.simulator.inputs.settings import shorten
-from ballplate.simulator.inputs.yamltree import Mark
+from ballplate.simulator.inputs import Mark, Message, shorten
 
 DAY_FIRST = re.compile(r"([0-9]{1,2})\.([0-9]{1,2})\.([0-9]{4})[\sT,]+(.+)")
 TIME_OF_DAY = re.compile(r"([0-9]{1,2}):([0-9]{2})(?::([0-9]{2}(?:[.,][0-9]{1,9})?))?")

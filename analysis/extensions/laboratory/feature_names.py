@@ -11,10 +11,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import product
 
-from ballplate.simulator.design.arrays import Design
-from ballplate.simulator.experiment.name_rules import PLACE
-from ballplate.simulator.inputs.messages import ExperimentError, refused
-from ballplate.simulator.inputs.settings import listing, shorten
+from ballplate.simulator.design import Design
+from ballplate.simulator.experiment import PLACE
+from ballplate.simulator.inputs import ExperimentError, listing, refused, shorten
 
 # Tried in this order where the experiment is known and no rule is given.
 RULES = (

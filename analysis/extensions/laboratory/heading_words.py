@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from fractions import Fraction
 from functools import lru_cache
 
-from ballplate.simulator.inputs.quantities import DURATION_UNITS, plain_unit
+from ballplate.simulator.inputs import DURATION_UNITS, plain_unit
 
 # Characters of what may be a heading.
 LONGEST = 100

@@ -8,8 +8,8 @@ from dataclasses import dataclass, field
 from fractions import Fraction
 from functools import cached_property
 
-from ballplate.simulator.experiment.readings_section import ColumnsSettings
-from ballplate.simulator.inputs.settings import hint, listing, shorten
+from ballplate.simulator.experiment import ColumnsSettings
+from ballplate.simulator.inputs import hint, listing, shorten
 
 from .heading_words import (
     LESS_CLEAR,

@@ -6,9 +6,7 @@ import sys
 from argparse import ArgumentParser, Namespace
 from pathlib import Path
 
-from ballplate.cli.outputs import add_force, add_output, text_writer, write
-from ballplate.cli.table_options import rule
-from ballplate.cli.telling import complain, note
+from ballplate.cli import add_force, add_output, complain, note, rule, text_writer, write
 
 GROUP = "measure"
 HELP = "make a table of readings of reports of CMM programs"
@@ -81,7 +79,7 @@ def add_options(parser: ArgumentParser) -> None:
 
 def run(options: Namespace) -> int:
     """Write the table of what the reports have."""
-    from ballplate.cli.common import single
+    from ballplate.cli import single
 
     from .interface import read_report
 

@@ -13,13 +13,19 @@ from pathlib import Path
 from typing import TextIO
 
 import numpy as np
-from ballplate.simulator.design.arrays import Design
-from ballplate.simulator.estimation.spheres import FEWEST_POINTS, SphereFit, closest_sphere
-from ballplate.simulator.experiment.readings_section import Coordinate
-from ballplate.simulator.inputs.messages import ExperimentError, refused
-from ballplate.simulator.inputs.settings import listing, number_of, shorten
-from ballplate.simulator.inputs.spreadsheets import CsvWriter
-from ballplate.simulator.inputs.yamltree import GivenText, Mark
+from ballplate.simulator.design import Design
+from ballplate.simulator.estimation import FEWEST_POINTS, SphereFit, closest_sphere
+from ballplate.simulator.experiment import Coordinate
+from ballplate.simulator.inputs import (
+    CsvWriter,
+    ExperimentError,
+    GivenText,
+    Mark,
+    listing,
+    number_of,
+    refused,
+    shorten,
+)
 
 from .feature_names import LONGEST_NAME, Named, fold, named, position_of_file, without_point
 from .formats.registered import read_report

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from ballplate.presentation.result import Result
+from ballplate.presentation import Result
 
 from .imported import ImportedReadings
 

@@ -11,12 +11,8 @@ from ballplate.arguments import (
     PathLike,
     experiment_of,
 )
-from ballplate.simulator.experiment.model import Experiment
-from ballplate.simulator.inputs.arguments import (
-    ensure_one_of,
-    ensure_path,
-    ensure_type,
-)
+from ballplate.simulator.experiment import Experiment
+from ballplate.simulator.inputs import ensure_one_of, ensure_path, ensure_type
 
 if TYPE_CHECKING:
     from .imported_result import ReadReport
@@ -42,9 +38,8 @@ def read_report(
     >>> bp.read_report("designs/reports/z-low.dmo", "designs/quickstart.yaml").told
     ('designs/reports/z-low.dmo: DMIS output; taken: 3 sphere centres; left: 1 plane',)
     """
-    from ballplate.simulator.experiment.layout import lay_out
-    from ballplate.simulator.experiment.name_rules import check_rule
-    from ballplate.simulator.inputs.quantities import LENGTH_UNITS
+    from ballplate.simulator.experiment import check_rule, lay_out
+    from ballplate.simulator.inputs import LENGTH_UNITS
 
     from .formats.registered import FORMATS
     from .imported import ImportSettings

@@ -12,12 +12,10 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from ballplate.simulator.design.arrays import Design, nominal_places
-from ballplate.simulator.geometry.motions import fit_motion, fixes_pose
-from ballplate.simulator.inputs.quantities import format_length
-from ballplate.simulator.inputs.settings import listing, shorten
-from ballplate.simulator.inputs.tables import FileRow
-from ballplate.simulator.machines.protocol import Array, Integers
+from ballplate.simulator.design import Design, nominal_places
+from ballplate.simulator.geometry import fit_motion, fixes_pose
+from ballplate.simulator.inputs import FileRow, format_length, listing, shorten
+from ballplate.simulator.machines import Array, Integers
 
 from .heading_words import folded
 from .symmetry import turns_onto_itself

@@ -6,8 +6,8 @@ from __future__ import annotations
 
 import re
 
-from ballplate.simulator.inputs.yamltree import GivenText
-from ballplate.simulator.readings.certificate_files import headings
+from ballplate.simulator.inputs import GivenText
+from ballplate.simulator.readings import headings
 
 from .formats.registered import recognised
 from .formats.report import Format

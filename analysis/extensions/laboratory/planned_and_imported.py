@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from ballplate.simulator.design.arrays import Design
-from ballplate.simulator.inputs.settings import listing
+from ballplate.simulator.design import Design
+from ballplate.simulator.inputs import listing
 
 from .imported import ImportedReading, ImportedReadings, ImportSettings, report_readings
 

@@ -7,21 +7,27 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Mapping, Sequence
 
 import numpy as np
-from ballplate.simulator.design.arrays import Design
-from ballplate.simulator.experiment.readings_section import ReadingsSettings
-from ballplate.simulator.geometry.motions import AXIS_NAMES
-from ballplate.simulator.inputs.messages import ExperimentError, Message, refused
-from ballplate.simulator.inputs.quantities import format_length
-from ballplate.simulator.inputs.settings import listing
-from ballplate.simulator.inputs.tables import FileRow, header_names, header_texts
-from ballplate.simulator.inputs.yamltree import GivenText
-from ballplate.simulator.machines.protocol import Array
-from ballplate.simulator.readings.coordinate_kinds import controller_offsets
-from ballplate.simulator.readings.reading_sources import (
+from ballplate.simulator.design import Design
+from ballplate.simulator.experiment import ReadingsSettings
+from ballplate.simulator.geometry import AXIS_NAMES
+from ballplate.simulator.inputs import (
+    ExperimentError,
+    FileRow,
+    GivenText,
+    Message,
+    format_length,
+    header_names,
+    header_texts,
+    listing,
+    refused,
+)
+from ballplate.simulator.machines import Array
+from ballplate.simulator.readings import (
     Source,
     SourceRows,
     SourceText,
     Units,
+    controller_offsets,
     is_plain,
     plain_rows,
 )

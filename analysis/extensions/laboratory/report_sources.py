@@ -6,13 +6,16 @@ import math
 from collections.abc import Collection
 from pathlib import Path
 
-from ballplate.simulator.design.arrays import Design
-from ballplate.simulator.experiment.readings_section import ReadingsSettings
-from ballplate.simulator.inputs.messages import refused
-from ballplate.simulator.inputs.quantities import LENGTH_UNITS, plain_unit
-from ballplate.simulator.inputs.settings import listing
-from ballplate.simulator.inputs.tables import FileRow
-from ballplate.simulator.inputs.yamltree import GivenText
+from ballplate.simulator.design import Design
+from ballplate.simulator.experiment import ReadingsSettings
+from ballplate.simulator.inputs import (
+    LENGTH_UNITS,
+    FileRow,
+    GivenText,
+    listing,
+    plain_unit,
+    refused,
+)
 
 from .any_table import TableRows
 from .formats.registered import recognised

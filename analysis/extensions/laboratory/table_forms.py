@@ -12,10 +12,8 @@ import re
 from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass
 
-from ballplate.simulator.experiment.readings_section import ReadingsSettings
-from ballplate.simulator.inputs.messages import MOST_MESSAGES
-from ballplate.simulator.inputs.settings import shorten
-from ballplate.simulator.inputs.tables import MOST_COLUMNS
+from ballplate.simulator.experiment import ReadingsSettings
+from ballplate.simulator.inputs import MOST_COLUMNS, MOST_MESSAGES, shorten
 
 from .heading_words import LONGEST, unit_of
 from .headings import HeadingError, Headings, Vocabulary, numbered_columns, read_headings

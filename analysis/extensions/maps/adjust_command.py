@@ -6,13 +6,23 @@ from argparse import ArgumentParser, Namespace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ballplate.cli.common import add_json, map_path, percentage, show, write_noted
-from ballplate.cli.outputs import UsageError, add_force, add_output
-from ballplate.cli.reading_options import add_readings, observed_readings, warn_of
-from ballplate.cli.telling import warn
+from ballplate.cli import (
+    UsageError,
+    add_force,
+    add_json,
+    add_output,
+    add_readings,
+    map_path,
+    observed_readings,
+    percentage,
+    show,
+    warn,
+    warn_of,
+    write_noted,
+)
 
 if TYPE_CHECKING:
-    from ballplate.simulator.maps.fitted_map import FittedMap
+    from ballplate.simulator.maps import FittedMap
 
 GROUP = "use"
 HELP = "predict what adjustments leave of a machine's errors, and compare with a second campaign"
@@ -73,7 +83,7 @@ def add_options(parser: ArgumentParser) -> None:
 
 def run(options: Namespace) -> int:
     """Print the prediction and the comparison; 1 if something is not as expected."""
-    from ballplate.simulator.experiment.map_files import write_map
+    from ballplate.simulator.experiment import write_map
 
     from .adjusted_machine import adjusted_machine
     from .machine_changes import guideway_turn, scale_change
@@ -122,13 +132,13 @@ def _fitted(options: Namespace, file: Path, readings: list[Path]) -> tuple[Fitte
     """A map, of a file or of a fit, and whether there is something to complain of; None where a fit
     has failed.
     """
-    from ballplate.simulator.experiment.map_files import read_map
+    from ballplate.simulator.experiment import read_map
 
     if _is_map(file):
         if readings:
             raise UsageError(f"{file} is a map, which needs no readings; leave {readings[0]} out")
         return read_map(file), False
-    from ballplate.results.study import fit
+    from ballplate.results import fit
 
     chosen = Namespace(**{**vars(options), "files": [file], "readings": readings})
     experiment, observed = observed_readings(chosen)
@@ -139,7 +149,7 @@ def _fitted(options: Namespace, file: Path, readings: list[Path]) -> tuple[Fitte
 
 def _is_map(path: Path) -> bool:
     """Whether a file is a map rather than an experiment or readings."""
-    from ballplate.simulator.inputs.yamltree import read_tree, written
+    from ballplate.simulator.inputs import read_tree, written
 
     if path.suffix.lower() == ".npz":
         return True

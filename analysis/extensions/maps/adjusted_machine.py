@@ -13,15 +13,13 @@ from itertools import combinations, product
 from typing import Any, Literal
 
 import numpy as np
-from ballplate.presentation.formatting import aligned, finite, number
-from ballplate.presentation.result import Result
-from ballplate.results.adjustments import ARCSECOND, coverage_factor, few_degrees_of_freedom
-from ballplate.simulator.computing.threads import single_threaded
-from ballplate.simulator.geometry.motions import AXIS_NAMES, rigid_motions
-from ballplate.simulator.inputs.settings import number_of
-from ballplate.simulator.machines.protocol import Array, Unit
-from ballplate.simulator.maps.fit_verdict import verdict_line
-from ballplate.simulator.maps.fitted_map import FittedMap, readings_in_common
+from ballplate.presentation import Result, aligned, finite, number
+from ballplate.results import ARCSECOND, coverage_factor, few_degrees_of_freedom
+from ballplate.simulator.computing import single_threaded
+from ballplate.simulator.geometry import AXIS_NAMES, rigid_motions
+from ballplate.simulator.inputs import number_of
+from ballplate.simulator.machines import Array, Unit
+from ballplate.simulator.maps import FittedMap, readings_in_common, verdict_line
 
 from .corrected_points import corrected, drawn_rows
 from .machine_changes import MachineChange

@@ -7,11 +7,10 @@ from collections.abc import Sequence
 from functools import reduce
 from pathlib import Path
 
-from ballplate.simulator.design.objects import Tasks
-from ballplate.simulator.experiment.map_files import BINARY, read_map
-from ballplate.simulator.experiment.model import Experiment
-from ballplate.simulator.inputs.yamltree import read_bytes
-from ballplate.simulator.maps.fitted_map import FittedMap
+from ballplate.simulator.design import Tasks
+from ballplate.simulator.experiment import BINARY, Experiment, read_map
+from ballplate.simulator.inputs import read_bytes
+from ballplate.simulator.maps import FittedMap
 
 from .error_curves_result import ErrorCurves, error_curves
 from .fitted_errors_result import FittedErrorMap, fitted_map_errors

@@ -7,20 +7,14 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from ballplate.results.campaign_tests import EstimatedSigma
-from ballplate.results.fit import Fit
-from ballplate.results.map_of_fit import data_of, maps_known
-from ballplate.simulator.computing.threads import single_threaded
-from ballplate.simulator.design.objects import Volume
-from ballplate.simulator.geometry.motions import cross_matrices, pose_size
-from ballplate.simulator.inputs.quantities import LengthFunction
-from ballplate.simulator.inputs.settings import number_of
-from ballplate.simulator.machines.description import MachineDescription
-from ballplate.simulator.machines.plane import PlaneModel
-from ballplate.simulator.machines.protocol import Array, ErrorModel, HasLines
-from ballplate.simulator.maps.fit_verdict import LackOfFit
-from ballplate.simulator.maps.fitted_map import InCommon, MapData, readings_in_common
-from ballplate.simulator.readings.same_readings import (
+from ballplate.results import EstimatedSigma, Fit, data_of, maps_known
+from ballplate.simulator.computing import single_threaded
+from ballplate.simulator.design import Volume
+from ballplate.simulator.geometry import cross_matrices, pose_size
+from ballplate.simulator.inputs import LengthFunction, number_of
+from ballplate.simulator.machines import Array, ErrorModel, HasLines, MachineDescription, PlaneModel
+from ballplate.simulator.maps import InCommon, LackOfFit, MapData, readings_in_common
+from ballplate.simulator.readings import (
     position_fingerprints,
     same_positions,
     same_readings,

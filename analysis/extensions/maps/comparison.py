@@ -9,12 +9,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from ballplate.results.campaign_tests import orthonormal
-from ballplate.simulator.computing.threads import single_threaded
-from ballplate.simulator.design.objects import Volume
-from ballplate.simulator.geometry.grids import even_grid
-from ballplate.simulator.geometry.motions import AXIS_NAMES
-from ballplate.simulator.machines.protocol import Array, ErrorModel, HasLines, Integers
+from ballplate.results import orthonormal
+from ballplate.simulator.computing import single_threaded
+from ballplate.simulator.design import Volume
+from ballplate.simulator.geometry import AXIS_NAMES, even_grid
+from ballplate.simulator.machines import Array, ErrorModel, HasLines, Integers
 
 from .compared_maps import MOTIONS, ComparedMap, motions
 from .normalised_errors import FigureGroup, JointTest, ValueDifference

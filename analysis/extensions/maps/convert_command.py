@@ -5,8 +5,7 @@ from __future__ import annotations
 from argparse import ArgumentParser, Namespace
 from pathlib import Path
 
-from ballplate.cli.common import FITTED, add_json, map_path
-from ballplate.cli.outputs import add_force, add_output, write
+from ballplate.cli import FITTED, add_force, add_json, add_output, map_path, write
 
 GROUP = "more"
 HELP = "convert the map of a fit to another error model, with its covariance"
@@ -42,9 +41,8 @@ def add_options(parser: ArgumentParser) -> None:
 
 def run(options: Namespace) -> int:
     """Convert a map; 1 if the new model cannot follow the old one."""
-    from ballplate.cli.common import fitted_map, show
-    from ballplate.cli.telling import complain
-    from ballplate.simulator.experiment.map_files import write_map
+    from ballplate.cli import complain, fitted_map, show
+    from ballplate.simulator.experiment import write_map
 
     from .converted_map import convert
 

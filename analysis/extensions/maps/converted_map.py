@@ -6,18 +6,17 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from ballplate.presentation.formatting import (
+from ballplate.presentation import (
+    Result,
     aligned,
     amount_of,
     as_data,
     number,
     to_uncertainty,
 )
-from ballplate.presentation.result import Result
-from ballplate.results.map_of_fit import FRAMES
-from ballplate.simulator.computing.threads import single_threaded
-from ballplate.simulator.maps.fit_verdict import verdict_data, verdict_line
-from ballplate.simulator.maps.fitted_map import CONVERSION, FittedMap, LeftOut
+from ballplate.results import FRAMES
+from ballplate.simulator.computing import single_threaded
+from ballplate.simulator.maps import CONVERSION, FittedMap, LeftOut, verdict_data, verdict_line
 
 from .corrected_points import corrected_with_root
 from .largest_differences import (

@@ -6,21 +6,25 @@ from argparse import ArgumentParser, Namespace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ballplate.cli.common import FITTED, add_json, coverage_factor, fitted_map, show
-from ballplate.cli.outputs import (
+from ballplate.cli import (
+    FITTED,
     UsageError,
     Writer,
     add_force,
+    add_json,
     add_output,
+    coverage_factor,
+    fitted_map,
+    show,
     text_writer,
+    warn,
     write,
 )
-from ballplate.cli.telling import warn
 
 if TYPE_CHECKING:
-    from ballplate.simulator.design.objects import Tasks
-    from ballplate.simulator.maps.fitted_map import FittedMap
-    from ballplate.simulator.readings.point_files import GivenPoints
+    from ballplate.simulator.design import Tasks
+    from ballplate.simulator.maps import FittedMap
+    from ballplate.simulator.readings import GivenPoints
 
 GROUP = "use"
 HELP = "correct points by the map of a fit, with their uncertainty"
@@ -105,8 +109,8 @@ def _add_lengths(parser: ArgumentParser) -> None:
 
 def run(options: Namespace) -> int:
     """Print points and lengths, and write what was asked for; 1 if something is undetermined."""
-    from ballplate.simulator.inputs.settings import hint
-    from ballplate.simulator.readings.point_files import read_points
+    from ballplate.simulator.inputs import hint
+    from ballplate.simulator.readings import read_points
 
     from .correction import MOST_CO_ORDINATES, correction
 
@@ -139,7 +143,7 @@ def run(options: Namespace) -> int:
 
 def _wanted(options: Namespace, fitted: FittedMap, given: GivenPoints) -> Tasks:
     """The lengths that the options ask for."""
-    from ballplate.simulator.experiment.load import load
+    from ballplate.simulator.experiment import load
 
     from .wanted_lengths import between_listed, between_named, tasks_of_experiment
 

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import numpy as np
-from ballplate.simulator.computing.threads import single_threaded
-from ballplate.simulator.design.observations.readings import offset_sensitivity
-from ballplate.simulator.machines.protocol import Array, Integers
-from ballplate.simulator.maps.fitted_map import FittedMap
+from ballplate.simulator.computing import single_threaded
+from ballplate.simulator.design import offset_sensitivity
+from ballplate.simulator.machines import Array, Integers
+from ballplate.simulator.maps import FittedMap
 
 # Points of which derivatives are held at once.
 POINTS_AT_ONCE = 1000

@@ -7,21 +7,16 @@ from dataclasses import dataclass
 from typing import Any, TextIO
 
 import numpy as np
-from ballplate.presentation.formatting import aligned, finite, number, picked, to_uncertainty
-from ballplate.presentation.result import Result
-from ballplate.results.adjustments import few_degrees_of_freedom, freedom_words
-from ballplate.results.map_of_fit import left_out_words
-from ballplate.simulator.computing.threads import single_threaded
-from ballplate.simulator.design.objects import Flags, Tasks
-from ballplate.simulator.geometry.motions import AXIS_NAMES
-from ballplate.simulator.inputs.quantities import Target
-from ballplate.simulator.inputs.settings import listing, number_of
-from ballplate.simulator.inputs.spreadsheets import CsvWriter
-from ballplate.simulator.machines.protocol import Array
-from ballplate.simulator.maps.fit_verdict import verdict_data, verdict_line
-from ballplate.simulator.maps.fitted_map import FittedMap
-from ballplate.simulator.readings.point_files import GivenPoints
-from ballplate.uncertainty.scale import stretches
+from ballplate.presentation import Result, aligned, finite, number, picked, to_uncertainty
+from ballplate.results import few_degrees_of_freedom, freedom_words, left_out_words
+from ballplate.simulator.computing import single_threaded
+from ballplate.simulator.design import Flags, Tasks
+from ballplate.simulator.geometry import AXIS_NAMES
+from ballplate.simulator.inputs import CsvWriter, Target, listing, number_of
+from ballplate.simulator.machines import Array
+from ballplate.simulator.maps import FittedMap, verdict_data, verdict_line
+from ballplate.simulator.readings import GivenPoints
+from ballplate.uncertainty import stretches
 
 from .corrected_points import corrected_with_blocks, corrected_with_root, tips
 from .mapped_lengths import mapped_lengths

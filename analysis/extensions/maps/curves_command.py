@@ -6,18 +6,20 @@ from argparse import ArgumentParser, ArgumentTypeError, Namespace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ballplate.cli.common import (
+from ballplate.cli import (
     FITTED,
+    UsageError,
+    Writer,
+    add_force,
     add_formats,
     add_picture,
+    complain,
     count,
     fitted_map,
     print_json,
     print_lines,
     write_picture,
 )
-from ballplate.cli.outputs import UsageError, Writer, add_force
-from ballplate.cli.telling import complain
 
 if TYPE_CHECKING:
     from .error_curves_result import ErrorCurves

@@ -5,8 +5,17 @@ from __future__ import annotations
 from argparse import ArgumentParser, ArgumentTypeError, Namespace
 from pathlib import Path
 
-from ballplate.cli.common import add_json, add_picture, day, show, whole
-from ballplate.cli.outputs import UsageError, add_force, add_output, write
+from ballplate.cli import (
+    UsageError,
+    add_force,
+    add_json,
+    add_output,
+    add_picture,
+    day,
+    show,
+    whole,
+    write,
+)
 
 from .lengths_command import coverage_factor
 
@@ -102,8 +111,8 @@ def _grid(text: str) -> int:
 
 def run(options: Namespace) -> int:
     """Compare, write and print; 1 with --fail if a change is shown."""
-    from ballplate.cli.telling import complain
-    from ballplate.simulator.inputs.quantities import QuantityError, Target, parse_length_function
+    from ballplate.cli import complain
+    from ballplate.simulator.inputs import QuantityError, Target, parse_length_function
 
     from .comparison import ComparisonSettings, NotComparableError
     from .shared_certificates import NothingSharedError

@@ -6,21 +6,22 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
-from ballplate.presentation.pictures import draw_box
-from ballplate.presentation.scene import box, projection
-from ballplate.presentation.svg import (
+from ballplate.presentation import (
     INK,
     MUTED,
     SERIES,
+    box,
+    draw_box,
     drawing,
     legend_above,
     placed_axes,
+    projection,
     round_number,
     save,
     scale_bar,
     sticks,
 )
-from ballplate.simulator.computing.rounding import comparable
+from ballplate.simulator.computing import comparable
 
 from .comparison import MapComparison
 from .normalised_errors import FigureGroup

@@ -9,11 +9,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from ballplate.presentation.formatting import SHOWN, aligned, as_data, ascii_units, number
-from ballplate.presentation.result import Result
-from ballplate.simulator.geometry.motions import AXIS_NAMES
-from ballplate.simulator.inputs.spreadsheets import CsvWriter
-from ballplate.simulator.maps.fitted_map import FittedMap
+from ballplate.presentation import SHOWN, Result, aligned, as_data, ascii_units, number
+from ballplate.simulator.geometry import AXIS_NAMES
+from ballplate.simulator.inputs import CsvWriter
+from ballplate.simulator.maps import FittedMap
 
 from .error_functions import (
     POSITIONS,

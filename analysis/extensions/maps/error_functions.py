@@ -8,11 +8,10 @@ from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from ballplate.simulator.computing.threads import single_threaded
-from ballplate.simulator.inputs.settings import hint
-from ballplate.simulator.machines.error_names import SQUARENESS_ERRORS, SquarenessError
-from ballplate.simulator.machines.protocol import Array, HasLines, Unit
-from ballplate.simulator.maps.fitted_map import FittedMap
+from ballplate.simulator.computing import single_threaded
+from ballplate.simulator.inputs import hint
+from ballplate.simulator.machines import SQUARENESS_ERRORS, Array, HasLines, SquarenessError, Unit
+from ballplate.simulator.maps import FittedMap
 
 # Positions along each line.
 POSITIONS = 41

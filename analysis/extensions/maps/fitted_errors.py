@@ -9,9 +9,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from ballplate.simulator.computing.threads import single_threaded
-from ballplate.simulator.machines.protocol import Array, Integers
-from ballplate.simulator.maps.fitted_map import FittedMap
+from ballplate.simulator.computing import single_threaded
+from ballplate.simulator.machines import Array, Integers
+from ballplate.simulator.maps import FittedMap
 
 from .corrected_points import POINTS_AT_ONCE, corrected, drawn_rows, probe_indices, tips
 from .map_places import MapPlaces

@@ -11,16 +11,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from ballplate.presentation.formatting import as_data
-from ballplate.presentation.result import Result
-from ballplate.presentation.scene import box_edges, projection
-from ballplate.presentation.vectors import Vectors, draw_vectors
-from ballplate.results.adjustments import few_degrees_of_freedom
-from ballplate.results.map_of_fit import left_out_words
-from ballplate.simulator.design.objects import Tasks
-from ballplate.simulator.inputs.settings import hint, number_of
-from ballplate.simulator.machines.protocol import Array, Integers
-from ballplate.simulator.maps.fitted_map import FittedMap
+from ballplate.presentation import Result, Vectors, as_data, box_edges, draw_vectors, projection
+from ballplate.results import few_degrees_of_freedom, left_out_words
+from ballplate.simulator.design import Tasks
+from ballplate.simulator.inputs import hint, number_of
+from ballplate.simulator.machines import Array, Integers
+from ballplate.simulator.maps import FittedMap
 
 from .fitted_errors import (
     FittedErrors,

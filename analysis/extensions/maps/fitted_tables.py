@@ -6,11 +6,10 @@ from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
-from ballplate.presentation.formatting import aligned, number, picked, to_uncertainty
-from ballplate.simulator.computing.rounding import comparable
-from ballplate.simulator.machines.protocol import Array
-from ballplate.simulator.maps.fit_verdict import verdict_data, verdict_line
-from ballplate.simulator.maps.fitted_map import FittedMap
+from ballplate.presentation import aligned, number, picked, to_uncertainty
+from ballplate.simulator.computing import comparable
+from ballplate.simulator.machines import Array
+from ballplate.simulator.maps import FittedMap, verdict_data, verdict_line
 
 from .fitted_errors import FittedErrors, FittedLengths
 from .realisations import Realisations

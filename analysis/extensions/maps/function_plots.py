@@ -7,18 +7,20 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from ballplate.presentation.formatting import SHOWN, number, to_uncertainty
-from ballplate.presentation.svg import (
+from ballplate.presentation import (
     DASHES,
     MUTED,
     PAPER,
     SERIES,
+    SHOWN,
     drawing,
+    number,
     placed_axes,
     save,
+    to_uncertainty,
 )
-from ballplate.simulator.geometry.motions import AXIS_NAMES
-from ballplate.simulator.machines.error_names import AXIS_ERRORS
+from ballplate.simulator.geometry import AXIS_NAMES
+from ballplate.simulator.machines import AXIS_ERRORS
 
 from .error_functions import ErrorFunctions, EstimatedNumber, FunctionCurve
 from .volumetric_tables import CONVENTION

@@ -16,23 +16,23 @@ from ballplate.arguments import (
     map_or_path,
     table_of,
 )
-from ballplate.simulator.computing.steps import Report, unreported
-from ballplate.simulator.experiment.model import Experiment
-from ballplate.simulator.inputs.arguments import (
+from ballplate.simulator.computing import Report, unreported
+from ballplate.simulator.experiment import Experiment
+from ballplate.simulator.inputs import (
+    GivenText,
     ensure_one_of,
     ensure_positive,
     ensure_report,
     ensure_type,
     ensure_whole,
+    hint,
 )
-from ballplate.simulator.inputs.settings import hint
-from ballplate.simulator.inputs.yamltree import GivenText
 
 if TYPE_CHECKING:
     import pandas
-    from ballplate.results.fit import Fit
-    from ballplate.simulator.machines.protocol import Array
-    from ballplate.simulator.maps.fitted_map import FittedMap
+    from ballplate.results import Fit
+    from ballplate.simulator.machines import Array
+    from ballplate.simulator.maps import FittedMap
 
     from .adjusted_machine import AdjustedMachine
     from .converted_map import ConvertedMap
@@ -94,8 +94,7 @@ def diff(
     <MapDifference of second less first: no change is shown (p = 0.53)>
     """
     import numpy as np
-    from ballplate.simulator.inputs.days import stated_day
-    from ballplate.simulator.inputs.quantities import Target, parse_length_function
+    from ballplate.simulator.inputs import Target, parse_length_function, stated_day
 
     from .comparison import ComparisonSettings
     from .sources import map_difference
@@ -317,7 +316,12 @@ def correct(
     '0.080 µm'
     """
     import pandas
-    from ballplate.simulator.readings import point_files
+    from ballplate.simulator.readings import (
+        GivenPoints,
+        ensure_points,
+        probe_places,
+        read_points,
+    )
 
     from .correction import correction
     from .wanted_lengths import between_named
@@ -333,13 +337,13 @@ def correct(
         if one not in names:
             raise ValueError(f"no probe {one!r}; {hint(str(one), names)}")
         table = table_of("points", points)
-        given = point_files.read_points(table, names, str(one), chosen.volume, offsets)
+        given = read_points(table, names, str(one), chosen.volume, offsets)
     else:
-        x = point_files.ensure_points(points, chosen.volume)
+        x = ensure_points(points, chosen.volume)
         asked = chosen.probe if probe is None else probe
-        probes = point_files.probe_places(asked, names, len(x))
+        probes = probe_places(asked, names, len(x))
         x = x if offsets is None else x - offsets[probes]
-        given = point_files.GivenPoints(x, ("",) * len(x), probes)
+        given = GivenPoints(x, ("",) * len(x), probes)
     wanted = between_named(given, lengths)
     return correction(chosen, given, wanted, coverage_factor, with_repeatability)
 

@@ -9,9 +9,9 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from ballplate.simulator.design.objects import Flags, Volume
-from ballplate.simulator.geometry.grids import even_grid
-from ballplate.simulator.machines.protocol import Array
+from ballplate.simulator.design import Flags, Volume
+from ballplate.simulator.geometry import even_grid
+from ballplate.simulator.machines import Array
 
 # Places along each axis at which points are compared, and ends of lengths, by dimension.
 POINTS_ALONG, ENDS_ALONG = {2: 41, 3: 15}, {2: 15, 3: 7}

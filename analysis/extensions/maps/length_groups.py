@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from ballplate.simulator.design.arrays import Design
-from ballplate.simulator.inputs.quantities import LengthFunction, format_length
-from ballplate.simulator.machines.protocol import Array, Integers
+from ballplate.simulator.design import Design
+from ballplate.simulator.inputs import LengthFunction, format_length
+from ballplate.simulator.machines import Array, Integers
 
 
 @dataclass(frozen=True)

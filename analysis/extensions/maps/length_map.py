@@ -7,22 +7,22 @@ from itertools import islice
 from math import comb, prod
 
 import numpy as np
-from ballplate.presentation.formatting import csv_lines
-from ballplate.simulator.computing.rounding import above, comparable
-from ballplate.simulator.computing.steps import ProgressStep, Report, unreported
-from ballplate.simulator.computing.threads import single_threaded
-from ballplate.simulator.design.arrays import Design
-from ballplate.simulator.estimation.functions import MeasuredPoints, displacements
-from ballplate.simulator.estimation.linearisation import linearise
-from ballplate.simulator.experiment.layout import lay_out
-from ballplate.simulator.experiment.model import Experiment
-from ballplate.simulator.geometry.grids import even_grid
-from ballplate.simulator.geometry.motions import AXIS_NAMES
-from ballplate.simulator.inputs.quantities import QuantityError, parse_length_function
-from ballplate.simulator.inputs.settings import hint
-from ballplate.simulator.machines.protocol import Array, Integers
-from ballplate.uncertainty.pairs import PairTile, pair_tiles
-from ballplate.uncertainty.tasks import expansion
+from ballplate.presentation import csv_lines
+from ballplate.simulator.computing import (
+    ProgressStep,
+    Report,
+    above,
+    comparable,
+    single_threaded,
+    unreported,
+)
+from ballplate.simulator.design import Design
+from ballplate.simulator.estimation import MeasuredPoints, displacements, linearise
+from ballplate.simulator.experiment import Experiment, lay_out
+from ballplate.simulator.geometry import AXIS_NAMES, even_grid
+from ballplate.simulator.inputs import QuantityError, hint, parse_length_function
+from ballplate.simulator.machines import Array, Integers
+from ballplate.uncertainty import PairTile, expansion, pair_tiles
 from numpy.typing import NDArray
 
 from .length_groups import LengthGroups, LengthMapSettings

@@ -8,8 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
-from ballplate.presentation.formatting import percent
-from ballplate.presentation.svg import (
+from ballplate.presentation import (
     DASHES,
     INK,
     MARKERS,
@@ -18,10 +17,11 @@ from ballplate.presentation.svg import (
     SERIES,
     drawing,
     legend_above,
+    percent,
     placed_axes,
     save,
 )
-from ballplate.simulator.machines.protocol import Array
+from ballplate.simulator.machines import Array
 from numpy.typing import NDArray
 
 from .length_groups import GroupedLengths, target_words

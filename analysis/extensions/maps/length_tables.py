@@ -8,7 +8,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from ballplate.presentation.formatting import (
+from ballplate.presentation import (
+    Result,
     aligned,
     as_data,
     csv_lines,
@@ -18,9 +19,8 @@ from ballplate.presentation.formatting import (
     records,
     uncertainty_words,
 )
-from ballplate.presentation.result import Result
-from ballplate.simulator.computing.rounding import comparable
-from ballplate.simulator.machines.protocol import Array
+from ballplate.simulator.computing import comparable
+from ballplate.simulator.machines import Array
 
 from .length_groups import GroupedLengths, LengthGroups, target_words
 from .length_plots import draw_lengths

@@ -7,20 +7,18 @@ from argparse import ArgumentParser, ArgumentTypeError, Namespace
 from collections.abc import Iterable
 from pathlib import Path
 
-from ballplate.cli import common
-from ballplate.cli.common import (
-    add_file,
-    add_json,
-    add_picture,
-    coverage_factor,
-    show,
-    single,
-)
-from ballplate.cli.outputs import (
+from ballplate.cli import (
     UsageError,
     Writer,
+    add_file,
     add_force,
+    add_json,
     add_output,
+    add_picture,
+    coverage_factor,
+    grid,
+    show,
+    single,
     text_writer,
     write,
 )
@@ -85,7 +83,7 @@ def add_options(parser: ArgumentParser) -> None:
 
 
 def _grid(text: str) -> tuple[int, ...]:
-    counts = common.grid(text)
+    counts = grid(text)
     if counts is None or len(counts) > 3:
         raise ArgumentTypeError(
             f'expected a whole number, 2 or above, or one for each axis such as 6,5,4, not "{text}"'
@@ -95,7 +93,7 @@ def _grid(text: str) -> tuple[int, ...]:
 
 def run(options: Namespace) -> int:
     """Print the tables, and write and draw what was asked for; 1 if the rank is not as expected."""
-    from ballplate.cli.progress import progress
+    from ballplate.cli import progress
 
     from .length_map import length_map, length_settings, pair_csv
     from .length_tables import point_csv

@@ -6,10 +6,10 @@ import re
 from dataclasses import dataclass
 from typing import Any
 
-from ballplate.presentation.formatting import number
-from ballplate.results.adjustments import ARCSECOND
-from ballplate.simulator.geometry.motions import AXIS_NAMES
-from ballplate.simulator.inputs.quantities import (
+from ballplate.presentation import number
+from ballplate.results import ARCSECOND
+from ballplate.simulator.geometry import AXIS_NAMES
+from ballplate.simulator.inputs import (
     QuantityError,
     parse_angle,
     parse_length,

@@ -8,16 +8,17 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ballplate.cli import common
-from ballplate.cli.common import (
+from ballplate.cli import (
+    UsageError,
+    add_force,
     add_formats,
     add_picture,
     argument_type,
     at_most,
     count,
+    grid,
     whole,
 )
-from ballplate.cli.outputs import UsageError, add_force
 
 from .curves_command import show_errors
 
@@ -115,7 +116,7 @@ def _add_places(parser: ArgumentParser) -> None:
 def _grid(text: str) -> tuple[int, ...]:
     from .volumetric_errors import MOST_POINTS
 
-    counts = common.grid(text)
+    counts = grid(text)
     if counts is None or len(counts) not in (2, 3):
         raise ArgumentTypeError(
             f'expected three whole numbers, 2 or above, such as 13,9,9, not "{text}"'
@@ -157,7 +158,7 @@ def _plane(text: str) -> dict[str, float]:
 
 def run(options: Namespace) -> int:
     """Print, and draw, what was asked for."""
-    from ballplate.simulator.experiment.load import load
+    from ballplate.simulator.experiment import load
 
     from .any_map import map_errors
     from .fitted_errors_result import FittedErrorMap

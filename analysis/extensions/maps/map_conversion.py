@@ -8,11 +8,10 @@ from itertools import product
 from typing import Any
 
 import numpy as np
-from ballplate.simulator.computing.threads import single_threaded
-from ballplate.simulator.design.observations.readings import rotation_sensitivity
-from ballplate.simulator.machines.empirical import USUAL_OFFSET
-from ballplate.simulator.machines.protocol import Array, ErrorModel
-from ballplate.simulator.maps.fitted_map import FittedMap, determined_only
+from ballplate.simulator.computing import single_threaded
+from ballplate.simulator.design import rotation_sensitivity
+from ballplate.simulator.machines import USUAL_OFFSET, Array, ErrorModel
+from ballplate.simulator.maps import FittedMap, determined_only
 
 # Random places for each parameter of the richer model, and the least number of them.
 PLACES_EACH, LEAST_PLACES = 2, 200

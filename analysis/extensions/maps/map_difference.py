@@ -11,14 +11,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from ballplate.presentation.formatting import aligned, finite, number, picked
-from ballplate.presentation.result import Result
-from ballplate.results.adjustments import FEW
-from ballplate.results.campaign_tests import TOO_ALIKE, TOO_RARE
-from ballplate.simulator.computing.rounding import comparable
-from ballplate.simulator.maps.fit_verdict import verdict_data, verdict_line
-from ballplate.simulator.maps.fitted_map import InCommon
-from ballplate.simulator.readings.same_readings import read_once_words
+from ballplate.presentation import Result, aligned, finite, number, picked
+from ballplate.results import FEW, TOO_ALIKE, TOO_RARE
+from ballplate.simulator.computing import comparable
+from ballplate.simulator.maps import InCommon, verdict_data, verdict_line
+from ballplate.simulator.readings import read_once_words
 
 from .compared_maps import MOTIONS, ComparedMap, in_common, positions_in_common
 from .comparison import MapComparison

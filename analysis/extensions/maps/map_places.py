@@ -8,16 +8,12 @@ from pathlib import Path
 from typing import Literal
 
 import numpy as np
-from ballplate.simulator.design.objects import Volume
-from ballplate.simulator.experiment.error_tables import parse_line, parse_point
-from ballplate.simulator.geometry.grids import even_grid
-from ballplate.simulator.geometry.motions import AXIS_NAMES
-from ballplate.simulator.inputs.messages import refused
-from ballplate.simulator.inputs.quantities import parse_length
-from ballplate.simulator.inputs.tables import header_names
-from ballplate.simulator.inputs.yamltree import GivenText
-from ballplate.simulator.machines.protocol import Array, Integers
-from ballplate.simulator.readings.point_files import PROBE, ensure_points, read_points
+from ballplate.simulator.design import Volume
+from ballplate.simulator.experiment import parse_line, parse_point
+from ballplate.simulator.geometry import AXIS_NAMES, even_grid
+from ballplate.simulator.inputs import GivenText, header_names, parse_length, refused
+from ballplate.simulator.machines import Array, Integers
+from ballplate.simulator.readings import PROBE, ensure_points, read_points
 
 # Points along each axis of the volume, and along a line, unless told.
 GRID, POINTS = (5, 5, 5), 21

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from ballplate.results.campaign_tests import (
+from ballplate.results import (
     HELD,
     JointDifference,
     Roots,
@@ -15,9 +15,8 @@ from ballplate.results.campaign_tests import (
     single_chances,
     with_common,
 )
-from ballplate.simulator.computing.rounding import blank, comparable
-from ballplate.simulator.computing.threads import single_threaded
-from ballplate.simulator.machines.protocol import Array
+from ballplate.simulator.computing import blank, comparable, single_threaded
+from ballplate.simulator.machines import Array
 from numpy.typing import NDArray
 
 from .compared_maps import MappedValues

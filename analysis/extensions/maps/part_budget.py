@@ -12,9 +12,9 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from ballplate.simulator.computing.threads import single_threaded
-from ballplate.simulator.machines.protocol import Array, ErrorModel, Integers
-from ballplate.simulator.maps.fitted_map import FittedMap
+from ballplate.simulator.computing import single_threaded
+from ballplate.simulator.machines import Array, ErrorModel, Integers
+from ballplate.simulator.maps import FittedMap
 
 from .fitted_errors import ErrorRows, length_ends, length_rows, rows_of_errors
 from .map_places import MapPlaces

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from ballplate.presentation.formatting import aligned, number
+from ballplate.presentation import aligned, number
 
 from .fitted_tables import ROUNDING, UNDETERMINED
 from .part_budget import REST, PartBudget

@@ -5,11 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from ballplate.results.campaign_tests import orthonormal
-from ballplate.results.fit import Fit
-from ballplate.simulator.estimation.functions import BallPlaces, displacements
-from ballplate.simulator.geometry.motions import AXIS_NAMES, fit_motion
-from ballplate.simulator.machines.protocol import Array, Integers
+from ballplate.results import Fit, orthonormal
+from ballplate.simulator.estimation import BallPlaces, displacements
+from ballplate.simulator.geometry import AXIS_NAMES, fit_motion
+from ballplate.simulator.machines import Array, Integers
 
 from .compared_maps import ComparedMap, MappedValues, motions, without_shared
 from .normalised_errors import FigureGroup, JointTest, ValueDifference

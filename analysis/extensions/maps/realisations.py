@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from ballplate.presentation.formatting import as_data
-from ballplate.simulator.machines.protocol import Array
+from ballplate.presentation import as_data
+from ballplate.simulator.machines import Array
 
 # Realisations that are drawn at most, and co-ordinates of all of them, of eight bytes each.
 MOST_DRAWS, MOST_NUMBERS = 1000, 20_000_000

@@ -15,8 +15,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from ballplate.simulator.computing.threads import scipy_linalg, single_threaded
-from ballplate.simulator.machines.protocol import Array
+from ballplate.simulator.computing import scipy_linalg, single_threaded
+from ballplate.simulator.machines import Array
 from numpy.typing import NDArray
 
 # Directions of a covariance below this part of the largest, as correlations, are those of figures

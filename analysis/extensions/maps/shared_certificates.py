@@ -6,19 +6,20 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
-from ballplate.results.fit import Fit
-from ballplate.simulator.computing.threads import single_threaded
-from ballplate.simulator.design.arrays import Design, Observations
-from ballplate.simulator.design.observations.coordinates import CalibratedCoordinates
-from ballplate.simulator.design.observations.distances import CalibratedDistances
-from ballplate.simulator.design.observations.joint_values import JointValues
-from ballplate.simulator.design.observations.lengths import (
+from ballplate.results import Fit
+from ballplate.simulator.computing import single_threaded
+from ballplate.simulator.design import (
+    CalibratedCoordinates,
+    CalibratedDistances,
+    Design,
+    JointValues,
     Lengths,
+    Observations,
     length_name,
     length_whitening,
 )
-from ballplate.simulator.estimation.hat import hat_rows, row_count, row_places
-from ballplate.simulator.machines.protocol import Array, Integers
+from ballplate.simulator.estimation import hat_rows, row_count, row_places
+from ballplate.simulator.machines import Array, Integers
 
 from .compared_maps import ComparedMap, without_shared
 

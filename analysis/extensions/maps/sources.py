@@ -6,17 +6,12 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-from ballplate.results.fit import Fit
-from ballplate.results.fit_of_file import fit_of_file, kind_of_file
-from ballplate.simulator.experiment.machine_file import load_machine
-from ballplate.simulator.experiment.map_files import read_map
-from ballplate.simulator.inputs.quantities import LengthFunction
-from ballplate.simulator.inputs.tables import header_names, read_table
-from ballplate.simulator.machines.description import MachineDescription
-from ballplate.simulator.machines.protocol import Array
-from ballplate.simulator.maps.fitted_map import FittedMap
-from ballplate.simulator.readings.point_files import NAMING
-from ballplate.simulator.readings.reading_files import AXES
+from ballplate.results import Fit, fit_of_file, kind_of_file
+from ballplate.simulator.experiment import load_machine, read_map
+from ballplate.simulator.inputs import LengthFunction, header_names, read_table
+from ballplate.simulator.machines import Array, MachineDescription
+from ballplate.simulator.maps import FittedMap
+from ballplate.simulator.readings import AXES, NAMING
 
 from .compared_maps import ComparedMap, expected_map, map_of_fit
 from .comparison import ComparisonSettings, NotComparableError, compared

@@ -6,19 +6,24 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from ballplate.simulator.design.objects import Volume
-from ballplate.simulator.experiment.changes import node_of
-from ballplate.simulator.experiment.machine_file import load_machine
-from ballplate.simulator.experiment.model_files import absolute
-from ballplate.simulator.inputs.messages import ExperimentError, refused
-from ballplate.simulator.inputs.problems import Problems
-from ballplate.simulator.inputs.trust import OPENED
-from ballplate.simulator.inputs.validation import validated
-from ballplate.simulator.inputs.yamltree import Mapping as MappingNode
-from ballplate.simulator.inputs.yamltree import Mark, Node, parse_tree, read_tree, to_python
-from ballplate.simulator.machines.custom import CustomModelError
-from ballplate.simulator.machines.protocol import ErrorModel
-from ballplate.simulator.machines.settings import (
+from ballplate.simulator.design import Volume
+from ballplate.simulator.experiment import absolute, load_machine, node_of
+from ballplate.simulator.inputs import (
+    OPENED,
+    ExperimentError,
+    Mark,
+    Node,
+    Problems,
+    parse_tree,
+    read_tree,
+    refused,
+    to_python,
+    validated,
+)
+from ballplate.simulator.inputs import Mapping as MappingNode
+from ballplate.simulator.machines import (
+    CustomModelError,
+    ErrorModel,
     ErrorModelSettings,
     MachineFileSettings,
     PythonSettings,

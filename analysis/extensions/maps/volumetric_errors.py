@@ -12,21 +12,25 @@ from functools import cached_property
 from typing import Literal
 
 import numpy as np
-from ballplate.simulator.design.objects import Volume
-from ballplate.simulator.machines.arrangement import AXES
-from ballplate.simulator.machines.curves import Points
-from ballplate.simulator.machines.description import (
+from ballplate.simulator.design import Volume
+from ballplate.simulator.machines import (
+    AXES,
+    Array,
     Combination,
+    KinematicModel,
     MachineDescription,
     ParametricError,
+    Points,
     PowerSeries,
+    TrueMachine,
+    VolumetricModel,
+    error_function,
     reference_functions,
+    squareness_field,
     stated_function,
+    thermal_field,
     true_volumetric,
 )
-from ballplate.simulator.machines.kinematic import KinematicModel, error_function
-from ballplate.simulator.machines.protocol import Array, TrueMachine
-from ballplate.simulator.machines.volumetric import VolumetricModel, squareness_field, thermal_field
 
 from .map_places import MapPlaces
 from .realisations import Draws, Realisations

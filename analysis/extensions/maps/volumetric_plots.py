@@ -8,27 +8,27 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
-from ballplate.presentation.formatting import SHOWN, number
-from ballplate.presentation.pictures import draw_box
-from ballplate.presentation.scene import box, projection
-from ballplate.presentation.svg import (
+from ballplate.presentation import (
     DASHES,
     INK,
     MARKERS,
     MUTED,
     PAPER,
     SERIES,
+    SHOWN,
     blank_axes,
+    box,
+    draw_box,
     drawing,
     legend_above,
+    number,
     placed_axes,
+    projection,
     round_number,
     save,
 )
-from ballplate.simulator.computing.rounding import comparable
-from ballplate.simulator.machines.arrangement import AXES
-from ballplate.simulator.machines.protocol import Array, Integers
-from ballplate.simulator.machines.volumetric import meaning, symbol
+from ballplate.simulator.computing import comparable
+from ballplate.simulator.machines import AXES, Array, Integers, meaning, symbol
 
 from .volumetric_errors import AlongAxis, LengthErrors, VolumetricErrors
 

@@ -10,13 +10,10 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ballplate.presentation.formatting import as_data
-from ballplate.presentation.result import Result
-from ballplate.presentation.scene import box_edges, projection
-from ballplate.presentation.vectors import Vectors, draw_vectors
-from ballplate.simulator.experiment.machine_file import load_machine
-from ballplate.simulator.inputs.messages import Message
-from ballplate.simulator.machines.volumetric import meaning
+from ballplate.presentation import Result, Vectors, as_data, box_edges, draw_vectors, projection
+from ballplate.simulator.experiment import load_machine
+from ballplate.simulator.inputs import Message
+from ballplate.simulator.machines import meaning
 
 from .fitted_tables import realisation_lines
 from .map_places import MapPlaces, PlacesAsked, map_places

@@ -8,7 +8,7 @@ from itertools import islice
 from typing import Any
 
 import numpy as np
-from ballplate.presentation.formatting import (
+from ballplate.presentation import (
     SHOWN,
     aligned,
     as_data,
@@ -18,14 +18,19 @@ from ballplate.presentation.formatting import (
     number,
     records,
 )
-from ballplate.simulator.computing.rounding import comparable
-from ballplate.simulator.inputs.quantities import format_length
-from ballplate.simulator.inputs.settings import hint, listing
-from ballplate.simulator.inputs.spreadsheets import CsvWriter
-from ballplate.simulator.machines.arrangement import AXES, Arrangement
-from ballplate.simulator.machines.curves import NAMES, SmoothedPoints
-from ballplate.simulator.machines.protocol import Array, Parameter
-from ballplate.simulator.machines.volumetric import SQUARENESS, meaning, symbol
+from ballplate.simulator.computing import comparable
+from ballplate.simulator.inputs import CsvWriter, format_length, hint, listing
+from ballplate.simulator.machines import (
+    AXES,
+    NAMES,
+    SQUARENESS,
+    Arrangement,
+    Array,
+    Parameter,
+    SmoothedPoints,
+    meaning,
+    symbol,
+)
 
 from .realisations import Realisations
 from .volumetric_errors import (

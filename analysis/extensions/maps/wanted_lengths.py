@@ -6,13 +6,18 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
-from ballplate.simulator.design.objects import Tasks
-from ballplate.simulator.experiment.model import Experiment
-from ballplate.simulator.inputs.messages import MOST_MESSAGES, ExperimentError, refused
-from ballplate.simulator.inputs.settings import hint, listing
-from ballplate.simulator.inputs.yamltree import GivenText
-from ballplate.simulator.maps.fitted_map import FittedMap
-from ballplate.simulator.readings.point_files import GivenPoints, read_pairs
+from ballplate.simulator.design import Tasks
+from ballplate.simulator.experiment import Experiment
+from ballplate.simulator.inputs import (
+    MOST_MESSAGES,
+    ExperimentError,
+    GivenText,
+    hint,
+    listing,
+    refused,
+)
+from ballplate.simulator.maps import FittedMap
+from ballplate.simulator.readings import GivenPoints, read_pairs
 
 
 def between_named(given: GivenPoints, pairs: Sequence[Sequence[str | int]]) -> Tasks:

@@ -7,8 +7,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from ballplate.presentation.svg import round_number
-from ballplate.simulator.machines.protocol import Array
+from ballplate.presentation import round_number
+from ballplate.simulator.machines import Array
 
 from .elements import Html, element, joined
 

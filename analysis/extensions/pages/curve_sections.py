@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from ballplate.presentation.formatting import SHOWN
+from ballplate.presentation import SHOWN
 
 from .charts import Chart, Trace, chart_svg, figure
 from .elements import Html, element, joined, note, table

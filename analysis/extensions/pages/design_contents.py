@@ -9,12 +9,11 @@ from ballplate.extensions.maps.length_map import length_map, length_settings
 from ballplate.extensions.pages.design_page import DesignContents, design_page
 from ballplate.extensions.pages.page_facts import assumptions, target_in_words, unjudged
 from ballplate.extensions.reliability.redundancy import reliability_of
-from ballplate.planning.checked_files import Wanted, checked_design
-from ballplate.results.prediction import Prediction
-from ballplate.simulator.computing.steps import Report, unreported
-from ballplate.simulator.estimation.linearisation import linearise
-from ballplate.simulator.experiment.load import with_pool
-from ballplate.simulator.experiment.model import Experiment
+from ballplate.planning import Wanted, checked_design
+from ballplate.results import Prediction
+from ballplate.simulator.computing import Report, unreported
+from ballplate.simulator.estimation import linearise
+from ballplate.simulator.experiment import Experiment, with_pool
 
 from .motions import null_motions, weak_motions
 

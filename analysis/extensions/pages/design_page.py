@@ -7,7 +7,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from ballplate.simulator.estimation.linearisation import Linearisation
+from ballplate.simulator.estimation import Linearisation
 
 from .design_views import ball_views, motion_view, point_view, volume_view
 from .document import Page, PageSection, facts_list, origin, written

@@ -7,12 +7,10 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 import numpy as np
-from ballplate.presentation.scene import MOST_BALLS, box_edges, hull, names_fit, projection
-from ballplate.presentation.svg import round_number
-from ballplate.simulator.design.arrays import Design, locations, nominal_state
-from ballplate.simulator.estimation.corrections import correction_rows
-from ballplate.simulator.estimation.linearisation import Linearisation
-from ballplate.simulator.machines.protocol import Array, Integers
+from ballplate.presentation import MOST_BALLS, box_edges, hull, names_fit, projection, round_number
+from ballplate.simulator.design import Design, locations, nominal_state
+from ballplate.simulator.estimation import Linearisation, correction_rows
+from ballplate.simulator.machines import Array, Integers
 
 from .elements import Html, element, joined
 from .motions import Motion, moved_balls, moved_points

@@ -6,7 +6,7 @@ import re
 from collections.abc import Iterable
 from html import escape
 
-from ballplate.simulator.inputs.messages import in_one_line
+from ballplate.simulator.inputs import in_one_line
 
 
 class Html(str):

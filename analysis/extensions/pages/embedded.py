@@ -13,8 +13,8 @@ from dataclasses import dataclass
 from html import escape
 from pathlib import Path
 
-from ballplate.presentation.files import write_file
-from ballplate.simulator.inputs.messages import in_one_line
+from ballplate.presentation import write_file
+from ballplate.simulator.inputs import in_one_line
 
 from .document import head, shipped
 from .elements import Html, element, note

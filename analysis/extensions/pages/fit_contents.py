@@ -8,13 +8,12 @@ from typing import Any
 
 import numpy as np
 from ballplate.extensions.reliability.redundancy import reliability_of
-from ballplate.presentation.scene import box_edges, projection
-from ballplate.results.estimates import ParameterEstimate, labels
-from ballplate.results.residuals import reading_residuals
-from ballplate.simulator.design.arrays import measured
-from ballplate.simulator.estimation.gauss_newton import Solution
-from ballplate.simulator.experiment.model import Experiment
-from ballplate.simulator.readings.observed_readings import ObservedReadings
+from ballplate.presentation import box_edges, projection
+from ballplate.results import ParameterEstimate, labels, reading_residuals
+from ballplate.simulator.design import measured
+from ballplate.simulator.estimation import Solution
+from ballplate.simulator.experiment import Experiment
+from ballplate.simulator.readings import ObservedReadings
 
 from .fit_page import FitContents, PlateResiduals
 from .page_facts import assumptions, target_in_words, unjudged

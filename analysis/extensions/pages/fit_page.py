@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from ballplate.simulator.machines.protocol import Array, Integers
+from ballplate.simulator.machines import Array, Integers
 
 from .curve_sections import curves_section
 from .document import Page, PageSection, facts_list, origin, written

@@ -9,18 +9,18 @@ from ballplate.arguments import (
     PathLike,
     experiment_of,
 )
-from ballplate.simulator.computing.steps import Report, unreported
-from ballplate.simulator.experiment.model import Experiment
-from ballplate.simulator.inputs.arguments import (
+from ballplate.simulator.computing import Report, unreported
+from ballplate.simulator.experiment import Experiment
+from ballplate.simulator.inputs import (
     ensure_path,
     ensure_report,
     ensure_type,
+    function,
+    optional_service,
 )
-from ballplate.simulator.inputs.extensions import function, optional_service
 
 if TYPE_CHECKING:
-    from ballplate.results.fit import Fit
-    from ballplate.results.prediction import Prediction
+    from ballplate.results import Fit, Prediction
 
     from .embedded import View
 
@@ -38,12 +38,11 @@ def view(given: Experiment | PathLike | Prediction | Fit) -> View:
     >>> bp.view(bp.run(bp.quickstart()))
     <View of quickstart: positions, points, balls of plate>
     """
-    from ballplate.results.fit import Fit
-    from ballplate.results.prediction import Prediction
+    from ballplate.results import Fit, Prediction
 
     if isinstance(given, Fit | Prediction):
         return given.view()
-    from ballplate.simulator.experiment.layout import lay_out
+    from ballplate.simulator.experiment import lay_out
 
     from .embedded import View
     from .views import position_picture
@@ -75,10 +74,8 @@ def page(
     >>> bp.page(bp.fit(bp.quickstart(), bp.simulate(bp.quickstart()))).splitlines()[0]
     '<!DOCTYPE html>'
     """
-    from ballplate.presentation.files import write_file
-    from ballplate.results.fit import Fit
-    from ballplate.results.prediction import Prediction
-    from ballplate.results.study import predict
+    from ballplate.presentation import write_file
+    from ballplate.results import Fit, Prediction, predict
 
     ensure_type(bool, "True or False", run_modules=run_modules)
     ensure_report(report)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from ballplate.presentation.formatting import number
+from ballplate.presentation import number
 
 from .charts import Chart, Trace, chart_svg, figure, figures, legend
 from .elements import Html, element, joined, note, table

@@ -5,14 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from ballplate.rank.verdict import null_changes, weak_changes
-from ballplate.simulator.computing.threads import single_threaded
-from ballplate.simulator.design.arrays import Readings
-from ballplate.simulator.estimation.corrections import correction_rows
-from ballplate.simulator.estimation.linearisation import Linearisation
-from ballplate.simulator.geometry.motions import cross_matrices
-from ballplate.simulator.inputs.quantities import Target
-from ballplate.simulator.machines.protocol import Array, Integers
+from ballplate.rank import null_changes, weak_changes
+from ballplate.simulator.computing import single_threaded
+from ballplate.simulator.design import Readings
+from ballplate.simulator.estimation import Linearisation, correction_rows
+from ballplate.simulator.geometry import cross_matrices
+from ballplate.simulator.inputs import Target
+from ballplate.simulator.machines import Array, Integers
 
 
 @dataclass(frozen=True, eq=False)

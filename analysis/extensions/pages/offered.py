@@ -5,14 +5,13 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from ballplate.simulator.estimation.linearisation import linearise
+from ballplate.simulator.estimation import linearise
 
 from .embedded import View
 from .views import judged_pictures, position_picture, residual_pictures
 
 if TYPE_CHECKING:
-    from ballplate.results.fit import Fit
-    from ballplate.results.prediction import Prediction
+    from ballplate.results import Fit, Prediction
 
 
 def design_view(prediction: Prediction) -> View:

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from ballplate.extensions.maps.length_groups import target_words
-from ballplate.gross_errors.leftover import too_many_entries
-from ballplate.presentation.formatting import uncertainty_words
-from ballplate.simulator.design.arrays import Design
-from ballplate.simulator.experiment.model import Experiment
-from ballplate.simulator.inputs.settings import listing
+from ballplate.gross_errors import too_many_entries
+from ballplate.presentation import uncertainty_words
+from ballplate.simulator.design import Design
+from ballplate.simulator.experiment import Experiment
+from ballplate.simulator.inputs import listing
 
 # Readings of plates beyond which judging every bias takes longer than a page should.
 MOST_JUDGED = 1500

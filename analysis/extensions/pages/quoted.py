@@ -12,7 +12,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
-from ballplate.presentation.formatting import amount_of, number, percent, to_uncertainty
+from ballplate.presentation import amount_of, number, percent, to_uncertainty
 
 from .elements import Html, element
 

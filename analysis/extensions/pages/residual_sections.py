@@ -8,9 +8,8 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from ballplate.presentation.formatting import SHOWN
-from ballplate.presentation.svg import round_number
-from ballplate.simulator.machines.protocol import Array, Integers
+from ballplate.presentation import SHOWN, round_number
+from ballplate.simulator.machines import Array, Integers
 
 from .charts import Chart, Trace, chart_svg, figure, figures, legend
 from .elements import Html, element, joined, note, sentence, table

@@ -12,8 +12,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from ballplate.presentation.scene import RISE, TURN, projection
-from ballplate.simulator.machines.protocol import Array
+from ballplate.presentation import RISE, TURN, projection
+from ballplate.simulator.machines import Array
 
 from .document import shipped
 from .elements import Html, element, joined

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ballplate.presentation.formatting import shown_unit, uncertainty_words
+from ballplate.presentation import shown_unit, uncertainty_words
 
 from .elements import Html, folded, joined, note, sentence, table
 from .quoted import UNDETERMINED, QuotedData

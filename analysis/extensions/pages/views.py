@@ -5,15 +5,14 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 import numpy as np
-from ballplate.presentation.scene import box_edges, projection
-from ballplate.rank.verdict import Direction, Verdict
-from ballplate.results.residuals import reading_residuals
-from ballplate.simulator.computing.threads import single_threaded
-from ballplate.simulator.design.arrays import Design, measured
-from ballplate.simulator.estimation.gauss_newton import Solution
-from ballplate.simulator.estimation.linearisation import Linearisation
-from ballplate.simulator.inputs.quantities import Target
-from ballplate.simulator.readings.observed_readings import ObservedReadings
+from ballplate.presentation import box_edges, projection
+from ballplate.rank import Direction, Verdict
+from ballplate.results import reading_residuals
+from ballplate.simulator.computing import single_threaded
+from ballplate.simulator.design import Design, measured
+from ballplate.simulator.estimation import Linearisation, Solution
+from ballplate.simulator.inputs import Target
+from ballplate.simulator.readings import ObservedReadings
 
 from .design_views import ball_views, motion_view, point_view, volume_view
 from .motions import Motion, null_motions, weak_motions

@@ -7,23 +7,20 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-from ballplate.gross_errors.leftover import columns_of_balls
-from ballplate.gross_errors.patterns import Patterns
-from ballplate.simulator.computing.rounding import first_largest_of_columns
-from ballplate.simulator.design.arrays import Design
-from ballplate.simulator.design.observations.readings import offset_sensitivity
-from ballplate.simulator.estimation.functions import (
+from ballplate.gross_errors import Patterns, columns_of_balls
+from ballplate.simulator.computing import first_largest_of_columns
+from ballplate.simulator.design import Design, offset_sensitivity
+from ballplate.simulator.estimation import (
     Coordinates,
     Displacements,
     Distances,
+    Linearisation,
     MeasuredPoints,
     Places,
     displacements,
 )
-from ballplate.simulator.estimation.linearisation import Linearisation
-from ballplate.simulator.machines.protocol import Array, Integers
-from ballplate.uncertainty.pairs import open_above, relative
-from ballplate.uncertainty.quantities import QUANTITIES
+from ballplate.simulator.machines import Array, Integers
+from ballplate.uncertainty import QUANTITIES, open_above, relative
 
 from .response import Response
 

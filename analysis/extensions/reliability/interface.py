@@ -5,13 +5,9 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Literal
 
 from ballplate.arguments import SIGMAS, PathLike, experiment_of
-from ballplate.simulator.computing.steps import Report, unreported
-from ballplate.simulator.experiment.model import Experiment
-from ballplate.simulator.inputs.arguments import (
-    ensure_one_of,
-    ensure_positive,
-    ensure_report,
-)
+from ballplate.simulator.computing import Report, unreported
+from ballplate.simulator.experiment import Experiment
+from ballplate.simulator.inputs import ensure_one_of, ensure_positive, ensure_report
 
 if TYPE_CHECKING:
     from .reliability_result import Reliability

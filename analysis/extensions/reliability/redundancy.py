@@ -8,21 +8,26 @@ import math
 from typing import Literal
 
 import numpy as np
-from ballplate.gross_errors.cause_search import FAMILY
-from ballplate.gross_errors.events import event_groups
-from ballplate.gross_errors.leftover import Columns, leftover, too_many_entries
-from ballplate.gross_errors.patterns import patterns
-from ballplate.simulator.computing.rounding import comparable
-from ballplate.simulator.computing.steps import ProgressStep, Report, unreported
-from ballplate.simulator.computing.threads import single_threaded
-from ballplate.simulator.design.arrays import Design, measured
-from ballplate.simulator.estimation.functions import Parameters
-from ballplate.simulator.estimation.hat import row_count, row_places
-from ballplate.simulator.estimation.linearisation import linearise
-from ballplate.simulator.experiment.layout import lay_out
-from ballplate.simulator.experiment.model import Experiment
-from ballplate.simulator.machines.protocol import Integers
-from ballplate.uncertainty.quantities import QUANTITIES, functions_of
+from ballplate.gross_errors import (
+    FAMILY,
+    Columns,
+    event_groups,
+    leftover,
+    patterns,
+    too_many_entries,
+)
+from ballplate.simulator.computing import (
+    ProgressStep,
+    Report,
+    comparable,
+    single_threaded,
+    unreported,
+)
+from ballplate.simulator.design import Design, measured
+from ballplate.simulator.estimation import Parameters, linearise, row_count, row_places
+from ballplate.simulator.experiment import Experiment, lay_out
+from ballplate.simulator.machines import Integers
+from ballplate.uncertainty import QUANTITIES, functions_of
 
 from .effects import SYMBOLS, Changes, Largest, across_probes, changes_of
 from .power import noncentrality

@@ -7,8 +7,16 @@ from __future__ import annotations
 from argparse import ArgumentParser, ArgumentTypeError, Namespace
 from functools import partial
 
-from ballplate.cli.common import add_file, add_json, number
-from ballplate.cli.outputs import UsageError, add_force, add_output, text_writer, write
+from ballplate.cli import (
+    UsageError,
+    add_file,
+    add_force,
+    add_json,
+    add_output,
+    number,
+    text_writer,
+    write,
+)
 
 GROUP = "more"
 HELP = "find which biases of readings and certificates would be noticed, and what the others change"
@@ -65,8 +73,7 @@ def _share(text: str) -> float:
 
 def run(options: Namespace) -> int:
     """Tell the reliability of all experiments of the files."""
-    from ballplate.cli.common import experiments, print_json, print_lines
-    from ballplate.cli.progress import progress
+    from ballplate.cli import experiments, print_json, print_lines, progress
 
     from .redundancy import reliability
     from .reliability_result import write_observations

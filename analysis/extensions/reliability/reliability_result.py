@@ -12,28 +12,27 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, TextIO
 
 import numpy as np
-from ballplate.gross_errors.names import name
-from ballplate.gross_errors.patterns import DRIFTS, Patterns, single_kinds
-from ballplate.presentation.formatting import (
+from ballplate.gross_errors import DRIFTS, Patterns, name, single_kinds
+from ballplate.presentation import (
     SHOWN,
+    Result,
     aligned,
     ascii_units,
     finite,
     number,
     picked,
 )
-from ballplate.presentation.panels import RowOfPoints, draw_rows
-from ballplate.presentation.result import Result
-from ballplate.rank.proposed_bars import listed
-from ballplate.simulator.computing.rounding import comparable
-from ballplate.simulator.design.arrays import Design
-from ballplate.simulator.estimation.functions import Functions, function_name
-from ballplate.simulator.geometry.motions import AXIS_NAMES
-from ballplate.simulator.inputs.spreadsheets import CsvWriter
-from ballplate.simulator.machines.protocol import Array, Integers
-from ballplate.uncertainty.quantities import QUANTITIES
+from ballplate.rank import listed
+from ballplate.simulator.computing import comparable
+from ballplate.simulator.design import Design
+from ballplate.simulator.estimation import Functions, function_name
+from ballplate.simulator.geometry import AXIS_NAMES
+from ballplate.simulator.inputs import CsvWriter
+from ballplate.simulator.machines import Array, Integers
+from ballplate.uncertainty import QUANTITIES
 
 from .effects import MOST_PLACES, across_probes
+from .rows_picture import RowOfPoints, draw_rows
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

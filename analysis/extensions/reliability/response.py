@@ -7,11 +7,9 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from ballplate.gross_errors.leftover import columns_of_balls
-from ballplate.gross_errors.patterns import Patterns
-from ballplate.simulator.estimation.hat import hat_rows
-from ballplate.simulator.estimation.linearisation import Linearisation
-from ballplate.simulator.machines.protocol import Array, Integers
+from ballplate.gross_errors import Patterns, columns_of_balls
+from ballplate.simulator.estimation import Linearisation, hat_rows
+from ballplate.simulator.machines import Array, Integers
 
 if TYPE_CHECKING:
     from scipy.sparse import csr_array

@@ -8,13 +8,10 @@ from functools import partial
 from typing import Any
 
 import numpy as np
-from ballplate.simulator.design.lookup import Indices
-from ballplate.simulator.design.observations.distances import DistanceCalibration
-from ballplate.simulator.design.observations.radius import RadiusCalibration
-from ballplate.simulator.experiment.model import Experiment
-from ballplate.simulator.geometry.artefacts import BryanGaugeSettings, TwoSpheresSettings
-from ballplate.simulator.geometry.ball_layouts import BallLayout, pairs
-from ballplate.simulator.inputs.quantities import LengthFunction, format_length
+from ballplate.simulator.design import DistanceCalibration, Indices, RadiusCalibration
+from ballplate.simulator.experiment import Experiment
+from ballplate.simulator.geometry import BallLayout, BryanGaugeSettings, TwoSpheresSettings, pairs
+from ballplate.simulator.inputs import LengthFunction, format_length
 
 from .changes import Change, ChangeKind, distances, pair_set, with_calibration
 from .written import can_be_written

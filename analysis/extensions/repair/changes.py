@@ -9,15 +9,16 @@ from dataclasses import dataclass, replace
 from enum import IntEnum
 
 import numpy as np
-from ballplate.simulator.design.lookup import Indices
-from ballplate.simulator.design.objects import Volume
-from ballplate.simulator.design.observations.calibration import Calibration
-from ballplate.simulator.design.observations.coordinates import CoordinateCalibration
-from ballplate.simulator.design.observations.distances import DistanceCalibration
-from ballplate.simulator.experiment.model import Experiment, Position, Probe, ReadingGroup
-from ballplate.simulator.geometry.ball_layouts import ArtefactSettings, BallLayout, pairs
-from ballplate.simulator.geometry.positions import Pose, ball_coordinates
-from ballplate.simulator.machines.protocol import Array
+from ballplate.simulator.design import (
+    Calibration,
+    CoordinateCalibration,
+    DistanceCalibration,
+    Indices,
+    Volume,
+)
+from ballplate.simulator.experiment import Experiment, Position, Probe, ReadingGroup
+from ballplate.simulator.geometry import ArtefactSettings, BallLayout, Pose, ball_coordinates, pairs
+from ballplate.simulator.machines import Array
 
 
 class ChangeKind(IntEnum):

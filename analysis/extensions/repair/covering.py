@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
-from ballplate.simulator.machines.protocol import Array
+from ballplate.simulator.machines import Array
 
 from .changes import Change
 from .screening import SEEN, rank_of

@@ -9,10 +9,7 @@ from ballplate.arguments import (
     load,
     load_all,
 )
-from ballplate.simulator.inputs.arguments import (
-    ensure_path,
-)
-from ballplate.simulator.inputs.yamltree import read_text
+from ballplate.simulator.inputs import ensure_path, read_text
 
 
 def repair(path: PathLike, variant: str | None = None) -> str:
@@ -29,8 +26,8 @@ def repair(path: PathLike, variant: str | None = None) -> str:
     >>> line in bp.repair("designs/npl/6.1.1.yaml", variant="B").splitlines()
     True
     """
-    from ballplate.results import study
-    from ballplate.simulator.experiment.load import with_pool
+    from ballplate.results import check
+    from ballplate.simulator.experiment import with_pool
 
     from .mending import mended, to_write
     from .repair_search import repairs
@@ -38,7 +35,7 @@ def repair(path: PathLike, variant: str | None = None) -> str:
     ensure_path("path", path)
     text = read_text(Path(path))
     for one in load_all(path) if variant is None else [load(path, variant)]:
-        judged = study.check(one).verdict
+        judged = check(one).verdict
         if not judged.deficiency:
             continue
         found = to_write(repairs(with_pool(one)), judged)

@@ -7,14 +7,12 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from ballplate.rank.verdict import effects, weak_limit
-from ballplate.simulator.computing.rounding import above, comparable
-from ballplate.simulator.estimation.linearisation import Linearisation, linearise
-from ballplate.simulator.experiment.layout import lay_out
-from ballplate.simulator.experiment.model import Experiment
-from ballplate.simulator.experiment.pool import placed_only
-from ballplate.simulator.inputs.messages import ExperimentError
-from ballplate.simulator.machines.protocol import Array
+from ballplate.rank import effects, weak_limit
+from ballplate.simulator.computing import above, comparable
+from ballplate.simulator.estimation import Linearisation, linearise
+from ballplate.simulator.experiment import Experiment, lay_out, placed_only
+from ballplate.simulator.inputs import ExperimentError
+from ballplate.simulator.machines import Array
 
 from .changes import Change, apply_all
 

@@ -6,23 +6,21 @@ from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
-from ballplate.rank.verdict import Verdict
-from ballplate.results.study import check
-from ballplate.simulator.experiment.load import load
-from ballplate.simulator.experiment.model import Experiment
-from ballplate.simulator.experiment.variants import place_of
-from ballplate.simulator.inputs.messages import Steps, format_path
-from ballplate.simulator.inputs.trust import UNKNOWN, Trust
-from ballplate.simulator.inputs.yamltree import (
-    Mapping as MappingNode,
-)
-from ballplate.simulator.inputs.yamltree import (
+from ballplate.rank import Verdict
+from ballplate.results import check
+from ballplate.simulator.experiment import Experiment, load, place_of
+from ballplate.simulator.inputs import (
+    UNKNOWN,
     Node,
+    Steps,
+    Trust,
+    format_path,
     mark_of,
     parse_tree,
     to_python,
     written,
 )
+from ballplate.simulator.inputs import Mapping as MappingNode
 
 from .changes import apply_all
 from .repair_search import Repair, Repairs

@@ -8,17 +8,15 @@ from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
-from ballplate.cli.outputs import check_overwritten, write_outputs
-from ballplate.cli.telling import note
-from ballplate.planning.checked_files import (
+from ballplate.cli import check_overwritten, note, write_outputs
+from ballplate.planning import (
     CheckedDesign,
     CheckedFile,
     Wanted,
     advised,
     check_files,
 )
-from ballplate.simulator.inputs.messages import ExperimentError, Message, refused
-from ballplate.simulator.inputs.yamltree import read_text
+from ballplate.simulator.inputs import ExperimentError, Message, read_text, refused
 
 from .mending import mended, to_write
 from .repair_tables import changes_in_words

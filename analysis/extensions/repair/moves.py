@@ -7,15 +7,10 @@ from functools import partial
 from itertools import product
 
 import numpy as np
-from ballplate.simulator.experiment.model import (
-    Experiment,
-    Position,
-    Probe,
-)
-from ballplate.simulator.geometry.artefacts import TwoSpheresSettings
-from ballplate.simulator.geometry.positions import AXIS_INDEX, QUARTER_TURNS
-from ballplate.simulator.inputs.quantities import format_length
-from ballplate.simulator.machines.protocol import Array
+from ballplate.simulator.experiment import Experiment, Position, Probe
+from ballplate.simulator.geometry import AXIS_INDEX, QUARTER_TURNS, TwoSpheresSettings
+from ballplate.simulator.inputs import format_length
+from ballplate.simulator.machines import Array
 
 from .changes import (
     Change,

@@ -5,12 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from functools import partial
 
-from ballplate.simulator.experiment.model import (
-    Experiment,
-    Pool,
-    Position,
-)
-from ballplate.simulator.experiment.pool import placed_only
+from ballplate.simulator.experiment import Experiment, Pool, Position, placed_only
 
 from .certificates import better_certificates, certificates
 from .changes import Change, ChangeKind, with_calibration, with_position

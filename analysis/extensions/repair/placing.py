@@ -5,12 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import numpy as np
-from ballplate.rank.proposed_bars import bar_directions
-from ballplate.simulator.experiment.model import (
-    Experiment,
-)
-from ballplate.simulator.geometry.ball_layouts import BallLayout
-from ballplate.simulator.machines.protocol import Array
+from ballplate.rank import bar_directions
+from ballplate.simulator.experiment import Experiment
+from ballplate.simulator.geometry import BallLayout
+from ballplate.simulator.machines import Array
 
 
 def bars(d: int) -> Iterator[tuple[str, Array]]:

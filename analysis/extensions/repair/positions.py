@@ -8,15 +8,10 @@ from functools import partial
 from itertools import product
 
 import numpy as np
-from ballplate.simulator.experiment.model import (
-    Experiment,
-    Position,
-    ReadingGroup,
-)
-from ballplate.simulator.geometry.artefacts import TwoSpheresSettings
-from ballplate.simulator.geometry.positions import AXIS_INDEX, Axis, Pose, plane_rotation
-from ballplate.simulator.inputs.quantities import format_length
-from ballplate.simulator.machines.protocol import Array
+from ballplate.simulator.experiment import Experiment, Position, ReadingGroup
+from ballplate.simulator.geometry import AXIS_INDEX, Axis, Pose, TwoSpheresSettings, plane_rotation
+from ballplate.simulator.inputs import format_length
+from ballplate.simulator.machines import Array
 
 from .changes import Change, ChangeKind, is_inside, with_position
 from .placing import along_rotation, bars, clean, is_plate, middle_of, pitch

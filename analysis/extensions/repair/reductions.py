@@ -7,12 +7,15 @@ from dataclasses import replace
 from functools import partial
 from typing import Any
 
-from ballplate.simulator.experiment.model import Experiment
-from ballplate.simulator.geometry.artefacts import GridSettings, SquareSettings
-from ballplate.simulator.machines.basis_settings import SplineSettings
-from ballplate.simulator.machines.empirical_settings import OF_BASIS, EmpiricalSettings
-from ballplate.simulator.machines.kinematic_settings import KinematicSettings
-from ballplate.simulator.machines.settings import MachineFileSettings
+from ballplate.simulator.experiment import Experiment
+from ballplate.simulator.geometry import GridSettings, SquareSettings
+from ballplate.simulator.machines import (
+    OF_BASIS,
+    EmpiricalSettings,
+    KinematicSettings,
+    MachineFileSettings,
+    SplineSettings,
+)
 
 from .changes import Change, ChangeKind, with_artefact
 

@@ -11,18 +11,12 @@ from dataclasses import dataclass
 from math import inf
 
 import numpy as np
-from ballplate.rank.verdict import independent_mixture
-from ballplate.results.prediction import Prediction
-from ballplate.results.study import predict
-from ballplate.simulator.computing.rounding import comparable
-from ballplate.simulator.computing.steps import Report, counted, unreported
-from ballplate.simulator.computing.threads import single_threaded
-from ballplate.simulator.experiment.model import Experiment
-from ballplate.simulator.experiment.pool import placed_only
-from ballplate.simulator.experiment.pools import seconds_of
-from ballplate.simulator.machines.protocol import Array
-from ballplate.uncertainty.pairs import PairSummary
-from ballplate.uncertainty.scale import OFFSET_TRIAL, lengths_with_offsets
+from ballplate.rank import independent_mixture
+from ballplate.results import Prediction, predict
+from ballplate.simulator.computing import Report, comparable, counted, single_threaded, unreported
+from ballplate.simulator.experiment import Experiment, placed_only, seconds_of
+from ballplate.simulator.machines import Array
+from ballplate.uncertainty import OFFSET_TRIAL, PairSummary, lengths_with_offsets
 
 from .changes import EFFORT, Change, ChangeKind, apply_all, go_together, is_inside
 from .covering import covering_pairs, covering_set, different

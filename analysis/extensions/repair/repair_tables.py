@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from ballplate.presentation.formatting import finite, number
-from ballplate.rank.proposed_bars import listed
-from ballplate.rank.verdict import Verdict, changed_names, length
-from ballplate.uncertainty.scale import OFFSET_TRIAL, exact_offsets
+from ballplate.presentation import finite, number
+from ballplate.rank import Verdict, changed_names, length, listed
+from ballplate.uncertainty import OFFSET_TRIAL, exact_offsets
 
 from .changes import KINDS
 from .offers import duration

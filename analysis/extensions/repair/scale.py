@@ -5,10 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from math import inf
 
-from ballplate.simulator.computing.threads import single_threaded
-from ballplate.simulator.experiment.model import Experiment
-from ballplate.simulator.experiment.pool import placed_only
-from ballplate.uncertainty.scale import OFFSET_TRIAL, Scale, lengths_with_offsets
+from ballplate.simulator.computing import single_threaded
+from ballplate.simulator.experiment import Experiment, placed_only
+from ballplate.uncertainty import OFFSET_TRIAL, Scale, lengths_with_offsets
 
 from .certificates import certificates
 from .changes import Change

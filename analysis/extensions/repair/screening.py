@@ -8,14 +8,15 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from ballplate.simulator.design.arrays import Design, nominal_state
-from ballplate.simulator.design.observations.distances import DistanceCalibration
-from ballplate.simulator.design.observations.readings import reading_blocks
-from ballplate.simulator.design.observations.whitening import at_least_exact
-from ballplate.simulator.experiment.layout import lay_out
-from ballplate.simulator.experiment.model import Position
-from ballplate.simulator.experiment.pool import placed_only
-from ballplate.simulator.machines.protocol import Array
+from ballplate.simulator.design import (
+    Design,
+    DistanceCalibration,
+    at_least_exact,
+    nominal_state,
+    reading_blocks,
+)
+from ballplate.simulator.experiment import Position, lay_out, placed_only
+from ballplate.simulator.machines import Array
 
 from .changes import Change
 from .judging import Examined

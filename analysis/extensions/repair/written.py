@@ -7,21 +7,29 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from ballplate.simulator.design.observations.calibration import Calibration
-from ballplate.simulator.design.observations.coordinates import CoordinateCalibration
-from ballplate.simulator.design.observations.distances import DistanceCalibration
-from ballplate.simulator.design.observations.radius import RadiusCalibration
-from ballplate.simulator.experiment.model import Experiment, Position, ReadingGroup
-from ballplate.simulator.geometry.positions import (
+from ballplate.simulator.design import (
+    Calibration,
+    CoordinateCalibration,
+    DistanceCalibration,
+    RadiusCalibration,
+)
+from ballplate.simulator.experiment import Experiment, Position, ReadingGroup
+from ballplate.simulator.geometry import (
     AXIS_INDEX,
     IN_PLANE_AXES,
     ball_coordinates,
     plane_rotation,
 )
-from ballplate.simulator.inputs.messages import Step, format_path
-from ballplate.simulator.inputs.quantities import LengthFunction, parse_length, typed_length
-from ballplate.simulator.inputs.yamltree import to_list, to_python
-from ballplate.simulator.machines.protocol import Array
+from ballplate.simulator.inputs import (
+    LengthFunction,
+    Step,
+    format_path,
+    parse_length,
+    to_list,
+    to_python,
+    typed_length,
+)
+from ballplate.simulator.machines import Array
 
 from .changes import ball_set, pair_set
 from .yamltext import flow

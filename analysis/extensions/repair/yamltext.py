@@ -8,17 +8,15 @@ from dataclasses import dataclass
 from typing import Any, Literal
 
 import yaml
-from ballplate.simulator.inputs.messages import (
+from ballplate.simulator.inputs import (
+    LOADER,
     ExperimentError,
+    Mark,
     Step,
     Steps,
     format_path,
-    refused,
-)
-from ballplate.simulator.inputs.yamltree import (
-    LOADER,
-    Mark,
     parse_tree,
+    refused,
     resolve_scalar,
     to_python,
 )

@@ -5,13 +5,12 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from ballplate.presentation.formatting import as_data, picked
-from ballplate.results.study import fit, predict
-from ballplate.simulator.design.arrays import Design, State
-from ballplate.simulator.experiment.layout import lay_out
-from ballplate.simulator.experiment.load import load
-from ballplate.simulator.readings.reading_files import read_readings
-from ballplate.uncertainty.summaries import Quantity
+from ballplate.presentation import as_data, picked
+from ballplate.results import fit, predict
+from ballplate.simulator.design import Design, State
+from ballplate.simulator.experiment import lay_out, load
+from ballplate.simulator.readings import read_readings
+from ballplate.uncertainty import Quantity
 
 from .certified_problems import CertifiedProblem
 

@@ -10,8 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from ballplate.simulator.inputs.messages import ExperimentError, Message, refused
-from ballplate.simulator.inputs.settings import hint, shorten
+from ballplate.simulator.inputs import ExperimentError, Message, hint, refused, shorten
 
 # Above any number that means something here, and below where a float ends.
 LARGE = 1e150

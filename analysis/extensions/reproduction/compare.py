@@ -8,13 +8,13 @@ from dataclasses import dataclass
 from typing import Any, Literal
 
 import numpy as np
-from ballplate.estimators.distances import (
+from ballplate.estimators import (
     EstimatorComparison,
     compare_estimators,
     share_below,
 )
-from ballplate.simulator.computing.steps import Report, unreported
-from ballplate.uncertainty.summaries import Quantity
+from ballplate.simulator.computing import Report, unreported
+from ballplate.uncertainty import Quantity
 
 from .published import (
     REPEATABILITY,

@@ -9,11 +9,8 @@ from typing import TYPE_CHECKING, Literal
 from ballplate.arguments import (
     PathLike,
 )
-from ballplate.simulator.computing.steps import Report, unreported
-from ballplate.simulator.inputs.arguments import (
-    ensure_report,
-    ensure_whole,
-)
+from ballplate.simulator.computing import Report, unreported
+from ballplate.simulator.inputs import ensure_report, ensure_whole
 
 if TYPE_CHECKING:
     from .reproduction_result import ReproducedDocument
@@ -40,7 +37,7 @@ def reproduce(
     >>> bp.reproduce("npl", "6.1.2").is_right
     True
     """
-    from ballplate.montecarlo.trials import MOST_TRIALS
+    from ballplate.montecarlo import MOST_TRIALS
 
     from .reproduction_result import reproduce_npl
     from .score_result import score_certified

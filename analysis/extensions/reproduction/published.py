@@ -10,8 +10,7 @@ from functools import cache
 from importlib.resources import files
 from typing import Literal
 
-from ballplate.simulator.inputs.settings import Settings
-from ballplate.simulator.inputs.yamltree import parse_tree, to_python
+from ballplate.simulator.inputs import Settings, parse_tree, to_python
 
 SYMBOLS = ("U1", "U2", "U3", "U4", "U5", "U6")
 Statistic = Literal["maximum", "average"]

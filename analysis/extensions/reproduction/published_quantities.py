@@ -7,17 +7,12 @@ last digits printed.
 from __future__ import annotations
 
 import numpy as np
-from ballplate.simulator.computing.threads import single_threaded
-from ballplate.simulator.design.arrays import Design
-from ballplate.simulator.design.observations.readings import rotation_sensitivity
-from ballplate.simulator.design.parameters import SharedLayout
-from ballplate.simulator.estimation.functions import BallPlaces, displacements
-from ballplate.simulator.estimation.linearisation import Linearisation, linearise
-from ballplate.simulator.geometry.motions import pose_size
-from ballplate.simulator.machines.kinematic import KinematicModel
-from ballplate.simulator.machines.protocol import Array
-from ballplate.uncertainty.pairs import pairs_of
-from ballplate.uncertainty.summaries import Quantity, summarise
+from ballplate.simulator.computing import single_threaded
+from ballplate.simulator.design import Design, SharedLayout, rotation_sensitivity
+from ballplate.simulator.estimation import BallPlaces, Linearisation, displacements, linearise
+from ballplate.simulator.geometry import pose_size
+from ballplate.simulator.machines import Array, KinematicModel
+from ballplate.uncertainty import Quantity, pairs_of, summarise
 from numpy.typing import NDArray
 
 

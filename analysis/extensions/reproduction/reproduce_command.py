@@ -7,8 +7,7 @@ from __future__ import annotations
 from argparse import ArgumentParser, Namespace
 from pathlib import Path
 
-from ballplate.cli.common import trial_count
-from ballplate.cli.outputs import UsageError
+from ballplate.cli import UsageError, trial_count
 
 GROUP = "more"
 HELP = "compute published experiments or certified problems, and compare the figures"
@@ -75,8 +74,7 @@ def run(options: Namespace) -> int:
     """Reproduce a document; 1 if a published figure does not come out within the limits stated, or
     an answer to a certified problem is wrong or missing.
     """
-    from ballplate.cli.common import print_json, print_lines
-    from ballplate.cli.progress import progress
+    from ballplate.cli import print_json, print_lines, progress
 
     from .reproduction_result import ReproducedDocument, reproduce_npl
     from .score_result import CertifiedScores, score_certified

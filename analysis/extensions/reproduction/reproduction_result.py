@@ -8,9 +8,9 @@ from pathlib import Path
 from typing import Any
 
 from ballplate.designs import shipped
-from ballplate.presentation.result import Result
-from ballplate.simulator.computing.steps import Report, unreported
-from ballplate.simulator.inputs.settings import hint, number_of
+from ballplate.presentation import Result
+from ballplate.simulator.computing import Report, unreported
+from ballplate.simulator.inputs import hint, number_of
 
 from .compare import Reproduction, reproduce
 from .published import npl

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from ballplate.presentation.formatting import aligned, as_data, number, picked
-from ballplate.simulator.inputs.settings import number_of
+from ballplate.presentation import aligned, as_data, number, picked
+from ballplate.simulator.inputs import number_of
 
 from .compare import (
     ComparedColumn,

@@ -13,7 +13,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from ballplate.simulator.inputs.settings import listing
+from ballplate.simulator.inputs import listing
 
 MOST_DIGITS = 15.0
 

@@ -8,9 +8,9 @@ from pathlib import Path
 from typing import Any
 
 from ballplate.designs import shipped
-from ballplate.presentation.result import Result
-from ballplate.simulator.computing.steps import Report, counted, unreported
-from ballplate.simulator.inputs.settings import number_of
+from ballplate.presentation import Result
+from ballplate.simulator.computing import Report, counted, unreported
+from ballplate.simulator.inputs import number_of
 
 from .certified_answers import answers
 from .certified_problems import CertifiedProblem, certified_problems, read_results

@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 from typing import Any
 
-from ballplate.presentation.formatting import aligned, as_data
+from ballplate.presentation import aligned, as_data
 
 from .certified_problems import CertifiedProblem
 from .score import Score

@@ -5,18 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from ballplate.results.fit import Fit
-from ballplate.results.prediction import Prediction
-from ballplate.results.study import fit, predict
-from ballplate.simulator.experiment.layout import lay_out
-from ballplate.simulator.experiment.load import load
-from ballplate.simulator.experiment.model import Experiment
-from ballplate.simulator.inputs.messages import refused
-from ballplate.simulator.inputs.settings import hint
-from ballplate.simulator.readings.generate import exact_readings
-from ballplate.simulator.readings.observed_readings import ObservedReadings
-from ballplate.simulator.readings.simulated import on_stated_machine
-from ballplate.uncertainty.summaries import Quantity
+from ballplate.results import Fit, Prediction, fit, predict
+from ballplate.simulator.experiment import Experiment, lay_out, load
+from ballplate.simulator.inputs import hint, refused
+from ballplate.simulator.readings import ObservedReadings, exact_readings, on_stated_machine
+from ballplate.uncertainty import Quantity
 
 from .published_quantities import tabulated_quantities
 

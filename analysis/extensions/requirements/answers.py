@@ -7,11 +7,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
-from ballplate.presentation.formatting import aligned
-from ballplate.presentation.panels import TriedValues, draw_tried
-from ballplate.presentation.result import Result
+from ballplate.presentation import Result, aligned
 
 from .goals import Goal, Judgement
+from .tried_values_picture import TriedValues, draw_tried
 from .unknowns import UnknownName
 
 if TYPE_CHECKING:

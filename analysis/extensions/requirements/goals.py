@@ -7,18 +7,16 @@ import re
 from dataclasses import dataclass
 from typing import Literal
 
-from ballplate.presentation.formatting import number, percent, shown_unit, uncertainty_words
-from ballplate.results.prediction import Prediction
-from ballplate.results.study import PlannedUncertainty
-from ballplate.simulator.computing.rounding import comparable
-from ballplate.simulator.inputs.quantities import (
+from ballplate.presentation import number, percent, shown_unit, uncertainty_words
+from ballplate.results import PlannedUncertainty, Prediction
+from ballplate.simulator.computing import comparable
+from ballplate.simulator.inputs import (
     QuantityError,
+    listing,
     parse_positive_angle,
     parse_positive_length,
 )
-from ballplate.simulator.inputs.settings import listing
-from ballplate.uncertainty.quantities import DESCRIPTIONS, QUANTITIES
-from ballplate.uncertainty.summaries import Quantity
+from ballplate.uncertainty import DESCRIPTIONS, QUANTITIES, Quantity
 
 FORMS = 'lengths, tasks, or a quantity such as "U6 average 0.3 um" or "U2 angles maximum 1 urad"'
 # Wholes that have values of several units.

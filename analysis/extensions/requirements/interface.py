@@ -9,9 +9,9 @@ from ballplate.arguments import (
     PathLike,
     experiment_of,
 )
-from ballplate.simulator.computing.steps import Report, unreported
-from ballplate.simulator.experiment.model import Experiment
-from ballplate.simulator.inputs.arguments import (
+from ballplate.simulator.computing import Report, unreported
+from ballplate.simulator.experiment import Experiment
+from ballplate.simulator.inputs import (
     ensure_one_of,
     ensure_positive,
     ensure_report,

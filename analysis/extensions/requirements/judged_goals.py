@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from ballplate.results.study import planned_uncertainty
-from ballplate.simulator.experiment.model import Experiment
+from ballplate.results import planned_uncertainty
+from ballplate.simulator.experiment import Experiment
 
 from .goals import Goal, GoalError, check_goal, judge
 

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from argparse import ArgumentParser, Namespace
 
-from ballplate.cli.common import add_file, add_goal, add_json, show, single, whole
-from ballplate.cli.outputs import UsageError
+from ballplate.cli import UsageError, add_file, add_goal, add_json, show, single, whole
 
 UNKNOWNS = ("repeatability", "certificate", "repeats", "balls", "size")
 
@@ -53,8 +52,8 @@ def add_options(parser: ArgumentParser) -> None:
 
 def run(options: Namespace) -> int:
     """Solve for what was asked; 1 if no value does."""
-    from ballplate.cli.progress import progress
-    from ballplate.simulator.inputs.quantities import QuantityError, parse_length_function
+    from ballplate.cli import progress
+    from ballplate.simulator.inputs import QuantityError, parse_length_function
 
     from .goals import GoalError, parse_goal
     from .root_search import reach

@@ -9,15 +9,10 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
-from ballplate.results.study import PlannedUncertainty, planned_uncertainty, predict
-from ballplate.simulator.computing.rounding import comparable
-from ballplate.simulator.computing.steps import Report, counted, unreported
-from ballplate.simulator.computing.threads import single_threaded
-from ballplate.simulator.experiment.model import Experiment
-from ballplate.simulator.experiment.variants import override
-from ballplate.simulator.inputs.messages import ExperimentError, refused
-from ballplate.simulator.inputs.settings import listing
-from ballplate.simulator.inputs.yamltree import Mapping, Node, Scalar
+from ballplate.results import PlannedUncertainty, planned_uncertainty, predict
+from ballplate.simulator.computing import Report, comparable, counted, single_threaded, unreported
+from ballplate.simulator.experiment import Experiment, override
+from ballplate.simulator.inputs import ExperimentError, Mapping, Node, Scalar, listing, refused
 
 from .answers import Answer, Reach
 from .goals import Goal, Judgement, check_goal, judge

@@ -9,21 +9,25 @@ from fractions import Fraction
 from itertools import chain, product
 from typing import Literal
 
-from ballplate.simulator.experiment.model import Experiment
-from ballplate.simulator.experiment.variants import node_at, override
-from ballplate.simulator.geometry.artefacts import GridSettings, SquareSettings
-from ballplate.simulator.inputs.quantities import (
+from ballplate.simulator.experiment import Experiment, node_at, override
+from ballplate.simulator.geometry import GridSettings, SquareSettings
+from ballplate.simulator.inputs import (
     BASE_UNITS,
     QUANTITY,
     UNITS,
     LengthFunction,
+    Mapping,
+    Node,
     QuantityError,
+    Scalar,
+    Sequence,
+    child,
+    hint,
+    listing,
     parse_length_function,
     plain_unit,
     typed_length,
 )
-from ballplate.simulator.inputs.settings import hint, listing
-from ballplate.simulator.inputs.yamltree import Mapping, Node, Scalar, Sequence, child
 
 from .steps import at_step, exact, round_down, round_up, step_of, times
 

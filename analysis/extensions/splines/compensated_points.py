@@ -14,11 +14,10 @@ from pathlib import Path
 import numpy as np
 from ballplate.extensions.splines.curve_tables import SIDES
 from ballplate.extensions.splines.error_curve import ErrorCurve
-from ballplate.presentation.formatting import fixed
-from ballplate.simulator.inputs.spreadsheets import CsvWriter
-from ballplate.simulator.inputs.tables import header_names, read_table
-from ballplate.simulator.machines.protocol import Array
-from ballplate.simulator.splines.spline_problems import SplineError, SplineProblem
+from ballplate.presentation import fixed
+from ballplate.simulator.inputs import CsvWriter, header_names, read_table
+from ballplate.simulator.machines import Array
+from ballplate.simulator.splines import SplineError, SplineProblem
 
 from .profile import NotOnProfileError
 

@@ -8,15 +8,15 @@ from contextlib import suppress
 from dataclasses import dataclass, fields
 from typing import Any
 
-from ballplate.simulator.inputs.quantities import (
+from ballplate.simulator.inputs import (
     UNITS,
     QuantityError,
+    hint,
     metres_or_radians,
     parse_angle,
     parse_length,
     parse_ratio,
 )
-from ballplate.simulator.inputs.settings import hint
 
 from .error_curve import EVERY, CurveSettings, Hold, Place
 from .read_points import Column, CurvePoints

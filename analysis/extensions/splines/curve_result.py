@@ -8,11 +8,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
-from ballplate.presentation.result import Result
-from ballplate.simulator.inputs.messages import ExperimentError, Message
-from ballplate.simulator.machines.protocol import Array
-from ballplate.simulator.splines.pieces import Powers
-from ballplate.simulator.splines.spline_problems import SplineError
+from ballplate.presentation import Result
+from ballplate.simulator.inputs import ExperimentError, Message
+from ballplate.simulator.machines import Array
+from ballplate.simulator.splines import Powers, SplineError
 
 from .compensated_points import CompensatedPoints, compensated_points, nominal_points
 from .curve_options import Asked, curve_settings, listed, positive

@@ -7,7 +7,7 @@ import math
 from typing import Any
 
 import numpy as np
-from ballplate.presentation.formatting import (
+from ballplate.presentation import (
     aligned,
     as_data,
     ascii_units,
@@ -16,12 +16,9 @@ from ballplate.presentation.formatting import (
     picked,
     records,
 )
-from ballplate.simulator.computing.rounding import comparable
-from ballplate.simulator.inputs.settings import listing
-from ballplate.simulator.inputs.spreadsheets import CsvWriter
-from ballplate.simulator.splines.constraints import Constraint
-from ballplate.simulator.splines.pieces import Pieces, Powers, pieces
-from ballplate.simulator.splines.space import Side
+from ballplate.simulator.computing import comparable
+from ballplate.simulator.inputs import CsvWriter, listing
+from ballplate.simulator.splines import Constraint, Pieces, Powers, Side, pieces
 
 from .error_curve import ErrorCurve
 from .read_points import Column

@@ -11,11 +11,20 @@ from itertools import pairwise
 from typing import Literal
 
 import numpy as np
-from ballplate.simulator.splines.constraints import Constraint, periodic, prescribed, straight
-from ballplate.simulator.splines.knots import at_every, with_boundaries
-from ballplate.simulator.splines.space import Array, SplineSpace
-from ballplate.simulator.splines.spline_fit import SplineFit, fit
-from ballplate.simulator.splines.spline_problems import SplineError, SplineProblem
+from ballplate.simulator.splines import (
+    Array,
+    Constraint,
+    SplineError,
+    SplineFit,
+    SplineProblem,
+    SplineSpace,
+    at_every,
+    fit,
+    periodic,
+    prescribed,
+    straight,
+    with_boundaries,
+)
 
 from .profile import NotOnProfileError, Profile, along
 from .read_points import ARC_LENGTH, CurvePoints

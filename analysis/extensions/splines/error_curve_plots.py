@@ -6,21 +6,21 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
-from ballplate.presentation.formatting import micro
-from ballplate.presentation.svg import (
+from ballplate.presentation import (
     INK,
     MUTED,
     PAPER,
     SERIES,
     common_legend,
     drawing,
+    micro,
     placed_axes,
     round_number,
     save,
     scale_bar,
     sticks,
 )
-from ballplate.simulator.computing.rounding import comparable
+from ballplate.simulator.computing import comparable
 
 from .curve_tables import derivative_unit, shown
 from .error_curve import ErrorCurve, whole_profile

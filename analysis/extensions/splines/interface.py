@@ -10,11 +10,7 @@ from ballplate.arguments import (
     SIGMAS,
     PathLike,
 )
-from ballplate.simulator.inputs.arguments import (
-    ensure_one_of,
-    ensure_path,
-    ensure_type,
-)
+from ballplate.simulator.inputs import ensure_one_of, ensure_path, ensure_type
 
 if TYPE_CHECKING:
     from .curve_result import FittedCurve

@@ -13,30 +13,28 @@ from pathlib import Path
 from typing import Literal
 
 import numpy as np
-from ballplate.simulator.inputs.messages import (
-    MORE_ERRORS,
-    MOST_MESSAGES,
-    ExperimentError,
-    Message,
-    refused,
-)
-from ballplate.simulator.inputs.quantities import (
+from ballplate.simulator.inputs import (
     ANGLE_UNITS,
     LENGTH_UNITS,
+    MORE_ERRORS,
+    MOST_MESSAGES,
+    MOST_ROWS,
+    ExperimentError,
+    Mark,
+    Message,
     QuantityError,
     exact_number,
-)
-from ballplate.simulator.inputs.settings import hint, listing, shorten
-from ballplate.simulator.inputs.tables import (
-    MOST_ROWS,
     header_cells,
+    hint,
+    listing,
     read_number,
+    refused,
+    shorten,
     split_cells,
     table_lines,
     wrong_count,
 )
-from ballplate.simulator.inputs.yamltree import Mark
-from ballplate.simulator.splines.space import Array
+from ballplate.simulator.splines import Array
 
 EXAMPLE = "position_mm,error_um"
 PROFILES = (("nominal_x", "nominal_z"), ("x", "z"))

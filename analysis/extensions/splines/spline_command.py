@@ -9,8 +9,17 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ballplate.cli.common import add_picture, count, print_json, print_lines
-from ballplate.cli.outputs import UsageError, Writer, add_force, add_output, write
+from ballplate.cli import (
+    UsageError,
+    Writer,
+    add_force,
+    add_output,
+    add_picture,
+    count,
+    print_json,
+    print_lines,
+    write,
+)
 
 if TYPE_CHECKING:
     from .read_points import CurvePoints

@@ -21,15 +21,10 @@ from ballplate.extensions.repair.placing import middle_of
 from ballplate.extensions.repair.positions import with_added
 from ballplate.extensions.repair.written import Edit, position_settings
 from ballplate.extensions.repair.yamltext import TextChange
-from ballplate.simulator.experiment.model import Experiment, Position, ReadingGroup
-from ballplate.simulator.geometry.positions import (
-    QUARTER_TURNS,
-    Pose,
-    plane_rotation,
-)
-from ballplate.simulator.inputs.messages import ExperimentError, Steps
-from ballplate.simulator.inputs.yamltree import parse_tree, to_python
-from ballplate.simulator.machines.protocol import Array
+from ballplate.simulator.experiment import Experiment, Position, ReadingGroup
+from ballplate.simulator.geometry import QUARTER_TURNS, Pose, plane_rotation
+from ballplate.simulator.inputs import ExperimentError, Steps, parse_tree, to_python
+from ballplate.simulator.machines import Array
 
 from .document import DesignDocument, changed, experiment_of
 

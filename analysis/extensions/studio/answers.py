@@ -15,22 +15,17 @@ from ballplate.extensions.pages.motions import (
     weak_motions,
 )
 from ballplate.extensions.repair.written import plane_of
-from ballplate.presentation.formatting import finite
-from ballplate.rank.verdict import Verdict, verdict
-from ballplate.results.parts import scale_lines, scale_warnings, target_lines
-from ballplate.results.prediction import length_headline, rank_words
-from ballplate.simulator.computing.threads import single_threaded
-from ballplate.simulator.design.arrays import locations
-from ballplate.simulator.estimation.linearisation import Linearisation, linearise
-from ballplate.simulator.experiment.layout import lay_out
-from ballplate.simulator.experiment.model import Experiment, Position
-from ballplate.simulator.geometry.grids import even_grid
-from ballplate.simulator.geometry.motions import without_rigid_motion
-from ballplate.simulator.geometry.positions import ball_coordinates
-from ballplate.simulator.inputs.quantities import Target
-from ballplate.uncertainty.error_map import point_map
-from ballplate.uncertainty.scale import scale_of
-from ballplate.uncertainty.summaries import Quantity, uncertainties
+from ballplate.extensions.sweeps.error_map_uncertainty import point_map
+from ballplate.presentation import finite
+from ballplate.rank import Verdict, verdict
+from ballplate.results import length_headline, rank_words, scale_lines, scale_warnings, target_lines
+from ballplate.simulator.computing import single_threaded
+from ballplate.simulator.design import locations
+from ballplate.simulator.estimation import Linearisation, linearise
+from ballplate.simulator.experiment import Experiment, Position, lay_out
+from ballplate.simulator.geometry import ball_coordinates, even_grid, without_rigid_motion
+from ballplate.simulator.inputs import Target
+from ballplate.uncertainty import Quantity, scale_of, uncertainties
 
 # Nodes of the lattice along each axis: edges of it that bend are drawn as curves.
 NODES = 9

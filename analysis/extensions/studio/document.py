@@ -10,11 +10,17 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from ballplate.simulator.experiment.load import load
-from ballplate.simulator.experiment.model import Experiment
-from ballplate.simulator.inputs.messages import ExperimentError, refused
-from ballplate.simulator.inputs.trust import OPENED, Trust
-from ballplate.simulator.inputs.yamltree import decoded, parse_tree, read_bytes, to_python
+from ballplate.simulator.experiment import Experiment, load
+from ballplate.simulator.inputs import (
+    OPENED,
+    ExperimentError,
+    Trust,
+    parse_tree,
+    read_bytes,
+    refused,
+    to_python,
+    utf8_text,
+)
 
 # Texts before the present one that are kept.
 MOST_STEPS = 200
@@ -65,7 +71,7 @@ def opened(path: Path, variant: str | None = None, trust: Trust = OPENED) -> Des
     :raises ExperimentError: the file cannot be read as text.
     """
     content = read_bytes(path)
-    return DesignDocument(path, variant, decoded(content, str(path)), content, trust)
+    return DesignDocument(path, variant, utf8_text(content, str(path)), content, trust)
 
 
 def experiment_of(document: DesignDocument, planning: bool = False) -> Experiment:

@@ -15,10 +15,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from ballplate.simulator.computing.processes import begin_worker, interruptions_blocked
-from ballplate.simulator.computing.steps import ProgressStep, Report
-from ballplate.simulator.experiment.layout import lay_out
-from ballplate.simulator.inputs.messages import ExperimentError
+from ballplate.simulator.computing import ProgressStep, Report, begin_worker, interruptions_blocked
+from ballplate.simulator.experiment import lay_out
+from ballplate.simulator.inputs import ExperimentError
 
 from .document import DesignDocument, experiment_of
 
@@ -47,8 +46,8 @@ def _next(document: DesignDocument, settings: Mapping[str, Any], report: Report)
 
 
 def _monte_carlo(document: DesignDocument, settings: Mapping[str, Any], report: Report) -> Any:
-    from ballplate.montecarlo.experiments import trials
-    from ballplate.results.study import predict
+    from ballplate.montecarlo import trials
+    from ballplate.results import predict
 
     experiment = experiment_of(document)
     found = trials(experiment, int(settings.get("trials", TRIALS)), report=report)
@@ -56,7 +55,7 @@ def _monte_carlo(document: DesignDocument, settings: Mapping[str, Any], report: 
 
 
 def _plan(document: DesignDocument, settings: Mapping[str, Any], report: Report) -> Any:
-    from ballplate.planning.campaign import Request, campaign
+    from ballplate.planning import Request, campaign
 
     experiment = experiment_of(document, planning=True)
     return {"lines": campaign(experiment, Request(), report=report).lines()}
@@ -76,9 +75,8 @@ def _ensure_sweep(document: DesignDocument, settings: Mapping[str, Any]) -> None
 
 def _fit(document: DesignDocument, settings: Mapping[str, Any], report: Report) -> Any:
     """The fit of readings that were dropped on the page, with their residuals at the balls."""
-    from ballplate.results.residuals import reading_residuals
-    from ballplate.results.study import fit
-    from ballplate.simulator.readings.reading_files import read_readings
+    from ballplate.results import fit, reading_residuals
+    from ballplate.simulator.readings import read_readings
 
     experiment = experiment_of(document)
     with tempfile.TemporaryDirectory() as folder:

@@ -11,9 +11,8 @@ from multiprocessing.connection import Connection
 from multiprocessing.process import BaseProcess
 from typing import Any
 
-from ballplate.simulator.computing.processes import begin_worker, interruptions_blocked
-from ballplate.simulator.inputs.messages import ExperimentError, Message, refused
-from ballplate.simulator.inputs.yamltree import to_python
+from ballplate.simulator.computing import begin_worker, interruptions_blocked
+from ballplate.simulator.inputs import ExperimentError, Message, refused, to_python
 
 from .answers import answer, scale_answer
 from .document import DesignDocument, data_of, experiment_of, variants_of

@@ -9,11 +9,8 @@ from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 
-from ballplate.simulator.experiment.load import trees_of
-from ballplate.simulator.experiment.modules import runs_code
-from ballplate.simulator.inputs.messages import ExperimentError
-from ballplate.simulator.inputs.trust import UNKNOWN
-from ballplate.simulator.inputs.yamltree import Mapping, to_python, walk
+from ballplate.simulator.experiment import runs_code, trees_of
+from ballplate.simulator.inputs import UNKNOWN, ExperimentError, Mapping, to_python, walk
 
 from .document import DesignDocument, changed, replace_file
 

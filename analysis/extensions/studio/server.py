@@ -15,7 +15,7 @@ from collections.abc import Awaitable, Callable
 from pathlib import Path
 from typing import Any
 
-from ballplate.simulator.inputs.messages import ExperimentError
+from ballplate.simulator.inputs import ExperimentError
 from starlette.applications import Starlette
 from starlette.concurrency import run_in_threadpool
 from starlette.datastructures import Headers
@@ -244,6 +244,6 @@ def _stopping(session: Session) -> Callable[[Request, dict[str, Any]], Any]:
 
 
 def _schema() -> Any:
-    from ballplate.simulator.experiment.schema import schema
+    from ballplate.simulator.experiment import schema
 
     return schema()

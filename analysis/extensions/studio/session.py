@@ -10,8 +10,7 @@ from pathlib import Path
 from threading import RLock
 from typing import Any
 
-from ballplate.simulator.inputs.messages import ExperimentError, Message, refused
-from ballplate.simulator.inputs.trust import OPENED, UNKNOWN
+from ballplate.simulator.inputs import OPENED, UNKNOWN, ExperimentError, Message, refused
 
 from .actions import ActionError, done, settings_of
 from .document import (

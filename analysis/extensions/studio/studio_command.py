@@ -6,9 +6,7 @@ from argparse import ArgumentParser, ArgumentTypeError, Namespace
 from importlib.resources import files
 from typing import TYPE_CHECKING
 
-from ballplate.cli.common import add_file, whole
-from ballplate.cli.outputs import Needed, UsageError
-from ballplate.cli.telling import note
+from ballplate.cli import Needed, UsageError, add_file, note, whole
 
 if TYPE_CHECKING:
     from .session import Session

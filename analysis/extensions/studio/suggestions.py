@@ -12,10 +12,10 @@ from ballplate.extensions.repair.offers import offers
 from ballplate.extensions.repair.repair_search import Repair, repairs
 from ballplate.extensions.repair.repair_tables import caveat, changes_in_words
 from ballplate.extensions.repair.written import Edit, position_settings
-from ballplate.results.study import planned_uncertainty
-from ballplate.simulator.computing.steps import Report, counted, unreported
-from ballplate.simulator.experiment.model import Experiment, Position
-from ballplate.simulator.inputs.messages import ExperimentError
+from ballplate.results import planned_uncertainty
+from ballplate.simulator.computing import Report, counted, unreported
+from ballplate.simulator.experiment import Experiment, Position
+from ballplate.simulator.inputs import ExperimentError
 
 from .answers import place_data
 from .document import DesignDocument, experiment_of

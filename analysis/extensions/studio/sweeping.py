@@ -27,14 +27,10 @@ from ballplate.extensions.sweeps.running import (
     writable_store,
 )
 from ballplate.extensions.sweeps.store import Store
-from ballplate.presentation.formatting import finite
-from ballplate.simulator.computing.steps import Report
-from ballplate.simulator.experiment.changes import node_of
-from ballplate.simulator.experiment.named_files import named_in
-from ballplate.simulator.experiment.variants import node_at
-from ballplate.simulator.inputs.messages import ExperimentError
-from ballplate.simulator.inputs.trust import Trust
-from ballplate.simulator.inputs.yamltree import Mark, Node, Scalar
+from ballplate.presentation import finite
+from ballplate.simulator.computing import Report
+from ballplate.simulator.experiment import named_in, node_at, node_of
+from ballplate.simulator.inputs import ExperimentError, Mark, Node, Scalar, Trust
 
 from .actions import ActionError, value_of
 from .document import DesignDocument, encoded, experiment_of

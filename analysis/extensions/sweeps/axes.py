@@ -5,16 +5,17 @@ from __future__ import annotations
 from collections import Counter
 from dataclasses import replace
 
-from ballplate.simulator.experiment.variants import node_at, override
-from ballplate.simulator.inputs.messages import Steps
-from ballplate.simulator.inputs.problems import Problems
-from ballplate.simulator.inputs.settings import hint, listing
-from ballplate.simulator.inputs.yamltree import (
+from ballplate.simulator.experiment import node_at, override
+from ballplate.simulator.inputs import (
     Mapping,
     Mark,
     Node,
+    Problems,
     Scalar,
     Sequence,
+    Steps,
+    hint,
+    listing,
     mark_of,
     to_python,
     written,

@@ -12,10 +12,8 @@ from dataclasses import dataclass
 from pathlib import Path, PurePath, PurePosixPath
 from typing import Any
 
-from ballplate.simulator.experiment.modules import python_models
-from ballplate.simulator.experiment.named_files import is_rooted
-from ballplate.simulator.inputs.messages import refused
-from ballplate.simulator.inputs.yamltree import Node, read_tree, to_list, to_python
+from ballplate.simulator.experiment import is_rooted, python_models
+from ballplate.simulator.inputs import Node, read_tree, refused, to_list, to_python
 
 from .model import Sweep
 from .named_files import named_files

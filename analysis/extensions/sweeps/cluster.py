@@ -16,8 +16,7 @@ from pathlib import Path
 from typing import Any
 
 import ballplate.simulator
-from ballplate.simulator.inputs.trust import OPENED
-from ballplate.simulator.inputs.unusable import UnusableError
+from ballplate.simulator.inputs import OPENED, UnusableError
 
 from .bundle import Bundle, unpack
 from .execute import Runner

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 
-from ballplate.uncertainty.quantities import RECORDED
+from ballplate.uncertainty import RECORDED
 
 # Besides those of quantities, versions and sums of squares.
 NAMES = (

@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 from functools import reduce
 from operator import add
 
-from ballplate.montecarlo.accumulator import Accumulator
-from ballplate.simulator.computing.steps import ProgressStep, Report, unreported
+from ballplate.montecarlo import Accumulator
+from ballplate.simulator.computing import ProgressStep, Report, unreported
 
 from .fingerprint import METHOD, method_of
 from .model import Sweep

@@ -9,8 +9,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ballplate.cli.outputs import PARQUET, UsageError, add_force, add_output, write
-from ballplate.cli.telling import complain
+from ballplate.cli import PARQUET, UsageError, add_force, add_output, complain, write
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -80,7 +79,7 @@ def warn_of_damage(path: Path, results: StoredResults, count: int) -> bool:
 
 def run(options: Namespace) -> int:
     """Write the table."""
-    from ballplate.simulator.inputs.spreadsheets import cell_of_text
+    from ballplate.simulator.inputs import cell_of_text
 
     from .frame import frame_of
     from .store import StoreError, chosen_sweep, definition_of, open_store, results

@@ -12,10 +12,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from ballplate.simulator.design.observations.python_values import PythonCalibration
-from ballplate.simulator.experiment.model import Experiment
-from ballplate.simulator.machines.custom import module_source
-from ballplate.simulator.machines.settings import PythonSettings
+from ballplate.simulator.design import PythonCalibration
+from ballplate.simulator.experiment import Experiment
+from ballplate.simulator.machines import PythonSettings, module_source
 from pydantic import BaseModel
 
 # The methods that figures and verdicts have been computed by, and what each corrected of the one

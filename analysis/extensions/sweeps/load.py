@@ -10,27 +10,30 @@ from itertools import product
 from pathlib import Path
 from typing import Any
 
-from ballplate.simulator.experiment.load import build
-from ballplate.simulator.experiment.model import Experiment
-from ballplate.simulator.experiment.variants import (
+from ballplate.simulator.experiment import (
+    Experiment,
+    build,
     is_same_place,
     node_at,
     override,
     variant_trees,
     with_present_keys,
 )
-from ballplate.simulator.inputs.messages import ExperimentError, Message
-from ballplate.simulator.inputs.problems import Problems
-from ballplate.simulator.inputs.settings import hint, listing
-from ballplate.simulator.inputs.trust import OPENED, Trust
-from ballplate.simulator.inputs.validation import validated
-from ballplate.simulator.inputs.yamltree import (
+from ballplate.simulator.inputs import (
+    OPENED,
+    ExperimentError,
     Mapping,
     Mark,
+    Message,
     Node,
+    Problems,
     Scalar,
     Sequence,
+    Trust,
+    hint,
+    listing,
     read_tree,
+    validated,
     walk,
 )
 

@@ -13,9 +13,8 @@ from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
 
-from ballplate.simulator.computing.processes import begin_worker, in_processes
-from ballplate.simulator.inputs.messages import ExperimentError
-from ballplate.simulator.inputs.trust import Trust
+from ballplate.simulator.computing import begin_worker, in_processes
+from ballplate.simulator.inputs import ExperimentError, Trust
 
 from .bundle import Bundle, bundle_of, files_of
 from .execute import Runner

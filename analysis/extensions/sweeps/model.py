@@ -6,8 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
-from ballplate.simulator.inputs.trust import OPENED, Trust
-from ballplate.simulator.inputs.yamltree import Mark, Node
+from ballplate.simulator.inputs import OPENED, Mark, Node, Trust
 
 Unit = Literal["m", "rad", "1", ""]
 

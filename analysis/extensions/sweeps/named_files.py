@@ -6,15 +6,14 @@ import os
 import re
 from pathlib import Path
 
-from ballplate.simulator.experiment.named_files import (
+from ballplate.simulator.experiment import (
     existing_file,
     files_of_machine,
     keyed_paths,
     model_modules,
     module_files,
 )
-from ballplate.simulator.inputs.messages import ExperimentError
-from ballplate.simulator.inputs.yamltree import Node, Scalar
+from ballplate.simulator.inputs import ExperimentError, Node, Scalar
 
 from .model import Sweep
 

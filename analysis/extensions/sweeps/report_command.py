@@ -8,8 +8,7 @@ from contextlib import closing
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ballplate.cli.outputs import PAGE, UsageError, add_force, add_output, write
-from ballplate.cli.telling import complain
+from ballplate.cli import PAGE, UsageError, add_force, add_output, complain, write
 
 from .export_command import add_store, warn_of_damage, warn_of_other_methods
 
@@ -92,7 +91,7 @@ def run(options: Namespace) -> int:
         is_damaged = warn_of_damage(store.path, results.found, len(results.cells))
         warn_of_other_methods(store.path, results.found.keys)
         if form == "html":
-            from ballplate.cli.progress import progress
+            from ballplate.cli import progress
 
             from .report.page import page
 
@@ -100,7 +99,7 @@ def run(options: Namespace) -> int:
             with progress(options) as shown:
                 text = page(store, results, options.run_modules, shown.show, comparison)
         else:
-            from ballplate.presentation.formats import FORMATS
+            from ballplate.presentation import FORMATS
 
             from .report.tables import report_tables
 

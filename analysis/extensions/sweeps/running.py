@@ -9,10 +9,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ballplate.presentation.result import Result
-from ballplate.simulator.computing.steps import Report, unreported
-from ballplate.simulator.inputs.messages import in_one_line
-from ballplate.simulator.inputs.unusable import UnusableError
+from ballplate.presentation import Result
+from ballplate.simulator.computing import Report, unreported
+from ballplate.simulator.inputs import UnusableError, in_one_line
 from filelock import FileLock, Timeout
 
 from .bundle import Bundle, changes, definition

@@ -19,8 +19,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from ballplate.montecarlo.accumulator import Accumulator, QuantityAccumulator
-from ballplate.simulator.inputs.messages import in_one_line
+from ballplate.montecarlo import Accumulator, QuantityAccumulator
+from ballplate.simulator.inputs import in_one_line
 
 from .fingerprint import METHOD, METHODS, method_of
 from .load import MOST_CELLS

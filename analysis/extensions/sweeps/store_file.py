@@ -15,8 +15,7 @@ from collections.abc import Callable
 from pathlib import Path, PurePath
 from urllib.parse import quote
 
-from ballplate.simulator.inputs.messages import in_one_line
-from ballplate.simulator.inputs.unusable import UnusableError
+from ballplate.simulator.inputs import UnusableError, in_one_line
 
 # The second format has digests of what it keeps; rows that came from the first have none.
 NEWEST = 2

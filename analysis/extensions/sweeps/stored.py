@@ -10,9 +10,9 @@ from dataclasses import dataclass, field
 from typing import Annotated, Any, Literal
 
 import numpy as np
-from ballplate.simulator.inputs.messages import in_lines
-from ballplate.simulator.machines.protocol import Array, Integers
-from ballplate.uncertainty.quantities import RECORDED_IF_TOLD
+from ballplate.simulator.inputs import in_lines
+from ballplate.simulator.machines import Array, Integers
+from ballplate.uncertainty import RECORDED_IF_TOLD
 from pydantic import (
     AfterValidator,
     BaseModel,

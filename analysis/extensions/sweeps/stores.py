@@ -11,8 +11,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
-from ballplate.simulator.computing.steps import Report, unreported
-from ballplate.simulator.inputs.arguments import (
+from ballplate.simulator.computing import Report, unreported
+from ballplate.simulator.inputs import (
     ensure_one_of,
     ensure_path,
     ensure_report,
@@ -149,7 +149,7 @@ def sweep_report(
                 with closing(open_store(Path(compare))) as other:
                     beside = compared(results, read_results(other, None), Path(compare).name)
             return page(opened, results, run_modules, report, beside)
-        from ballplate.presentation.formats import FORMATS
+        from ballplate.presentation import FORMATS
 
         from .report.tables import report_tables
 

@@ -9,12 +9,10 @@ from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ballplate.cli.common import add_workers
-from ballplate.cli.outputs import UsageError
-from ballplate.cli.telling import complain
+from ballplate.cli import UsageError, add_workers, complain
 
 if TYPE_CHECKING:
-    from ballplate.simulator.computing.steps import ProgressStep
+    from ballplate.simulator.computing import ProgressStep
 
     from .bundle import Bundle
     from .execute import Runner, Summary
@@ -99,7 +97,7 @@ def run(options: Namespace) -> int:
 
 
 def _run(sweep: Sweep, bundle: Bundle, store: Store, options: Namespace) -> int:
-    from ballplate.cli.progress import progress
+    from ballplate.cli import progress
 
     from .local import ChangedError
     from .running import compute_sweep, enter
@@ -137,7 +135,7 @@ def _run(sweep: Sweep, bundle: Bundle, store: Store, options: Namespace) -> int:
 
 
 def _runner(sweep: Sweep, bundle: Bundle, options: Namespace) -> AbstractContextManager[Runner]:
-    from ballplate.simulator.computing.processes import processors
+    from ballplate.simulator.computing import processors
 
     from .cluster import cluster_runner
     from .local import local_runner
@@ -148,8 +146,7 @@ def _runner(sweep: Sweep, bundle: Bundle, options: Namespace) -> AbstractContext
 
 
 def _tell(store: Store, which: str, number: int, summary: Summary) -> None:
-    from ballplate.simulator.inputs.messages import in_one_line
-    from ballplate.simulator.inputs.settings import number_of
+    from ballplate.simulator.inputs import in_one_line, number_of
 
     from .running import shortcomings
 
@@ -166,9 +163,9 @@ def _tell(store: Store, which: str, number: int, summary: Summary) -> None:
 
 
 def _dry_run(sweep: Sweep, options: Namespace) -> int:
-    from ballplate.cli.progress import duration
-    from ballplate.simulator.computing.processes import processors
-    from ballplate.simulator.inputs.settings import number_of
+    from ballplate.cli import duration
+    from ballplate.simulator.computing import processors
+    from ballplate.simulator.inputs import number_of
 
     from .estimate import seconds_of
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from ballplate.simulator.experiment.schema import DRAFT, tidied
+from ballplate.simulator.experiment import DRAFT, tidied
 
 from .sweep_settings import SweepSettings
 

@@ -6,10 +6,10 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
-from ballplate.simulator.experiment.sections import Line, Seed
-from ballplate.simulator.geometry.ball_layouts import Name
-from ballplate.simulator.inputs.settings import Forms, NonEmpty, Settings
-from ballplate.uncertainty.quantities import QUANTITIES, RECORDED, RECORDED_IF_TOLD
+from ballplate.simulator.experiment import Line, Seed
+from ballplate.simulator.geometry import Name
+from ballplate.simulator.inputs import Forms, NonEmpty, Settings
+from ballplate.uncertainty import QUANTITIES, RECORDED, RECORDED_IF_TOLD
 from pydantic import Field
 
 if TYPE_CHECKING:

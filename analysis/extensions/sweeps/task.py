@@ -10,17 +10,19 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from ballplate.montecarlo.accumulator import Accumulator
-from ballplate.montecarlo.experiments import Trials, block_of_trials, combined, trials
-from ballplate.montecarlo.figures import MonteCarloEstimate, MonteCarloOutcome
-from ballplate.results.prediction import Prediction
-from ballplate.results.study import predict
-from ballplate.simulator.computing.memory import want_of_memory
-from ballplate.simulator.computing.threads import single_threaded
-from ballplate.simulator.computing.versions import versions
-from ballplate.simulator.experiment.model import Experiment
-from ballplate.simulator.inputs.messages import ExperimentError
-from ballplate.simulator.inputs.unusable import UnusableError
+from ballplate.montecarlo import (
+    Accumulator,
+    MonteCarloEstimate,
+    MonteCarloOutcome,
+    Trials,
+    block_of_trials,
+    combined,
+    trials,
+)
+from ballplate.results import Prediction, predict
+from ballplate.simulator.computing import single_threaded, versions, want_of_memory
+from ballplate.simulator.experiment import Experiment
+from ballplate.simulator.inputs import ExperimentError, UnusableError
 
 from .columns import symbol_column, unit_suffix
 from .fingerprint import fingerprint, with_method, without_method

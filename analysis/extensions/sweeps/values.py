@@ -10,16 +10,21 @@ from fractions import Fraction
 from itertools import combinations
 from typing import Any
 
-from ballplate.simulator.inputs.quantities import (
+from ballplate.simulator.inputs import (
     QUANTITY,
+    Mapping,
+    Node,
     QuantityError,
+    Scalar,
+    Sequence,
+    child,
     exact_number,
     parse_angle,
     parse_length,
     parse_ratio,
+    shorten,
+    to_python,
 )
-from ballplate.simulator.inputs.settings import shorten
-from ballplate.simulator.inputs.yamltree import Mapping, Node, Scalar, Sequence, child, to_python
 
 from .model import Unit
 

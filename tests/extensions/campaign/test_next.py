@@ -20,7 +20,7 @@ from ballplate.extensions.campaign.next_position import (
 from ballplate.extensions.campaign.next_result import NextStep
 from ballplate.extensions.campaign.watching_command import settled
 from ballplate.extensions.requirements.goals import GoalError, parse_goal
-from ballplate.simulator.experiment.load import load
+from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.inputs.yamltree import GivenText
 from scipy.stats import chi2

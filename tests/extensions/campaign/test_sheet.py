@@ -16,7 +16,7 @@ import pytest
 from ballplate.cli import main
 from ballplate.extensions.campaign.reading_lists import planned_readings
 from ballplate.extensions.campaign.sheet import Sheet, sheet_of
-from ballplate.simulator.experiment.load import load
+from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.inputs.messages import ExperimentError
 
 # Positions of all kinds; poses and layouts that can be computed by hand.

@@ -20,7 +20,7 @@ from ballplate.extensions.campaign.sheet_forms import (
 from ballplate.extensions.campaign.sheet_page import sheet_page
 from ballplate.planning.run_sheet_tables import sheet_data, sheet_lines, summary
 from ballplate.planning.schedule import RunSheet, run_sheet
-from ballplate.simulator.experiment.load import load
+from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.geometry.positions import ball_coordinates
 

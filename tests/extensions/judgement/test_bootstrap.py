@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from ballplate.extensions.judgement import bootstrap as of_bootstrap
 from ballplate.extensions.judgement.bootstrap import Replicate, bootstrap
-from ballplate.results.fit import Fit
+from ballplate.results.fits import Fit
 from ballplate.simulator.experiment.model import Experiment
 
 

@@ -25,7 +25,7 @@ from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.inputs.messages import ExperimentError
 from ballplate.simulator.readings.generate import noisy_certificate, noisy_readings
 from ballplate.simulator.readings.observed_readings import ObservedReadings, observe
-from ballplate.simulator.readings.same_readings import same_readings
+from ballplate.simulator.readings.readings_in_common import same_readings
 from numpy.typing import NDArray
 
 from tests.reference import dense

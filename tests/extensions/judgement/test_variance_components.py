@@ -28,7 +28,7 @@ from ballplate.extensions.judgement.restricted_likelihood import (
     estimated_ratios,
     group_sums,
 )
-from ballplate.gross_errors.leftover import Leftover, leftover
+from ballplate.gross_errors.remainders import Leftover, leftover
 from ballplate.results.groupings import GROUPINGS, Grouping
 from ballplate.results.observation_groups import ObservationGroup, groups_of, reweighted
 from ballplate.simulator.design.arrays import Design, nominal_state

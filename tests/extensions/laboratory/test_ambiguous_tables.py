@@ -13,7 +13,7 @@ from ballplate.extensions.laboratory.any_table import TableRows
 from ballplate.extensions.laboratory.reading_tables import any_table_rows
 from ballplate.simulator.design.arrays import Design
 from ballplate.simulator.experiment.layout import lay_out
-from ballplate.simulator.experiment.load import load
+from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.inputs.messages import ExperimentError
 from ballplate.simulator.inputs.yamltree import GivenText

@@ -11,7 +11,7 @@ import numpy as np
 import pandas
 import pytest
 from ballplate.simulator.experiment.layout import lay_out
-from ballplate.simulator.experiment.load import load
+from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.inputs.messages import ExperimentError
 from ballplate.simulator.readings.reading_files import ObservedReadings, read_readings
 

@@ -12,7 +12,7 @@ import pandas as pd
 import pytest
 from ballplate.extensions.laboratory.reading_tables import any_table_rows
 from ballplate.simulator.experiment.layout import lay_out
-from ballplate.simulator.experiment.load import load
+from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.inputs.messages import ExperimentError
 from ballplate.simulator.inputs.yamltree import GivenText

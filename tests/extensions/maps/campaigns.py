@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 from ballplate.extensions.maps.compared_maps import ComparedMap, map_of_fit
-from ballplate.results.fit import Fit
+from ballplate.results.fits import Fit
 from ballplate.results.study import fit as fit_observed
 from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.model import Experiment

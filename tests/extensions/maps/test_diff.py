@@ -12,7 +12,7 @@ import ballplate as bp
 import numpy as np
 import pytest
 from ballplate.cli import main
-from ballplate.results.fit import Fit
+from ballplate.results.fits import Fit
 
 PARK = Path("designs/park")
 

@@ -19,7 +19,7 @@ from ballplate.extensions.maps.error_functions import error_functions
 from ballplate.extensions.maps.fitted_errors import fitted_lengths
 from ballplate.extensions.maps.map_places import PlacesAsked, map_places
 from ballplate.extensions.maps.wanted_lengths import tasks_of_experiment
-from ballplate.results.fit import Fit
+from ballplate.results.fits import Fit
 from ballplate.simulator.estimation.gauss_newton import estimate, linearised_fit
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.maps.fitted_map import FittedMap

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from ballplate.extensions.maps.compared_maps import ComparedMap, map_of_fit, motions
 from ballplate.extensions.maps.comparison import ComparisonSettings, compared
-from ballplate.results.fit import Fit
+from ballplate.results.fits import Fit
 from ballplate.simulator.estimation.gauss_newton import estimate, linearised_fit
 from ballplate.simulator.geometry.motions import cross_matrices
 from ballplate.simulator.machines.framing import FramedModel

@@ -23,7 +23,7 @@ from ballplate.extensions.maps.length_map import (
 )
 from ballplate.results.study import predict
 from ballplate.simulator.experiment.layout import lay_out
-from ballplate.simulator.experiment.load import load
+from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.inputs.quantities import LengthFunction
 

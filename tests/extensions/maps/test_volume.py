@@ -12,7 +12,7 @@ import pytest
 from ballplate.cli import main
 from ballplate.simulator.design.arrays import locations, nominal_state
 from ballplate.simulator.experiment.layout import lay_out
-from ballplate.simulator.experiment.load import load
+from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.inputs.messages import ExperimentError
 
 EXPERIMENT = """\

@@ -14,7 +14,7 @@ from ballplate.planning.choice import CurvePoint, Gain
 from ballplate.planning.constraints import Budget, Spent
 from ballplate.planning.selection import Campaign
 from ballplate.results.study import predict
-from ballplate.simulator.experiment.load import load
+from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.experiment.pool import with_chosen
 
 pytest.importorskip("matplotlib", reason="pictures need matplotlib")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from ballplate.presentation.scene import hull
+from ballplate.presentation.scenes import hull
 
 
 @pytest.mark.parametrize("seed", range(20))

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from ballplate.extensions.pages.charts import Chart, Trace, chart_svg
 from ballplate.extensions.pages.spatial import Layer, SpatialPicture, figure_of
-from ballplate.presentation.scene import projection
+from ballplate.presentation.scenes import projection
 
 
 def numbers(text: str) -> list[float]:

@@ -12,7 +12,7 @@ from ballplate.estimators.reversal_fits import fit_reversal
 from ballplate.presentation.vectors import LONGEST, Vectors, draw_vectors, magnification
 from ballplate.results.study import fit
 from ballplate.simulator.experiment.layout import lay_out
-from ballplate.simulator.experiment.load import load
+from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.readings.reading_files import read_readings
 
 pytest.importorskip("matplotlib", reason="pictures need matplotlib")

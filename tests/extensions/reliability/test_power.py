@@ -16,9 +16,9 @@ from ballplate.extensions.reliability.power import (
 )
 from ballplate.extensions.reliability.redundancy import reliability_of
 from ballplate.extensions.reliability.reliability_result import Reliability
+from ballplate.gross_errors.bias_patterns import Patterns, patterns
 from ballplate.gross_errors.cause_search import diagnosis
-from ballplate.gross_errors.leftover import Columns, leftover
-from ballplate.gross_errors.patterns import Patterns, patterns
+from ballplate.gross_errors.remainders import Columns, leftover
 from ballplate.simulator.design.arrays import Design
 from ballplate.simulator.design.observations.coordinates import CalibratedCoordinates
 from ballplate.simulator.design.observations.distances import CalibratedDistances

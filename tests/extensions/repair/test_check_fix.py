@@ -15,7 +15,7 @@ import pytest
 import yaml
 from ballplate.cli import main
 from ballplate.results.study import check
-from ballplate.simulator.experiment.load import load
+from ballplate.simulator.experiment.loading import load
 
 from tests.reference.copies import copy_file
 

@@ -13,7 +13,7 @@ import pytest
 from ballplate.extensions.repair.mending import mended, to_write
 from ballplate.extensions.repair.repair_search import Repair, repairs
 from ballplate.results.study import check
-from ballplate.simulator.experiment.load import load
+from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.inputs.messages import ExperimentError
 from hypothesis import given, settings

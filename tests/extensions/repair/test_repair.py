@@ -25,7 +25,7 @@ from ballplate.extensions.repair.screening import rank_of, seen_by
 from ballplate.planning.checked_files import Wanted, check_files
 from ballplate.results.study import check, predict
 from ballplate.simulator.experiment.layout import lay_out
-from ballplate.simulator.experiment.load import load
+from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.experiment.model import (
     AtMost,
     Candidate,

@@ -17,7 +17,7 @@ from ballplate.extensions.repair.repair_search import Repair, repairs
 from ballplate.extensions.repair.repair_tables import repair_lines
 from ballplate.presentation.formatting import number
 from ballplate.results.study import check, predict
-from ballplate.simulator.experiment.load import load
+from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.experiment.model import Experiment
 
 TRIAL = "1 um"

@@ -18,7 +18,7 @@ from ballplate.extensions.requirements.steps import at_step, round_down, round_u
 from ballplate.extensions.requirements.unknowns import NotVariableError
 from ballplate.results.prediction import Prediction
 from ballplate.results.study import predict
-from ballplate.simulator.experiment.load import load
+from ballplate.simulator.experiment.loading import load
 from scipy.optimize import brentq
 
 TEXT = (

@@ -14,7 +14,7 @@ pytest.importorskip("starlette", reason="the studio is an extra")
 from ballplate.extensions.studio.server import application
 from ballplate.extensions.studio.session import RefusedError, Session
 from ballplate.results.study import predict
-from ballplate.simulator.experiment.load import load
+from ballplate.simulator.experiment.loading import load
 from starlette.testclient import TestClient
 
 PORT, TOKEN = 8123, "a-token-of-the-tests"

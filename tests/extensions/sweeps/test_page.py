@@ -17,6 +17,7 @@ from ballplate.cli import main
 from ballplate.designs import shipped
 from ballplate.extensions.studio.document import opened
 from ballplate.extensions.studio.sweeping import swept
+from ballplate.extensions.sweeps.error_map_uncertainty import error_map
 from ballplate.extensions.sweeps.frame import frame
 from ballplate.extensions.sweeps.report.cells import NoExperimentError, experiments
 from ballplate.extensions.sweeps.report.page import page
@@ -25,8 +26,7 @@ from ballplate.extensions.sweeps.report.verdicts import ranks
 from ballplate.extensions.sweeps.store import open_store
 from ballplate.results.study import predict
 from ballplate.simulator.computing.steps import unreported
-from ballplate.simulator.experiment.load import load
-from ballplate.uncertainty.error_map import error_map
+from ballplate.simulator.experiment.loading import load
 
 from tests.extensions.sweeps.stores import Page, axis, done, failed, made_up
 

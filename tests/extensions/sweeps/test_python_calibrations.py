@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 from ballplate.cli import main
 from ballplate.extensions.sweeps.fingerprint import fingerprint
-from ballplate.simulator.experiment.load import load
+from ballplate.simulator.experiment.loading import load
 
 MODULE = """
 import numpy as np

@@ -12,7 +12,7 @@ import pytest
 from ballplate.extensions.sweeps.fingerprint import fingerprint
 from ballplate.extensions.sweeps.load import experiment_of, load_sweep
 from ballplate.simulator.experiment import structure
-from ballplate.simulator.experiment.load import load
+from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.inputs.messages import ExperimentError
 
 from tests.extensions.sweeps.support import ROOT, small_sweep

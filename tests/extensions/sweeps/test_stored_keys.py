@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 from ballplate.extensions.sweeps.fingerprint import METHOD, fingerprint
-from ballplate.simulator.experiment.load import load
+from ballplate.simulator.experiment.loading import load
 
 KEPT = [
     ("quickstart.yaml", "quickstart", "9cce15c3e7bebae2bfb31f6733a7fd4ae6c88151"),

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from ballplate.extensions.sweeps.load import experiment_of, load_sweep
 from ballplate.extensions.sweeps.model import Sweep
-from ballplate.simulator.experiment.load import load
+from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.inputs.messages import ExperimentError
 
 from tests.reference.copies import copy_file

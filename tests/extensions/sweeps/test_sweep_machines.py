@@ -9,7 +9,7 @@ from ballplate.cli import main
 from ballplate.extensions.sweeps.bundle import bundle_of, unpack
 from ballplate.extensions.sweeps.fingerprint import fingerprint
 from ballplate.extensions.sweeps.load import experiment_of, load_sweep
-from ballplate.simulator.experiment.load import load
+from ballplate.simulator.experiment.loading import load
 
 from tests.reference.copies import copy_tree
 

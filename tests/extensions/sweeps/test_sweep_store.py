@@ -20,7 +20,7 @@ from ballplate.extensions.sweeps.store import definitions, files, keys, open_sto
 from ballplate.extensions.sweeps.task import BLOCK, CellResult, CellTask, compute
 from ballplate.montecarlo.experiments import trials
 from ballplate.results.study import predict
-from ballplate.simulator.experiment.load import load
+from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.inputs.messages import ExperimentError, Message
 
 from tests.extensions.sweeps.support import (

@@ -11,9 +11,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from fractions import Fraction
 
-from ballplate.simulator.inputs.quantities import LENGTH_UNITS
-from ballplate.simulator.inputs.settings import shorten
-from ballplate.simulator.inputs.yamltree import Mark
+from ballplate.simulator.inputs import LENGTH_UNITS, Mark, shorten
 
 from .columns import headings, is_number, with_point
 from .report import (

@@ -12,14 +12,14 @@ from dataclasses import dataclass, field, replace
 from fractions import Fraction
 
 import numpy as np
-from ballplate.simulator.inputs.quantities import (
+from ballplate.simulator.inputs import (
     ANGLE_UNITS,
     LENGTH_UNITS,
+    Mark,
     QuantityError,
     exact_number,
+    shorten,
 )
-from ballplate.simulator.inputs.settings import shorten
-from ballplate.simulator.inputs.yamltree import Mark
 
 from .report import LOCATED, SPHERE, Feature, Format, Place, Report, ReportProblems, System
 from .text import Text, read_lines

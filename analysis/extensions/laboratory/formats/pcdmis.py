@@ -12,9 +12,7 @@ from dataclasses import dataclass, field
 from fractions import Fraction
 from itertools import takewhile
 
-from ballplate.simulator.inputs.quantities import LENGTH_UNITS
-from ballplate.simulator.inputs.settings import shorten
-from ballplate.simulator.inputs.yamltree import Mark
+from ballplate.simulator.inputs import LENGTH_UNITS, Mark, shorten
 
 from .columns import is_number, with_point
 from .report import (

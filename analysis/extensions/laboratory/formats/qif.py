@@ -13,12 +13,15 @@ from dataclasses import dataclass
 from fractions import Fraction
 
 import numpy as np
-from ballplate.simulator.inputs.messages import refused
-from ballplate.simulator.inputs.quantities import QuantityError, exact_number
-from ballplate.simulator.inputs.settings import shorten
-from ballplate.simulator.inputs.xmltree import Element, parse_xml
-from ballplate.simulator.machines.protocol import Array
+from ballplate.simulator.inputs import (
+    QuantityError,
+    exact_number,
+    refused,
+    shorten,
+)
+from ballplate.simulator.machines import Array
 
+from ..xmltree import Element, parse_xml
 from .report import LOCATED, SPHERE, Feature, Format, Report, ReportProblems, System
 
 NAMESPACE = re.compile(r"http://qifstandards\.org/xsd/qif[0-9]*")

@@ -7,10 +7,14 @@ from fractions import Fraction
 from itertools import pairwise
 from pathlib import Path
 
-from ballplate.simulator.inputs.decoding import text_and_encoding
-from ballplate.simulator.inputs.messages import refused
-from ballplate.simulator.inputs.settings import hint, listing
-from ballplate.simulator.inputs.yamltree import GivenText, read_bytes
+from ballplate.simulator.inputs import (
+    GivenText,
+    hint,
+    listing,
+    read_bytes,
+    refused,
+    text_and_encoding,
+)
 
 from .calypso import CALYPSO
 from .dmis import DMIS

@@ -8,15 +8,16 @@ from dataclasses import dataclass, field
 from fractions import Fraction
 from typing import Literal
 
-from ballplate.simulator.inputs.messages import (
+from ballplate.simulator.inputs import (
     MORE_ERRORS,
     MOST_MESSAGES,
     ExperimentError,
+    Mark,
     Message,
+    QuantityError,
+    metres_or_radians,
 )
-from ballplate.simulator.inputs.quantities import QuantityError, metres_or_radians
-from ballplate.simulator.inputs.yamltree import Mark
-from ballplate.simulator.machines.protocol import Array
+from ballplate.simulator.machines import Array
 
 Place = tuple[float, float, float]
 System = Literal["machine", "part", "unstated"]

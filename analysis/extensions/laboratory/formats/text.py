@@ -5,8 +5,7 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass
 
-from ballplate.simulator.inputs.decoding import decoded, refuse_controls
-from ballplate.simulator.inputs.yamltree import Mark
+from ballplate.simulator.inputs import Mark, decoded, refuse_controls
 
 # Form feeds part pages.
 LINE_END = re.compile("\r\n|\r|\n|\x0c")

@@ -7,10 +7,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from ballplate.presentation.formatting import number, percent
-from ballplate.presentation.table import Block, Entry, Row, Table
-from ballplate.simulator.computing.rounding import comparable
-from ballplate.simulator.inputs.settings import listing, number_of
+from ballplate.presentation import Block, Entry, Row, Table, number, percent
+from ballplate.simulator.computing import comparable
+from ballplate.simulator.inputs import listing, number_of
 from numpy.typing import NDArray
 
 from .axis_worth import AxisWorth, axis_worths

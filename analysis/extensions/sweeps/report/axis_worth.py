@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from ballplate.presentation.formatting import number
+from ballplate.presentation import number
 from numpy.typing import NDArray
 
 from .results import Integers, ReportAxis, ReportedSweep

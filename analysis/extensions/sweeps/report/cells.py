@@ -7,9 +7,8 @@ import tempfile
 from collections.abc import Sequence
 from pathlib import Path, PurePosixPath
 
-from ballplate.simulator.experiment.model import Experiment
-from ballplate.simulator.inputs.messages import ExperimentError
-from ballplate.simulator.inputs.trust import Trust
+from ballplate.simulator.experiment import Experiment
+from ballplate.simulator.inputs import ExperimentError, Trust
 
 from ..bundle import Bundle, unpack
 from ..load import experiment_of, load_sweep

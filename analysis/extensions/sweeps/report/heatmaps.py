@@ -8,8 +8,7 @@ from dataclasses import dataclass
 from itertools import combinations
 
 import numpy as np
-from ballplate.presentation.formatting import number
-from ballplate.presentation.table import Entry
+from ballplate.presentation import Entry, number
 from numpy.typing import NDArray
 
 from .measures import Measure, uncertainty_measures

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from ballplate.presentation.formatting import shown_unit
-from ballplate.uncertainty.quantities import DESCRIPTIONS
+from ballplate.presentation import shown_unit
+from ballplate.uncertainty import DESCRIPTIONS
 
 from ..columns import MORE, symbol_column
 from .results import ReportedSweep

@@ -14,22 +14,30 @@ from typing import Any
 
 import numpy as np
 from ballplate.extensions.pages.document import style
-from ballplate.presentation.formatting import micro, number, percent, uncertainty_words
-from ballplate.presentation.pictures import probes_svg, scene_svg, slice_svg, slice_words
-from ballplate.presentation.scene import MOST_BALLS, Scene, scene
-from ballplate.presentation.table import Block, Entry, Row, Table
-from ballplate.simulator.computing.steps import Report, counted, unreported
-from ballplate.simulator.experiment.layout import lay_out
-from ballplate.simulator.experiment.model import Experiment
-from ballplate.simulator.inputs.messages import in_one_line
-from ballplate.simulator.inputs.settings import listing
-from ballplate.uncertainty.error_map import error_map
-from ballplate.uncertainty.quantities import DESCRIPTIONS
+from ballplate.presentation import (
+    MOST_BALLS,
+    Block,
+    Entry,
+    Row,
+    Scene,
+    Table,
+    micro,
+    number,
+    percent,
+    scene,
+    uncertainty_words,
+)
+from ballplate.simulator.computing import Report, counted, unreported
+from ballplate.simulator.experiment import Experiment, lay_out
+from ballplate.simulator.inputs import in_one_line, listing
+from ballplate.uncertainty import DESCRIPTIONS
 
 from ..columns import symbol_column
+from ..error_map_uncertainty import error_map
 from ..store import Store
 from .answer import answer
 from .cells import NoExperimentError, experiments
+from .design_pictures import probes_svg, scene_svg, slice_svg, slice_words
 from .heatmaps import heat_maps
 from .plots import plot_svg
 from .results import ReportedSweep, best_and_worst, cell_list, criterion

@@ -6,20 +6,21 @@ import textwrap
 from typing import TYPE_CHECKING
 
 import numpy as np
-from ballplate.presentation.formatting import micro, number
-from ballplate.presentation.svg import (
+from ballplate.presentation import (
     DASHES,
     INK,
     MARKERS,
     PAPER,
     SERIES,
     WIDTH,
-    as_svg,
     common_legend,
     drawing,
+    micro,
+    number,
     placed_axes,
 )
 
+from .design_pictures import as_svg
 from .series import Panel, Plot, SeriesLine
 
 if TYPE_CHECKING:

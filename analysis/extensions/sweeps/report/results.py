@@ -9,10 +9,9 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from ballplate.simulator.computing.rounding import comparable
-from ballplate.simulator.inputs.messages import in_one_line
-from ballplate.simulator.inputs.quantities import QUANTITY, exact_number
-from ballplate.uncertainty.quantities import RECORDED
+from ballplate.simulator.computing import comparable
+from ballplate.simulator.inputs import QUANTITY, exact_number, in_one_line
+from ballplate.uncertainty import RECORDED
 from numpy.typing import NDArray
 
 from ..columns import MORE, symbol_column

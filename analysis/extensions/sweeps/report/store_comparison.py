@@ -8,10 +8,9 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from ballplate.presentation.formatting import number
-from ballplate.presentation.table import Block, Entry, Row, Table
-from ballplate.simulator.inputs.settings import listing, number_of
-from ballplate.simulator.machines.protocol import Array
+from ballplate.presentation import Block, Entry, Row, Table, number
+from ballplate.simulator.inputs import listing, number_of
+from ballplate.simulator.machines import Array
 
 from .answer import WITHIN
 from .axis_worth import SAME

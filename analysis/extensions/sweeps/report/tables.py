@@ -5,10 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from ballplate.montecarlo.comparison_tables import with_error
-from ballplate.montecarlo.figures import MonteCarloEstimate
-from ballplate.presentation.formatting import number, percent
-from ballplate.presentation.table import Block, Entry, Row, Table
+from ballplate.montecarlo import MonteCarloEstimate, with_error
+from ballplate.presentation import Block, Entry, Row, Table, number, percent
 
 from ..columns import symbol_column
 from .measures import (

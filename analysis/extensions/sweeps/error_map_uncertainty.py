@@ -5,16 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from ballplate.simulator.computing.threads import single_threaded
-from ballplate.simulator.design.arrays import Design
-from ballplate.simulator.estimation.functions import displacements
-from ballplate.simulator.estimation.linearisation import Linearisation, linearise
-from ballplate.simulator.experiment.layout import lay_out
-from ballplate.simulator.experiment.model import Experiment
-from ballplate.simulator.machines.protocol import Array
-
-from .kernel_quantities import evaluation_points
-from .summaries import point_pairs
+from ballplate.simulator.computing import single_threaded
+from ballplate.simulator.design import Design
+from ballplate.simulator.estimation import Linearisation, displacements, linearise
+from ballplate.simulator.experiment import Experiment, lay_out
+from ballplate.simulator.machines import Array
+from ballplate.uncertainty import evaluation_points, point_pairs
 
 # Points along x and y of a slice.
 POINTS = 21

@@ -6,10 +6,7 @@ import math
 from collections.abc import Collection, Sequence
 from typing import TYPE_CHECKING, Any
 
-from ballplate.simulator.computing.rounding import printable
-from ballplate.simulator.inputs.settings import listing, number_of
-
-from ..presentation.formatting import (
+from ballplate.presentation.formatting import (
     aligned,
     finite,
     number,
@@ -18,12 +15,14 @@ from ..presentation.formatting import (
     to_uncertainty,
     uncertainty_words,
 )
-from ..rank.verdict import GREAT, Verdict
-from ..uncertainty.scale import Scale
-from ..uncertainty.summaries import Quantity
-from ..uncertainty.tasks import TaskUncertainty, is_determined
-from .adjustments import ARCSECOND, Adjustment
-from .plates import PlateCoordinates
+from ballplate.rank.verdicts import GREAT, Verdict
+from ballplate.results.adjustments import ARCSECOND, Adjustment
+from ballplate.results.plates import PlateCoordinates
+from ballplate.simulator.computing.rounding import printable
+from ballplate.simulator.inputs.settings import listing, number_of
+from ballplate.uncertainty.scale import Scale
+from ballplate.uncertainty.summaries import Quantity
+from ballplate.uncertainty.tasks import TaskUncertainty, is_determined
 
 if TYPE_CHECKING:
     from ballplate.simulator.experiment.model import Experiment

@@ -9,32 +9,28 @@ from dataclasses import dataclass, replace
 from itertools import combinations
 
 import numpy as np
-from ballplate.simulator.computing.processes import in_processes
-from ballplate.simulator.computing.rounding import comparable
-from ballplate.simulator.computing.steps import Report, counted, unreported
-from ballplate.simulator.computing.threads import single_threaded
-from ballplate.simulator.experiment.model import AtMost, Candidate, Experiment, Pool, Position
-from ballplate.simulator.inputs.messages import ExperimentError, refused
-from ballplate.simulator.inputs.settings import listing
-
-from ..results.study import predict
-from .bound import Bound, bound
-from .choice import CurvePoint, Gain
-from .constraints import Budget, Constraints, constraints
-from .criteria import CriterionName, criterion, is_about_balls, refuse_many_points
-from .drift_in_orders import (
+from ballplate.planning.bound import Bound, bound
+from ballplate.planning.choice import CurvePoint, Gain
+from ballplate.planning.constraints import Budget, Constraints, constraints
+from ballplate.planning.criteria import (
+    CriterionName,
+    criterion,
+    is_about_balls,
+    refuse_many_points,
+)
+from ballplate.planning.drift_in_orders import (
     drift_effect,
     in_time,
     is_of_plates,
     parse_drift_size,
     without_drift,
 )
-from .information import pool_information
-from .least_drift import least_drift
-from .offer import Offer, offer, open_directions
-from .orders import LEAST_CHANGE_OVER, ORDERS, OrderName, ReadingOrder
-from .schedule import Completion, run_sheet
-from .search import (
+from ballplate.planning.information import pool_information
+from ballplate.planning.least_drift import least_drift
+from ballplate.planning.offer import Offer, offer, open_directions
+from ballplate.planning.orders import LEAST_CHANGE_OVER, ORDERS, OrderName, ReadingOrder
+from ballplate.planning.schedule import Completion, run_sheet
+from ballplate.planning.search import (
     GAIN,
     Found,
     Losses,
@@ -45,9 +41,17 @@ from .search import (
     starts,
     value,
 )
-from .selection import Campaign
-from .short_names import short_names
-from .whole_pool import pool_gap
+from ballplate.planning.selection import Campaign
+from ballplate.planning.short_names import short_names
+from ballplate.planning.whole_pool import pool_gap
+from ballplate.results.study import predict
+from ballplate.simulator.computing.processes import in_processes
+from ballplate.simulator.computing.rounding import comparable
+from ballplate.simulator.computing.steps import Report, counted, unreported
+from ballplate.simulator.computing.threads import single_threaded
+from ballplate.simulator.experiment.model import AtMost, Candidate, Experiment, Pool, Position
+from ballplate.simulator.inputs.messages import ExperimentError, refused
+from ballplate.simulator.inputs.settings import listing
 
 # Random starts of the search, in a large pool and in a small one.
 LARGE_STARTS, SMALL_STARTS = 24, 8

@@ -5,15 +5,14 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Literal
 
+from ballplate.results.fits import Fit
+from ballplate.results.study import fit
 from ballplate.simulator.experiment.layout import lay_out
-from ballplate.simulator.experiment.load import load
+from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.experiment.map_files import BINARY
 from ballplate.simulator.inputs.messages import refused
 from ballplate.simulator.inputs.yamltree import Mapping, read_tree
 from ballplate.simulator.readings.reading_files import read_readings
-
-from .fit import Fit
-from .study import fit
 
 
 def kind_of_file(path: Path) -> Literal["map", "machine", "experiment"]:

@@ -4,9 +4,9 @@ import random
 import xml.etree.ElementTree as etree
 
 import pytest
-from ballplate.simulator.inputs import xmltree
+from ballplate.extensions.laboratory import xmltree
+from ballplate.extensions.laboratory.xmltree import DEEPEST, Element, parse_xml, read_xml
 from ballplate.simulator.inputs.messages import ExperimentError
-from ballplate.simulator.inputs.xmltree import DEEPEST, Element, parse_xml, read_xml
 from ballplate.simulator.inputs.yamltree import GivenText
 
 TEXT = """<?xml version="1.0" encoding="{}"?>

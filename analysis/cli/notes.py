@@ -59,9 +59,8 @@ def told(options: Namespace) -> Iterator[None]:
     if not options.verbose:
         yield
         return
-    from ballplate.simulator.computing.versions import versions
-
-    from .outputs import inputs
+    from ballplate.cli.outputs import inputs
+    from ballplate.simulator.computing.library_versions import versions
 
     for name, version in versions():
         note(options, f"{name} {version}")

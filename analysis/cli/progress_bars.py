@@ -13,9 +13,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from ballplate.cli.bar import Bar
     from ballplate.simulator.computing.steps import ProgressStep
-
-    from .bar import Bar
 
 # Seconds between two lines where there is no terminal.
 LINE_INTERVAL = 5.0
@@ -45,14 +44,14 @@ class ProgressDisplay:
         if sys.stderr.isatty():
             self._draw(step)
         elif time.monotonic() - self.last >= LINE_INTERVAL:
-            from .bar import line
+            from ballplate.cli.bar import line
 
             self.last = time.monotonic()
             print(line(step, self.last - self.started), file=sys.stderr, flush=True)
 
     def _draw(self, step: ProgressStep) -> None:
         # Loaded only where it is seen.
-        from .bar import Bar, width
+        from ballplate.cli.bar import Bar, width
 
         if self.bar is None:
             self.bar = Bar(step.what, step.wanted, step.before)

@@ -11,9 +11,14 @@ from dataclasses import dataclass
 from pathlib import Path
 from xml.parsers import expat
 
-from .messages import ExperimentError, refused
-from .settings import shorten
-from .yamltree import GivenText, Mark, read_bytes
+from ballplate.simulator.inputs import (
+    ExperimentError,
+    GivenText,
+    Mark,
+    read_bytes,
+    refused,
+    shorten,
+)
 
 MOST_XML_BYTES = 50_000_000
 MOST_ELEMENTS = 500_000

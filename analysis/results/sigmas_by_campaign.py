@@ -8,6 +8,8 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+from ballplate.presentation.formatting import finite, number, picked
+from ballplate.results.adjustments import freedom_words
 from ballplate.simulator.design.arrays import Design
 from ballplate.simulator.design.observations.priors import Priors
 from ballplate.simulator.estimation.gauss_newton import (
@@ -22,9 +24,6 @@ from ballplate.simulator.machines.protocol import Array
 from ballplate.simulator.maps.fitted_map import LEAST_SIGMA
 from ballplate.simulator.maps.map_prior import EarlierCampaign
 from ballplate.simulator.readings.observed_readings import ObservedReadings
-
-from ..presentation.formatting import finite, number, picked
-from .adjustments import freedom_words
 
 # Level of the two-sided F-test of two sigmas, as Bozivich, Bancroft and Hartley (1956) recommend
 # before variances are pooled: smaller ones miss more differences of a few tenths, and intervals

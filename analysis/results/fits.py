@@ -8,33 +8,26 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from ballplate.simulator.computing.steps import Report, unreported
-from ballplate.simulator.design.arrays import Design
-from ballplate.simulator.estimation.gauss_newton import Solution
-from ballplate.simulator.inputs.arguments import ensure_one_of, ensure_positive, ensure_type
-from ballplate.simulator.inputs.extensions import optional_service, service
-from ballplate.simulator.inputs.settings import listing
-from ballplate.simulator.machines.protocol import Array
-from ballplate.simulator.maps.fit_verdict import LackOfFit
-from ballplate.simulator.maps.fitted_map import LEAST_SIGMA
-from ballplate.simulator.readings.observed_readings import ObservedReadings
-from ballplate.simulator.readings.point_files import ensure_points, probe_places
-
-from ..gross_errors.exact_values import has_exact_values
-from ..gross_errors.suspects import Diagnosis
-from ..gross_errors.wording import diagnosis_data, diagnosis_lines
-from ..presentation.files import write_file
-from ..presentation.formats import as_html
-from ..presentation.formatting import aligned, amount_of, finite, number, picked, to_uncertainty
-from ..presentation.result import FitResult
-from ..presentation.scene import box_edges, projection
-from ..presentation.vectors import Vectors, draw_vectors
-from ..rank.verdict import Verdict
-from ..uncertainty.summaries import Quantity, tasks_of
-from ..uncertainty.tasks import TaskUncertainty
-from .adjustments import Adjustment, few_degrees_of_freedom, freedom_words
-from .error_functions import EstimatedCurve, estimated_curves
-from .estimates import (
+from ballplate.gross_errors.exact_values import has_exact_values
+from ballplate.gross_errors.suspects import Diagnosis
+from ballplate.gross_errors.wording import diagnosis_data, diagnosis_lines
+from ballplate.presentation.files import write_file
+from ballplate.presentation.formats import as_html
+from ballplate.presentation.formatting import (
+    aligned,
+    amount_of,
+    finite,
+    number,
+    picked,
+    to_uncertainty,
+)
+from ballplate.presentation.result import FitResult
+from ballplate.presentation.scenes import box_edges, projection
+from ballplate.presentation.vectors import Vectors, draw_vectors
+from ballplate.rank.verdicts import Verdict
+from ballplate.results.adjustments import Adjustment, few_degrees_of_freedom, freedom_words
+from ballplate.results.error_functions import EstimatedCurve, estimated_curves
+from ballplate.results.estimates import (
     CorrectedPoints,
     EstimatedFunctions,
     ParameterEstimate,
@@ -42,9 +35,12 @@ from .estimates import (
     estimate_rows,
     labels,
 )
-from .groupings import GROUPINGS, Grouping
-from .map_of_fit import counted_twice, map_of
-from .parts import (
+from ballplate.results.groupings import GROUPINGS, Grouping
+from ballplate.results.map_of_fit import counted_twice, map_of
+from ballplate.results.plates import PlateCoordinates
+from ballplate.results.prediction import length_headline, rank_words
+from ballplate.results.residuals import Residual, reading_residuals, residual_groups
+from ballplate.results.text_blocks import (
     adjustment_data,
     adjustment_lines,
     map_lines,
@@ -58,17 +54,26 @@ from .parts import (
     verdict_data,
     verdict_lines,
 )
-from .plates import PlateCoordinates
-from .prediction import length_headline, rank_words
-from .residuals import Residual, reading_residuals, residual_groups
+from ballplate.simulator.computing.steps import Report, unreported
+from ballplate.simulator.design.arrays import Design
+from ballplate.simulator.estimation.gauss_newton import Solution
+from ballplate.simulator.inputs.arguments import ensure_one_of, ensure_positive, ensure_type
+from ballplate.simulator.inputs.extensions import optional_service, service
+from ballplate.simulator.inputs.settings import listing
+from ballplate.simulator.machines.protocol import Array
+from ballplate.simulator.maps.fit_verdict import LackOfFit
+from ballplate.simulator.maps.fitted_map import LEAST_SIGMA
+from ballplate.simulator.readings.observed_readings import ObservedReadings
+from ballplate.simulator.readings.point_files import ensure_points, probe_places
+from ballplate.uncertainty.summaries import Quantity, tasks_of
+from ballplate.uncertainty.tasks import TaskUncertainty
 
 if TYPE_CHECKING:
     import pandas
+    from ballplate.results.sigmas_by_campaign import CampaignSigmas
     from ballplate.simulator.experiment.model import Experiment
     from ballplate.simulator.maps.fitted_map import FittedMap
     from matplotlib.figure import Figure
-
-    from .campaign_sigmas import CampaignSigmas
 
 
 def lack_of_fit(squares: float, freedom: int, diagnosis: Diagnosis, untested: str) -> LackOfFit:

@@ -8,15 +8,14 @@ from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
+from ballplate.montecarlo.accumulator import Accumulator, accumulate
+from ballplate.montecarlo.figures import MonteCarloOutcome, outcome
 from ballplate.montecarlo.reference import Reference
 from ballplate.montecarlo.replicates import BATCH, estimate_batch
+from ballplate.montecarlo.targets import MonteCarloQuantity, targets
 from ballplate.simulator.computing.processes import in_processes
 from ballplate.simulator.computing.steps import ProgressStep, Report, unreported
 from ballplate.simulator.computing.threads import single_threaded
-
-from .accumulator import Accumulator, accumulate
-from .figures import MonteCarloOutcome, outcome
-from .targets import MonteCarloQuantity, targets
 
 # Batches of a task. A fixed number, so that sums are formed in the same order whoever forms them.
 BATCHES = 4

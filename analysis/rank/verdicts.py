@@ -11,6 +11,8 @@ from collections.abc import Collection
 from dataclasses import dataclass, replace
 
 import numpy as np
+from ballplate.rank.canonical import elementary_mixture, principal_directions
+from ballplate.rank.missing_bars import reasons, relative_changes
 from ballplate.simulator.computing.rounding import above, comparable, printable
 from ballplate.simulator.design.arrays import Design
 from ballplate.simulator.design.parameters import SharedLayout
@@ -18,9 +20,6 @@ from ballplate.simulator.estimation.linearisation import Linearisation
 from ballplate.simulator.geometry.motions import without_rigid_motion
 from ballplate.simulator.inputs.quantities import Target
 from ballplate.simulator.machines.protocol import Array, HasLines, Unit
-
-from .canonical import elementary_mixture, principal_directions
-from .missing_bars import reasons, relative_changes
 
 # Parts of a direction that move points by less than this fraction of its largest part are not told.
 NEGLIGIBLE = 0.01
