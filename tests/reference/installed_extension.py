@@ -11,7 +11,8 @@ import tomllib
 from pathlib import Path
 from typing import Any
 
-LABORATORY = Path(__file__).parents[1] / "extensions" / "installed" / "our-laboratory"
+TOP = Path(__file__).parents[2]
+LABORATORY = TOP / "tests" / "extensions" / "installed" / "our-laboratory"
 STARTED = """
 import contextlib, io, json, sys
 from pathlib import Path
