@@ -67,8 +67,14 @@ class OpenKinds:
         self, schema: CoreSchema, handler: GetJsonSchemaHandler
     ) -> dict[str, Any]:
         found = handler(schema)
-        for kind in names(self.provided, with_registered=True):
-            settings: Any = self.settings(kind)
+        more: list[Any] = [
+            self.settings(kind) for kind in names(self.provided, with_registered=True)
+        ]
+        for settings in more:
             settings.model_rebuild()
-            found.setdefault("oneOf", []).append(handler(settings.__pydantic_core_schema__))
+        if more:
+            # Members of a union are put among the definitions.
+            union = core_schema.union_schema([one.__pydantic_core_schema__ for one in more])
+            of_more = handler(union)
+            found.setdefault("oneOf", []).extend(of_more.get("anyOf", [of_more]))
         return found
