@@ -49,7 +49,6 @@ if TYPE_CHECKING:
         LENGTH_UNITS,
         QUANTITY,
         UNITS,
-        Angle,
         Length,
         LengthFunction,
         PositiveAngle,
