@@ -81,7 +81,8 @@ if TYPE_CHECKING:
     from ballplate.simulator.inputs.trust import Trust
     from ballplate.simulator.machines.protocol import ErrorModel
     from ballplate.simulator.maps.fitted_map import FittedMap
-    from ballplate.uncertainty.quantities import QUANTITIES, QuantityKind
+    from ballplate.uncertainty.kernel_quantities import QuantityKind
+    from ballplate.uncertainty.quantities import QUANTITIES
 
 __all__ = [
     "BallPlaces",
@@ -184,7 +185,8 @@ _KERNEL = {
     "ballplate.presentation.table": ("Table",),
     "ballplate.results.fits": ("Fit",),
     "ballplate.results.prediction": ("Prediction",),
-    "ballplate.uncertainty.quantities": ("QUANTITIES", "QuantityKind"),
+    "ballplate.uncertainty.kernel_quantities": ("QuantityKind",),
+    "ballplate.uncertainty.quantities": ("QUANTITIES",),
     "ballplate.simulator.computing.processes": ("in_processes",),
     "ballplate.simulator.design.arrays": ("Design", "Observations"),
     "ballplate.simulator.design.influences.protocol": ("Influence",),

@@ -18,6 +18,7 @@ from ballplate.simulator.inputs import extensions
 from ballplate.simulator.inputs.extensions import KINDS, Extension
 from ballplate.simulator.inputs.faces import public_names
 
+from tests.reference.installed_extension import LABORATORY
 from tests.test_architecture import EXTENSIONS, arrows, trees
 
 TOP = Path(__file__).parents[1]
@@ -43,8 +44,14 @@ BUILDS_ON = {
 
 # What has no table of public names: all of it is public, or only its path is asked for.
 WHOLE = ("ballplate", "ballplate.arguments", "ballplate.designs", "ballplate.simulator")
-# Public names that serve extensions of others.
-FOR_OTHERS = set[str]()
+# Public names that serve extensions of others, such as that of a laboratory.
+FOR_OTHERS = {
+    alias.name
+    for path in LABORATORY.rglob("*.py")
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+    if isinstance(node, ast.ImportFrom) and f"{node.module}".startswith("ballplate.")
+    for alias in node.names
+}
 
 
 def extension_of(path: Path) -> str:

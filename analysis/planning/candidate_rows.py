@@ -14,6 +14,7 @@ from functools import cached_property
 
 import numpy as np
 from ballplate.simulator.design.arrays import Design, Observations, State, nominal_state
+from ballplate.simulator.design.observations.balls import BallObservations
 from ballplate.simulator.design.observations.calibration import Calibration
 from ballplate.simulator.design.observations.joint_values import JointValues
 from ballplate.simulator.design.observations.lengths import (
@@ -247,11 +248,15 @@ def calibration_rows(
     :raises ExperimentError: it is of a length standard that has a certificate already, or more than
         one length.
     """
+    if not item.artefact:
+        return _of_observations(drawn, [item.observed(0)])
     artefact = drawn.design.artefacts.names.index(item.artefact)
-    if experiment.artefacts[item.artefact].role == "plate":
+    if experiment.is_observed(item):
         first = int(drawn.design.balls.of(artefact)[0])
         one, root = item.observed(first), item.root
-        return _of_observations(drawn, [one if root is None else JointValues.of([(one, root)])])
+        if root is not None and isinstance(one, BallObservations):
+            one = JointValues.of([(one, root)])
+        return _of_observations(drawn, [one])
     named = drawn.design.unknown_lengths.of(artefact)
     if len(named) != 1:
         text = (

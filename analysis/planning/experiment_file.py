@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 import yaml
+from ballplate.simulator.design.observations.kinds import is_of_machine
 from ballplate.simulator.experiment.model import Candidate, Experiment, Pool, Position
 from ballplate.simulator.experiment.pool_sections import TimesSettings
 from ballplate.simulator.experiment.pools import READING, SET_UP
@@ -149,11 +150,15 @@ def _content(
     )
     # Where there is one artefact, nothing says which.
     only = next(iter(said["artefacts"]))
-    items = [one for one in said.get("calibration", []) if str(one.get("artefact", only)) in placed]
+    items = [
+        one
+        for one in said.get("calibration", [])
+        if str(one.get("artefact", only)) in placed or is_of_machine(str(one.get("kind")))
+    ]
     items += [
         to_list(one.settings)
         for one in chosen
-        if not isinstance(one.item, Position) and one.item.artefact in placed
+        if not isinstance(one.item, Position) and one.item.artefact in {*placed, ""}
     ]
     said["artefacts"] = {name: one for name, one in said["artefacts"].items() if name in placed}
     said["positions"] = [to_list(one.settings) for one in positions]

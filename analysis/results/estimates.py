@@ -23,7 +23,7 @@ from ballplate.simulator.inputs.arguments import ensure_type
 from ballplate.simulator.inputs.settings import hint, number_of
 from ballplate.simulator.machines.protocol import Array, Integers, Unit
 
-from ..uncertainty.quantities import task_distances
+from ..uncertainty.kernel_quantities import task_distances
 
 ParameterKind = Literal["machine", "origin", "rotation", "offset", "length", "influence", "ball"]
 FunctionKind = Literal[ParameterKind, "task"]

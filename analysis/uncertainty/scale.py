@@ -120,7 +120,8 @@ def _groups(experiment: Experiment) -> Iterator[tuple[str, Experiment]]:
     sets = [[name] for name in names] if len(names) <= MOST_ARTEFACTS else [names]
     for some in sets:
         rest = tuple(item for item in experiment.calibration if item.artefact not in some)
-        yield f"certificates of {listing(some, 3)}", replace(experiment, calibration=rest)
+        words = listing((name or "the machine" for name in some), 3)
+        yield f"certificates of {words}", replace(experiment, calibration=rest)
     if experiment.priors:
         yield "priors", replace(experiment, priors=())
     certified = [probe.name for probe, *_ in experiment.certified_offsets]

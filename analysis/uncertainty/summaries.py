@@ -24,8 +24,9 @@ from ballplate.simulator.estimation.linearisation import Linearisation
 from ballplate.simulator.inputs.quantities import LengthFunction, Target
 from ballplate.simulator.machines.protocol import Array
 
+from .kernel_quantities import evaluation_points
 from .pairs import PairSummary, PairTile, all_pairs, pairs_of
-from .quantities import DESCRIPTIONS, QUANTITIES, evaluation_points, functions_of
+from .quantities import DESCRIPTIONS, QUANTITIES, functions_of
 from .tasks import TaskUncertainty, task_uncertainties
 
 

@@ -12,6 +12,7 @@ if TYPE_CHECKING:
         Design,
         Observations,
         Readings,
+        Rows,
         State,
         locations,
         measured,
@@ -40,6 +41,7 @@ if TYPE_CHECKING:
     from .influences.temperature import COLDEST, WARMEST, TemperaturesSettings
     from .lookup import Indices, References
     from .objects import SLIGHTLY, Flags, Tasks, Volume
+    from .observations.balls import BallObservations
     from .observations.calibration import (
         FAR_FROM_DRAWING,
         Calibration,

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import traceback
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any, ClassVar, Self, TypeVar, cast
@@ -329,6 +329,12 @@ class Observations(ABC):
 
     def __len__(self) -> int:
         return len(self.value)
+
+    @classmethod
+    def joined(cls, parts: Sequence[Observations]) -> Self:
+        """The observations of all parts, of this kind, together."""
+        columns = zip(*(vars(one).values() for one in parts), strict=True)
+        return cls(*(np.concatenate(column) for column in columns))
 
     @property
     def balls(self) -> Integers:

@@ -17,6 +17,7 @@ from ..inputs.settings import hint, listing, shorten
 from ..inputs.trust import UNKNOWN, Trust
 from ..inputs.yamltree import Sequence as SequenceNode
 from ..inputs.yamltree import written
+from .objects import Volume
 
 Floats = NDArray[np.float64]
 Indices = NDArray[np.intp]
@@ -38,7 +39,7 @@ class References:
 
     ``probes`` and ``artefact_names`` are names as written, also of entries that are wrong in
     themselves; ``artefacts`` and ``layouts`` have only right ones. ``dimension`` is None where the
-    file does not tell it.
+    file does not tell it, and so is the ``volume`` where it is wrong.
     """
 
     problems: Problems
@@ -49,6 +50,7 @@ class References:
     artefacts: dict[str, ArtefactSettings]
     layouts: dict[str, BallLayout]
     trust: Trust = UNKNOWN
+    volume: Volume | None = None
     tally: ReadingCount = field(default_factory=ReadingCount)
 
     def file(self, name: object) -> Path:
@@ -172,6 +174,16 @@ class References:
             f"has {len(point)} co-ordinates, but the experiment has {self.dimension} dimensions;"
             f" give {self.dimension}",
         )
+
+    def is_in_volume(self, point: Sequence[float], steps: Steps) -> bool:
+        """Tell whether a point has the right number of co-ordinates and lies in the measuring
+        volume, after saying where not.
+        """
+        if not self.has_dimension(point, steps):
+            return False
+        lower, upper = (point, point) if self.volume is None else self.volume.of_readings
+        is_inside = bool(np.all((lower <= np.array(point)) & (np.array(point) <= upper)))
+        return self.require(is_inside, steps, "is outside the measuring volume; correct it")
 
     def refuse_in_plane(self, *steps: Step) -> None:
         """Say that a key is one of three dimensions."""

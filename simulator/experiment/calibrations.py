@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
+from typing import Any
 
 import numpy as np
 
@@ -10,21 +11,26 @@ from ..design.lookup import References
 from ..design.observations.balls import BallObservations
 from ..design.observations.calibration import Calibration
 from ..design.observations.distances import DistancesSettings
-from ..design.observations.kinds import CALIBRATIONS
+from ..design.observations.kinds import read_calibration
 from ..design.observations.radius import RadiusSettings
 from ..geometry.artefacts import BallLayout, BryanGaugeSettings
 from ..inputs.messages import Steps
-from ..inputs.settings import Settings, listing
+from ..inputs.settings import listing
 from ..machines.protocol import Array
 
 
-def resolve_calibration(
-    settings: Settings, name: str | None, steps: Steps, references: References
-) -> Calibration | None:
-    """Return a calibration of the artefact named with its indices and values, or None after saying
-    what is wrong.
+def resolve_calibration(settings: Any, steps: Steps, references: References) -> Calibration | None:
+    """Return a calibration of an artefact, or of the machine, with its indices and values, or None
+    after saying what is wrong.
     """
-    artefact = references.artefact(name, steps)
+    if "artefact" not in type(settings).model_fields:
+        of_machine = read_calibration(settings, "", steps, references)
+        layout = next(iter(references.layouts.values()), None)
+        if of_machine is None or layout is None:
+            return None
+        text = _unnamed(of_machine.names(layout))
+        return of_machine if references.require(not text, steps, text) else None
+    artefact = references.artefact(settings.artefact, steps)
     if artefact is None or artefact not in references.layouts:
         return None
     is_gauge = isinstance(references.artefacts[artefact], BryanGaugeSettings)
@@ -40,25 +46,31 @@ def resolve_calibration(
         )
         references.problems.add((*steps, "kind"), text)
         return None
-    read = next(read for kind, read in CALIBRATIONS.items() if isinstance(settings, kind))
     # What a kind makes of balls that do not suit it is told below.
     with np.errstate(all="ignore"):
-        found = read(settings, artefact, steps, references)
+        found = read_calibration(settings, artefact, steps, references)
         text = "" if found is None or is_gauge else _unsuitable(found, references.layouts[artefact])
     return found if references.require(not text, steps, text) else None
+
+
+def _unnamed(pairs: list[tuple[str, str]]) -> str:
+    """What is wrong with the names of an item's values; empty if nothing is."""
+    names = [", ".join(pair) for pair in pairs]
+    if not names:
+        return "states no value; name at least one ball, or remove the item"
+    twice = [name for name, times in Counter(names).items() if times > 1]
+    return f"states {listing(twice)} more than once; remove all but one" if twice else ""
 
 
 def _unsuitable(item: Calibration, layout: BallLayout) -> str:
     """What is wrong with values that cannot be observed where balls are as drawn; empty if nothing
     is.
     """
+    if text := _unnamed(item.names(layout)):
+        return text
     names = [", ".join(one) for one in item.names(layout)]
-    if not names:
-        return "states no value; name at least one ball, or remove the item"
-    if len(set(names)) < len(names):
-        twice = [name for name, times in Counter(names).items() if times > 1]
-        return f"states {listing(twice)} more than once; remove all but one"
     given, extent = item.observed(0), float(np.ptp(layout.coordinates, axis=0).max())
+    assert isinstance(given, BallObservations)
     values, slopes = _at(given, layout.coordinates)
     # Each ball is moved otherwise, by what rounding may do.
     way = np.sin(np.arange(1.0, layout.coordinates.size + 1.0)).reshape(layout.coordinates.shape)

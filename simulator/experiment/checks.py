@@ -381,7 +381,7 @@ def check_use(
                 [
                     one.kind
                     for one in sections.entries("calibration").values()
-                    if one.artefact in (name, None)
+                    if getattr(one, "artefact", "") in (name, None)
                 ]
                 if calibration_count
                 else []
@@ -404,8 +404,9 @@ def check_calibration_read(
     """Report calibrated balls of a length standard that no position reads; of plates, all are
     reported.
     """
-    is_standard = references.artefacts[calibration.artefact].role == "length_standard"
-    if not isinstance(calibration, DistanceCalibration) or not is_standard:
+    if not isinstance(calibration, DistanceCalibration):
+        return
+    if references.artefacts[calibration.artefact].role != "length_standard":
         return
     if len(positions) < position_count:
         return
@@ -512,9 +513,9 @@ def check_lengths(
         problems.add(("positions",), text, of_key=True)
     for steps, calibration in calibrations.items():
         name = calibration.artefact
-        if references.artefacts[name].role == "length_standard" and isinstance(
-            calibration, DistanceCalibration
-        ):
+        if not isinstance(calibration, DistanceCalibration):
+            continue
+        if references.artefacts[name].role == "length_standard":
             times = sum(len(one.probes) for one in positions if one.artefact == name)
             if len(calibration.pairs) * times > MOST_LENGTHS:
                 text = (
@@ -529,8 +530,9 @@ def _check_joint_lengths(calibrations: Mapping[Steps, Calibration], references: 
     """Report length standards of which too many lengths have balls in common."""
     of_standards: dict[str, list[tuple[Steps, DistanceCalibration]]] = {}
     for steps, one in calibrations.items():
-        is_standard = references.artefacts[one.artefact].role == "length_standard"
-        if is_standard and isinstance(one, DistanceCalibration) and one.repeatability == "included":
+        if not isinstance(one, DistanceCalibration) or one.repeatability != "included":
+            continue
+        if references.artefacts[one.artefact].role == "length_standard":
             of_standards.setdefault(one.artefact, []).append((steps, one))
     for name, own in of_standards.items():
         ends = np.concatenate([one.pairs.ravel() for _, one in own])

@@ -6,6 +6,9 @@ from __future__ import annotations
 
 from typing import Any
 
+from pydantic import create_model
+
+from ..inputs.extensions import names, provided
 from .sections import ExperimentSettings
 
 DRAFT = "https://json-schema.org/draft/2020-12/schema"
@@ -13,7 +16,15 @@ DRAFT = "https://json-schema.org/draft/2020-12/schema"
 
 def schema() -> dict[str, Any]:
     """Return the JSON Schema (draft 2020-12) of an experiment file."""
-    found: dict[str, Any] = tidied(ExperimentSettings.model_json_schema())
+    keys: dict[str, Any] = {
+        key: (provided("sections", key, "SETTINGS"), None)
+        for key in names("sections", with_registered=True)
+    }
+    settings = ExperimentSettings
+    if keys:
+        about = ExperimentSettings.__doc__
+        settings = create_model("Experiment", __base__=ExperimentSettings, __doc__=about, **keys)
+    found: dict[str, Any] = tidied(settings.model_json_schema())
     # Variants may supply what the file itself leaves out, which no schema can tell.
     required = found.pop("required")
     # Positions may be chosen from a pool.

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..computing.rounding import comparable
-from ..design.arrays import Design, Readings
+from ..design.arrays import Design, Observations, Readings
 from ..design.objects import (
     Artefacts,
     Balls,
@@ -78,8 +78,8 @@ def lay_out(experiment: Experiment, is_pool: bool = False) -> Design:
     position_artefact = np.array([artefacts.index(place.artefact) for place in places], np.int64)
     rotations = np.array([place.pose.rotation for place in places])
     origins = np.array([place.pose.origin for place in places])
-    of_balls = _of_balls(experiment, first_ball)
-    distances, coordinates, *others = of_balls
+    stated = _stated(experiment, first_ball)
+    distances, coordinates, *others = stated
     lengths, unknown = standard_lengths(
         experiment, readings, first_ball, rotations, position_artefact, balls
     )
@@ -92,7 +92,7 @@ def lay_out(experiment: Experiment, is_pool: bool = False) -> Design:
         balls,
     )
     across = _across(experiment, rotations, position_artefact)
-    held = _held(laid, position_artefact, rotations, of_balls)
+    held = _held(laid, position_artefact, rotations, stated)
     if across is not None:
         read = np.flatnonzero(across >= 0)
         # Nothing is read of a shift across the plane and, of what is in it, of tilts.
@@ -242,20 +242,22 @@ def _readings(
     return Readings(ball, position, probe, repeats[order], uncertainty)
 
 
-def _of_balls(experiment: Experiment, first_ball: dict[str, int]) -> list[BallObservations]:
-    """Observations of the balls of plates, by kind: what all items of a kind state."""
-    parts: dict[type[BallObservations], list[BallObservations]] = {
+def _stated(experiment: Experiment, first_ball: dict[str, int]) -> list[Observations]:
+    """Observations of the balls of plates, and of the machine, by kind: what all items of a kind
+    state.
+    """
+    parts: dict[type[Observations], list[Observations]] = {
         CalibratedDistances: [no_distances()],
         CalibratedCoordinates: [no_coordinates()],
     }
     joint = []
     for item in experiment.calibration:
-        if experiment.artefacts[item.artefact].role == "plate":
-            one = item.observed(int(first_ball[item.artefact]))
+        if experiment.is_observed(item):
+            one = item.observed(int(first_ball.get(item.artefact, 0)))
             root = item.root
             if root is None:
                 parts.setdefault(type(one), []).append(one)
-            else:
+            elif isinstance(one, BallObservations):
                 joint.append((one, root))
     for name, artefact in experiment.artefacts.items():
         if artefact.flatness is not None:
@@ -270,7 +272,7 @@ def _held(
     balls: Balls,
     position_artefact: NDArray[np.int64],
     rotations: Array,
-    observations: Collection[BallObservations],
+    observations: Collection[Observations],
 ) -> Flags:
     """Which pose parameters are held (k, pose size).
 

@@ -33,6 +33,7 @@ from .exact_values import check_exact_values
 from .influences import resolve_influences
 from .machine import resolve_evaluation, resolve_machine, resolve_noise, target_of
 from .model import Experiment
+from .own_sections import needed_extensions, resolve_own_sections
 from .placements import resolve_position
 from .pool import placed_only
 from .pools import resolve_candidates, resolve_pool
@@ -177,6 +178,8 @@ def _build(
     machine = (
         resolve_machine(sections.get("machine"), problems) if sections.get("machine") else None
     )
+    if machine is not None:
+        references = replace(references, volume=machine.volume)
     probes = resolve_probes(sections, references)
     check_error_model(sections, machine, references)
     check_true_machine(sections, machine, references)
@@ -205,9 +208,7 @@ def _build(
     calibrations: dict[int, Calibration] = {}
     for key, settings in sections.entries("calibration").items():
         i = int(key)
-        calibration = resolve_calibration(
-            settings, settings.artefact, ("calibration", i), references
-        )
+        calibration = resolve_calibration(settings, ("calibration", i), references)
         if calibration is not None:
             calibrations[i] = calibration
             check_calibration_read(
@@ -224,6 +225,7 @@ def _build(
     check_derivatives(sections, machine, evaluation, references)
     check_readings(sections, references)
     stars = resolve_stars(sections, probes, references)
+    own_sections = resolve_own_sections(sections, references)
     if problems.messages or machine is None or evaluation is None:
         return None, problems.messages
     experiment = Experiment(
@@ -257,6 +259,8 @@ def _build(
         doubts=tuple(str(doubt) for doubt in problems.doubts),
         readings=sections.get("readings") or no_settings(),
         notes=tuple(str(note) for note in problems.notes),
+        sections=own_sections,
+        extensions=needed_extensions(sections),
     )
     return experiment if planning or pool is None else placed_only(experiment), []
 

@@ -228,9 +228,11 @@ class Experiment:
     nothing was stated. ``coverage_factor`` times the standard uncertainty is what targets are
     meant for. ``noise``: of simulated readings. ``pool``: what a plan may choose from. ``doubts``:
     what of the file is possible, and unlikely to be meant. ``notes``: what was found in its tables
-    by itself. ``readings``: where tables of readings are and how they are written. ``tree``: what
-    was written, without variants, ``mark``: where the experiment itself stands, and ``builder``:
-    what makes an experiment of a tree, with the ``trust`` that is in the file.
+    by itself. ``readings``: where tables of readings are and how they are written. ``sections``:
+    what is written under keys that extensions provide. ``extensions``: names of those that it
+    needs. ``tree``: what was written, without variants, ``mark``: where the experiment itself
+    stands, and ``builder``: what makes an experiment of a tree, with the ``trust`` that is in the
+    file.
     """
 
     title: str
@@ -263,6 +265,8 @@ class Experiment:
     doubts: tuple[str, ...] = ()
     readings: ReadingsSettings = field(default_factory=no_settings)
     notes: tuple[str, ...] = ()
+    sections: Mapping[str, Any] = field(default_factory=dict)
+    extensions: tuple[str, ...] = ()
 
     @property
     def dimension(self) -> int:
@@ -274,6 +278,16 @@ class Experiment:
         """The campaigns of all maps that are prior knowledge."""
         shares = (prior.share for prior in self.priors)
         return tuple(dict.fromkeys(one.campaign for one in shares if one is not None))
+
+    def layout_of(self, item: Calibration) -> BallLayout:
+        """The layout that an item of calibration names its values by; any where these are of the
+        machine, and need none.
+        """
+        return self.layouts[item.artefact or next(iter(self.layouts))]
+
+    def is_observed(self, item: Calibration) -> bool:
+        """Whether an item is observations of its own; lengths of standards are read."""
+        return not item.artefact or self.artefacts[item.artefact].role == "plate"
 
     @property
     def certified_offsets(self) -> list[tuple[Probe, int, float, float]]:

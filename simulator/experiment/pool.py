@@ -32,7 +32,9 @@ def placed_only(experiment: Experiment) -> Experiment:
         experiment,
         artefacts={name: one for name, one in experiment.artefacts.items() if name in placed},
         layouts={name: one for name, one in experiment.layouts.items() if name in placed},
-        calibration=tuple(one for one in experiment.calibration if one.artefact in placed),
+        calibration=tuple(
+            one for one in experiment.calibration if not one.artefact or one.artefact in placed
+        ),
         priors=tuple(
             one for one in experiment.priors if one.position is None or one.position in names
         ),

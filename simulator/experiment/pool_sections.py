@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cache
 from typing import TYPE_CHECKING, Annotated, Any, Literal, Self, TypeVar, Union
 
 from pydantic import Discriminator, Field, Tag, create_model, model_validator
@@ -10,6 +11,7 @@ from ..design.observations.coordinates import CalibratedBalls
 from ..design.observations.kinds import CALIBRATIONS
 from ..geometry.ball_layouts import BallNames, Name
 from ..geometry.positions import Axis
+from ..inputs.open_kinds import OpenKinds
 from ..inputs.quantities import Duration, Length
 from ..inputs.settings import Forms, NonEmpty, Settings, Several, Text
 from .position_sections import Count, LengthPerAxis, PositionSettings, ProbeNames, QuarterTurns
@@ -222,10 +224,16 @@ class _Priced(Settings):
     )
 
 
+@cache
 def _priced(kind: type[Settings]) -> Any:
     """Settings of a kind of calibration that can be had at a price."""
     words = f"{(kind.__doc__ or '').rstrip('.')}, to be had at a price."
-    return create_model(f"Priced{kind.__name__}", __base__=(_Priced, kind), __doc__=words)
+    return create_model(
+        f"Priced{kind.__name__}",
+        __base__=(_Priced, kind),
+        __doc__=words,
+        __module__=kind.__module__,
+    )
 
 
 if TYPE_CHECKING:
@@ -233,7 +241,7 @@ if TYPE_CHECKING:
 else:
     PricedSettings = Annotated[
         Union[tuple(_priced(kind) for kind in CALIBRATIONS)],  # noqa: UP007
-        Field(discriminator="kind"),
+        OpenKinds("calibrations", form=_priced),
     ]
 
 

@@ -221,11 +221,7 @@ def resolve_pool(
         settings = sections.get(*steps)
         if settings is None:
             references.check_written(steps)
-        item = (
-            resolve_calibration(settings, settings.artefact, steps, references)
-            if settings is not None
-            else None
-        )
+        item = resolve_calibration(settings, steps, references) if settings is not None else None
         if item is None:
             complete = False
             continue

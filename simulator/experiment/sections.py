@@ -257,6 +257,9 @@ class ExperimentSettings(Settings):
         ),
     )
     seed: Seed = Field(1, description="seed of simulated readings; default 1")
+    extensions: NonEmpty[Text] | None = Field(
+        None, description="names of extensions that the file needs besides those shipped"
+    )
     variants: Annotated[dict[Name, dict[Text, Any]], Field(min_length=1)] | None = Field(
         None,
         description=(

@@ -13,10 +13,12 @@ from pydantic import TypeAdapter, ValidationError
 from ..design.influences.kinds import AnyInfluence
 from ..design.observations.kinds import CalibrationSettings
 from ..geometry.artefacts import AnyArtefactSettings
+from ..inputs.extensions import names, provided
 from ..inputs.messages import Steps
 from ..inputs.problems import Problems
 from ..inputs.settings import Settings, describe, hint, nearest
 from ..inputs.validation import explain_in, type_adapter
+from ..inputs.wording import LACKING
 from ..inputs.yamltree import Mapping, Node, Scalar, Sequence, to_python
 from .pool_sections import GroupSettings, ListedSettings, PoolSettings, PricedSettings, is_group
 from .position_sections import PositionSettings
@@ -50,6 +52,9 @@ OTHER_FILES = {
         " or name it as a prior or true machine with kind: map in an experiment"
     ),
 }
+
+# Keys that are no extension's.
+KEYS = (*ExperimentSettings.model_fields, *OTHER_FILES, *ALIASES)
 
 # Values of nodes that are valid, by their types. Trees that differ in a few nodes, such as those of
 # a sweep's cells, share all others.
@@ -93,13 +98,18 @@ def validate_sections(root: Node, problems: Problems, planning: bool = False) ->
     problems.add_empty()
     absent = [name for name in fields if name not in root.items]
     misspelt = set()
-    for key in root.items:
-        if key not in fields:
-            text = f"unknown key; {hint(key, absent)}"
-            if key in ALIASES:
-                text = f"this is the earlier name of {ALIASES[key]}, which is there too; remove one"
-            problems.add((key,), text, True)
-            misspelt.add(nearest(key, absent))
+    for key, node in root.items.items():
+        if key in fields:
+            continue
+        settings = None if key in KEYS else provided("sections", key, "SETTINGS")
+        if settings is not None:
+            values |= _validate([type_adapter(settings)], node, (key,), problems)
+            continue
+        text = f"unknown key; {_known_key(key, absent)}"
+        if key in ALIASES:
+            text = f"this is the earlier name of {ALIASES[key]}, which is there too; remove one"
+        problems.add((key,), text, True)
+        misspelt.add(nearest(key, absent))
     for key, field in fields.items():
         node_or_none = root.items.get(key)
         if node_or_none is None and key in misspelt:
@@ -122,6 +132,12 @@ def validate_sections(root: Node, problems: Problems, planning: bool = False) ->
         elif key != "variants":
             values |= _validate(_adapters(key, node_or_none), node_or_none, (key,), problems)
     return Sections(values)
+
+
+def _known_key(key: str, absent: Iterable[str]) -> str:
+    """Which key was meant, those of extensions among them."""
+    meant = hint(key, (*absent, *names("sections", with_registered=True)))
+    return f"{meant}; {LACKING}" if meant.startswith("known") else meant
 
 
 def _validate_entries(key: str, node: Node, problems: Problems) -> dict[Steps, Any]:
@@ -224,6 +240,7 @@ def _adapters(key: str, node: Node) -> Iterator[TypeAdapter[Any]]:
 def _kinds(key: str) -> dict[str, type[Settings]]:
     """The classes among which the word `kind` chooses in a section or its entries, by that word."""
     union, *about = get_args(_form(key)) or (None,)
+    about += [one for field in about for one in getattr(field, "metadata", ())]
     if not any(getattr(one, "discriminator", None) == "kind" for one in about):
         return {}
     return {

@@ -8,6 +8,7 @@ from collections.abc import Sequence as AnySequence
 from dataclasses import replace
 from pathlib import Path
 
+from ..inputs.extensions import provider
 from ..inputs.messages import Message, format_path
 from ..inputs.problems import Problems
 from ..inputs.settings import describe, hint, listing
@@ -134,6 +135,7 @@ def override(root: Node, path: str, value: Node, mark: Mark) -> Node:
     if (
         len(steps) == 1
         and steps[0] not in ExperimentSettings.model_fields
+        and provider("sections", str(steps[0])) is None
         or steps[0] == "variants"
     ):
         known = [key for key in ExperimentSettings.model_fields if key != "variants"]

@@ -10,7 +10,7 @@ from ballplate.simulator.inputs.faces import lazily
 if TYPE_CHECKING:
     from .artefacts import BryanGaugeSettings, GridSettings, SquareSettings, TwoSpheresSettings
     from .axes import PlateAxes, axes_words, plate_axes
-    from .ball_layouts import ArtefactSettings, BallLayout, Name, pairs
+    from .ball_layouts import ArtefactSettings, BallLayout, Name, frozen, pairs
     from .grids import even_grid, grid_points
     from .listed_directions import directions
     from .motions import (

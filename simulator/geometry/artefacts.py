@@ -1,8 +1,8 @@
 """Artefacts: their keys in an experiment file, and the places of their balls in their own
 frames.
 
-A further kind of artefact is one file with a subclass of `ArtefactSettings` that has a ``layout``,
-and one line in ``ARTEFACTS``.
+A further kind of the kernel is one file with a subclass of `ArtefactSettings` that has a
+``layout``, and one line in ``ARTEFACTS``; extensions have their own.
 """
 
 from __future__ import annotations
@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Literal, Self, Union
 
 from pydantic import Discriminator, Field, Tag, model_validator
 
+from ..inputs.open_kinds import OpenKinds
 from ..inputs.quantities import PositiveLength
 from .ball_layouts import (
     MOST_BALLS,
@@ -196,7 +197,10 @@ ARTEFACTS: Mapping[str, type[ArtefactSettings]] = {
 if TYPE_CHECKING:
     AnyArtefactSettings = ArtefactSettings
 else:
-    AnyArtefactSettings = Annotated[Union[tuple(ARTEFACTS.values())], Field(discriminator="kind")]  # noqa: UP007
+    AnyArtefactSettings = Annotated[
+        Union[tuple(ARTEFACTS.values())],  # noqa: UP007
+        OpenKinds("artefacts", ArtefactSettings),
+    ]
 
 
 def _rectangle(

@@ -1,9 +1,10 @@
 """Extensions of ballplate, and what each of them provides by name.
 
-The kernel imports no extension. It asks here for a command, a function or a service by its name,
-and what provides it is loaded then. Extensions that are shipped stand in the table
-`ballplate.extensions.SHIPPED`; those that are installed besides register an `Extension` by the
-entry point `ballplate.extensions`, and are looked up only for names that the table does not have.
+The kernel imports no extension. It asks here for a command, a function, a service, a kind in a file
+or a quantity by its name, and what provides it is loaded then. Extensions that are shipped stand in
+the table `ballplate.extensions.SHIPPED`; those that are installed besides register an `Extension`
+by the entry point `ballplate.extensions`. They are looked up for names that neither the table nor
+the kernel has, and where all names are needed, as by `--help`, `schema` and tables of quantities.
 """
 
 from __future__ import annotations
@@ -26,7 +27,21 @@ if TYPE_CHECKING:
     from importlib.metadata import EntryPoint
 
 ENTRY_POINT = "ballplate.extensions"
-KINDS = ("commands", "functions", "services", "schemas")
+OF_FILES = ("artefacts", "calibrations", "error_models", "influences", "sections")
+KINDS = ("commands", "functions", "services", "schemas", *OF_FILES, "quantities")
+
+# Where the kernel's own names of a kind are; it has no services.
+_OWN = {
+    "commands": ("cli", "COMMANDS"),
+    "functions": ("", "__all__"),
+    "schemas": ("cli.schema", "SCHEMAS"),
+    "artefacts": ("simulator.geometry.artefacts", "ARTEFACTS"),
+    "calibrations": ("simulator.design.observations.kinds", "KINDS"),
+    "error_models": ("simulator.machines.settings", "KINDS"),
+    "influences": ("simulator.design.influences.kinds", "KINDS"),
+    "sections": ("simulator.experiment.structure", "KEYS"),
+    "quantities": ("uncertainty.kernel_quantities", "KERNEL_QUANTITIES"),
+}
 
 
 class MissingExtensionError(UnusableError):
@@ -57,6 +72,11 @@ class Extension:
 
     `functions` are those of `import ballplate`, `services` what the kernel asks for, and `schemas`
     kinds of files whose module has a function `schema`.
+
+    `artefacts`, `calibrations`, `error_models` and `influences` are kinds that a file names by
+    `kind`, and `sections` further keys of an experiment; their modules have SETTINGS, the class of
+    what is written there. Those of calibrations and, where they need one, sections have a function
+    `read`, and those of error models an ERROR_MODEL. A module of `quantities` has a QUANTITY.
     """
 
     name: str
@@ -65,6 +85,12 @@ class Extension:
     functions: Mapping[str, str] = field(default_factory=dict)
     services: Mapping[str, str] = field(default_factory=dict)
     schemas: Mapping[str, str] = field(default_factory=dict)
+    artefacts: Mapping[str, str] = field(default_factory=dict)
+    calibrations: Mapping[str, str] = field(default_factory=dict)
+    error_models: Mapping[str, str] = field(default_factory=dict)
+    influences: Mapping[str, str] = field(default_factory=dict)
+    sections: Mapping[str, str] = field(default_factory=dict)
+    quantities: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def is_installed(self) -> bool:
@@ -139,29 +165,30 @@ def _checked(extension: object, before: Sequence[Extension]) -> Extension:
     """
     if not isinstance(extension, Extension):
         raise UnusableError(f"{extension!r} is no Extension")
+    if extension.name in {other.name for other in (*shipped(), *before)}:
+        raise UnusableError(f"another extension has the name {extension.name} already")
     for kind in KINDS:
-        provided = getattr(extension, kind)
-        if not isinstance(provided, Mapping):
+        modules = getattr(extension, kind)
+        if not isinstance(modules, Mapping):
             raise UnusableError(f"its {kind} are no mapping of names to modules")
-        for name, module in provided.items():
+        for name, module in modules.items():
             if not isinstance(module, Command if kind == "commands" else str):
                 what = "Command" if kind == "commands" else "name of a module"
                 raise UnusableError(f"{name} ({kind}) is {module!r}, and no {what}")
-            owner = "ballplate" if name in _own(kind) else None
+            first = "ballplate" if name in _own(kind) else None
             for other in (*shipped(), *before):
-                owner = other.name if name in getattr(other, kind) else owner
-            if owner is not None:
-                raise UnusableError(f"{name} ({kind}) is provided by {owner} already")
+                first = other.name if name in getattr(other, kind) else first
+            if first is not None:
+                raise UnusableError(f"{name} ({kind}) is provided by {first} already")
     return extension
 
 
 def _own(kind: str) -> Collection[str]:
     """Names of a kind that the kernel has itself."""
-    if kind == "commands":
-        return tuple(import_module("ballplate.cli").COMMANDS)
-    if kind == "functions":
-        return tuple(import_module("ballplate").__all__)
-    return tuple(import_module("ballplate.cli.schema").SCHEMAS) if kind == "schemas" else ()
+    if kind not in _OWN:
+        return ()
+    module, table = _OWN[kind]
+    return tuple(getattr(import_module(f"ballplate.{module}".rstrip(".")), table))
 
 
 def _entry_points() -> Iterator[EntryPoint]:
@@ -236,6 +263,39 @@ def module_with(kind: str, name: str) -> ModuleType:
         raise KeyError(name)
     provided = getattr(extension, kind)[name]
     return extension.load(provided.module if isinstance(provided, Command) else provided)
+
+
+def provided(kind: str, name: str, attribute: str) -> Any | None:
+    """An attribute of the module that has what a name stands for; None where no extension
+    provides it.
+
+    :raises UnusableError: the module cannot be loaded, or lacks it.
+    """
+    extension = provider(kind, name)
+    if extension is None:
+        return None
+    module = getattr(extension, kind)[name]
+    found = getattr(extension.load(module), attribute, None)
+    if found is None:
+        text = f"module {module} has no {attribute}, which {kind} need"
+        raise UnusableError(f"extension {extension.name}: {text}")
+    return found
+
+
+def owner(class_: type) -> str | None:
+    """The name of the extension that a class is of; None of one of the kernel."""
+    module = f"{class_.__module__}."
+    if module.startswith("ballplate.") and not module.startswith(f"{ENTRY_POINT}."):
+        return None
+    extensions = (*shipped(), *registered().extensions)
+    return next((one.name for one in extensions if module.startswith(f"{one.package}.")), None)
+
+
+def is_installed(name: str) -> bool:
+    """Whether an extension is, by its name."""
+    return any(one.name == name for one in shipped()) or any(
+        one.name == name for one in registered().extensions
+    )
 
 
 def service(name: str) -> Any:

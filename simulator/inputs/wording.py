@@ -19,6 +19,8 @@ Schema = AnyMapping[str, Any]
 
 # Keys that may state an expanded uncertainty in place of a standard one.
 NOT_STANDARD = ("expanded_uncertainty", "uncertainty", "expanded", "u", "u95", "accuracy")
+# What may be missing where a kind or key is unknown.
+LACKING = "if an extension provides it, install that"
 # Kinds by other names that they have, in lower case without what is no letter.
 OTHER_NAMES = {
     **dict.fromkeys(("ballbar", "barbell", "dumbbell"), "two_spheres"),
@@ -149,7 +151,7 @@ def _explain(error: ErrorDetails, place: _Place, root: Node, schema: Schema) -> 
         return _unknown_key(steps, root, schema)
     if isinstance(node, Scalar) and node.value is None:
         return Explanation(steps, "empty; give a value, or leave it out")
-    if kind in ("union_tag_invalid", "union_tag_not_found"):
+    if kind in ("union_tag_invalid", "union_tag_not_found", "open_tag_invalid"):
         kinds = _allowed(schema, root, (*steps, "kind"))
         tag = child(node, "kind")
         if tag is None:
@@ -157,6 +159,8 @@ def _explain(error: ErrorDetails, place: _Place, root: Node, schema: Schema) -> 
         if isinstance(tag, Scalar) and tag.value is not None:
             other = OTHER_NAMES.get("".join(filter(str.isalnum, str(tag.value).casefold())))
             meant = f'write "{other}"' if other in kinds else hint(str(tag.value), kinds)
+            if kind == "open_tag_invalid" and meant.startswith("known"):
+                meant = f"{meant}; {LACKING}"
             return Explanation(
                 (*steps, "kind"), f'unknown kind "{shorten(str(tag.value))}"; {meant}'
             )

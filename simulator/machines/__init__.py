@@ -27,8 +27,18 @@ if TYPE_CHECKING:
     from .error_names import AXIS_ERRORS, SQUARENESS_ERRORS, SquarenessError
     from .kinematic import ErrorFunction, KinematicModel, carried_vectors, error_function
     from .kinematic_settings import FunctionsSettings, KinematicSettings
+    from .model_kinds import Corner, ErrorModelKind
     from .plane import PlaneModel
-    from .protocol import Array, ErrorModel, HasLines, Integers, Parameter, TrueMachine, Unit
+    from .protocol import (
+        Array,
+        ErrorModel,
+        HasLines,
+        Integers,
+        Parameter,
+        Reported,
+        TrueMachine,
+        Unit,
+    )
     from .settings import (
         ErrorModelSettings,
         MachineFileSettings,

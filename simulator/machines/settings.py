@@ -1,17 +1,19 @@
 """The keys of error models in a file, and their conversion into error models.
 
-A kind of error model is one file with its settings and an `ErrorModelKind`, and one entry of
-`ERROR_MODELS`.
+A kind of error model of the kernel is one file with its settings and an `ErrorModelKind`, and one
+entry of `ERROR_MODELS`; extensions have their own.
 """
 
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Any, Literal, Union
+from typing import Annotated, Any, Literal, Union, get_args
 
 from pydantic import Field, PrivateAttr, StringConstraints
 
+from ..inputs.extensions import owner, provided
 from ..inputs.messages import Steps
+from ..inputs.open_kinds import OpenKinds
 from ..inputs.settings import Settings, listing
 from ..inputs.trust import UNKNOWN, Trust
 from .custom import custom_model
@@ -157,12 +159,21 @@ ERROR_MODELS: tuple[ErrorModelKind, ...] = (
 
 _KINDS = {kind.settings: kind for kind in ERROR_MODELS}
 
-ErrorModelSettings = Annotated[Union[tuple(_KINDS)], Field(discriminator="kind")]  # type: ignore[valid-type]  # noqa: UP007
+KINDS = tuple(kind for one in _KINDS for kind in get_args(one.model_fields["kind"].annotation))
+
+ErrorModelSettings = Annotated[  # type: ignore[valid-type]
+    Union[tuple(_KINDS)],  # noqa: UP007
+    OpenKinds("error_models"),
+]
 
 
 def kind_of(settings: Settings) -> ErrorModelKind:
     """The kind of error model that the settings describe."""
-    return _KINDS[type(settings)]
+    if type(settings) in _KINDS:
+        return _KINDS[type(settings)]
+    kind: Any = provided("error_models", vars(settings)["kind"], "ERROR_MODEL")
+    assert isinstance(kind, ErrorModelKind)
+    return kind
 
 
 def with_defaults(settings: Settings, dimension: int) -> Settings:
@@ -172,7 +183,7 @@ def with_defaults(settings: Settings, dimension: int) -> Settings:
     >>> with_defaults(MetricSettings(kind="metric"), 3).scale
     'each'
     """
-    if type(settings) in _KINDS:
+    if type(settings) in _KINDS or owner(type(settings)) is not None:
         return kind_of(settings).with_defaults(settings, dimension)
     own = getattr(settings, "error_model", None)
     return (

@@ -1,11 +1,8 @@
-"""A quantity added as one entry in one file, U7, the body diagonals of the volume as the
-documentation has them: every command then has it.
-"""
+"""A quantity that an extension provides, U7, the body diagonals of the volume: every command has it."""
 
 from __future__ import annotations
 
 import json
-import shutil
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -17,17 +14,10 @@ from ballplate import experiment
 from ballplate.simulator.experiment.layout import lay_out
 
 from tests.reference import dense
-from tests.reference.package_copies import package_copy, said_by_copy
+from tests.reference.installed_extension import install, said_with
 from tests.reference.small_quickstart import small_sections
 
 TOP = Path(__file__).parents[2]
-
-PAGE = (TOP / "docs" / "how-to" / "extend.md").read_text(encoding="utf-8")
-FUNCTION, ENTRY = (
-    part.split("```\n")[0] for part in PAGE.partition("**A quantity**")[2].split("```python\n")[1:3]
-)
-START = "QUANTITIES: dict"
-END = "}\n\n\n# What all quantities"
 
 SWEEP = """\
 title: repeatability
@@ -81,33 +71,20 @@ print(json.dumps({
 """
 
 
-def package(folder: Path) -> Path:
-    """A copy of the package, and the file of quantities in it."""
-    return package_copy(folder) / "uncertainty" / "quantities.py"
-
-
-def told(folder: Path) -> dict[str, Any]:
-    """What the package in a folder says."""
-    work = folder / "work"
-    shutil.rmtree(work, ignore_errors=True)
+def told(installed: Path | None, work: Path) -> dict[str, Any]:
+    """What is said with the extensions that are installed in a folder."""
     work.mkdir()
     (work / "base.yaml").write_text(yaml.safe_dump(small_sections(20, 1)), encoding="utf-8")
     (work / "sweep.yaml").write_text(SWEEP)
-    return said_by_copy(folder, SCRIPT, work)
+    return said_with(installed, SCRIPT, work)
 
 
 @pytest.fixture(scope="module")
 def both(tmp_path_factory: pytest.TempPathFactory) -> tuple[dict[str, Any], dict[str, Any]]:
-    """What is told with the entry, and after it has been removed."""
+    """What is told with the extension, and without it."""
     folder = tmp_path_factory.mktemp("package")
-    file = package(folder)
-    text = file.read_text(encoding="utf-8")
-    assert text.count(END) == text.count(START) == 1
-    with_function = text.replace(START, f"{FUNCTION}\n\n{START}")
-    file.write_text(with_function.replace(END, ENTRY + END), encoding="utf-8")
-    added = told(folder)
-    file.write_text(text, encoding="utf-8")
-    return added, told(folder)
+    added = told(install(folder), folder / "with")
+    return added, told(None, folder / "without")
 
 
 @cache
@@ -182,7 +159,7 @@ def test_sweeps_reports_and_the_schema_have_it(both: tuple[dict[str, Any], dict[
     assert "U7 maximum" in added["report"]
 
 
-def test_nothing_of_it_is_left_once_the_entry_is_gone(
+def test_nothing_of_it_is_left_without_the_extension(
     both: tuple[dict[str, Any], dict[str, Any]],
 ) -> None:
     added, removed = both

@@ -19,8 +19,8 @@ from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.inputs.quantities import Target
+from ballplate.uncertainty.kernel_quantities import task_distances
 from ballplate.uncertainty.pairs import pairs_of
-from ballplate.uncertainty.quantities import task_distances
 from ballplate.uncertainty.summaries import uncertainties
 from ballplate.uncertainty.tasks import task_uncertainties
 

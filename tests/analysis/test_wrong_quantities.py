@@ -14,7 +14,8 @@ from ballplate.planning.campaign_choice import Request, campaign
 from ballplate.simulator.design.arrays import Design
 from ballplate.simulator.estimation.functions import Coordinates, Distances, Parameters
 from ballplate.simulator.experiment.loading import with_pool
-from ballplate.uncertainty.quantities import QUANTITIES, QuantityKind, evaluation_points
+from ballplate.uncertainty.kernel_quantities import QuantityKind, evaluation_points
+from ballplate.uncertainty.quantities import QUANTITIES
 
 PAIR = np.array([[0, 1]])
 POOL = {

@@ -140,9 +140,14 @@ def test_the_file_uses_every_key(complete: Experiment) -> None:
         if isinstance(node, Mapping)
         for key in node.items
     }
-    # Pools and influence quantities, which a length standard does not go with, have tests of their
+    # Pools, extensions and influence quantities, which a length standard does not go with, have tests of their
     # own.
-    assert set(ExperimentSettings.model_fields) - used == {"variants", "pool", "influences"}
+    assert set(ExperimentSettings.model_fields) - used == {
+        "extensions",
+        "influences",
+        "pool",
+        "variants",
+    }
     for key in (
         "corner",
         "centre",

@@ -1,5 +1,5 @@
-"""An artefact added as one file and one line, a ring of balls as the documentation has it: every
-command then knows it, and the pairs of balls that it names.
+"""An artefact that an extension provides, a ring of balls: every command knows it, and the pairs of
+balls that it names.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from ballplate.simulator.experiment.layout import lay_out
 from scipy.optimize import least_squares
 
 from tests.reference import dense
-from tests.reference.package_copies import documented, package_copy, said_by_copy
+from tests.reference.installed_extension import install, said_with
 
 TOP = Path(__file__).parents[2]
 
@@ -75,15 +75,6 @@ print(json.dumps({
 }))
 """
 
-# A kind whose layout contradicts itself.
-TWINS = """
-class TwinsSettings(ArtefactSettings):
-    kind: Literal["twins"]
-
-    def layout(self) -> BallLayout:
-        return BallLayout(("a", "a"), frozen([[0, 0, 0], [1, 0, 0]]))
-"""
-
 
 def sections(artefact: dict[str, Any], pairs: Any = "diameters") -> dict[str, Any]:
     """The quickstart with another plate, and few coefficients and points."""
@@ -96,20 +87,8 @@ def sections(artefact: dict[str, Any], pairs: Any = "diameters") -> dict[str, An
 
 @pytest.fixture(scope="module")
 def told(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
-    """What a copy of the package says that has the file and the lines of the documentation."""
-    folder = tmp_path_factory.mktemp("package")
-    package, (file, entry) = package_copy(folder), documented("**An artefact**")
-    room = package / "simulator" / "geometry"
-    (room / "ring.py").write_text(file + "\n" + TWINS, encoding="utf-8")
-    kinds = (room / "artefacts.py").read_text(encoding="utf-8")
-    line, registered = entry.strip().split("\n\n")
-    for mark, new in (
-        ("from .directions import", f"{line}, TwinsSettings\n"),
-        ('    "sphere": ', f'{registered}\n    "twins": TwinsSettings,\n'),
-    ):
-        assert kinds.count(mark) == 1
-        kinds = kinds.replace(mark, new + mark)
-    (room / "artefacts.py").write_text(kinds, encoding="utf-8")
+    """What is said where the extension is installed."""
+    folder = install(tmp_path_factory.mktemp("package"))
     work = folder / "work"
     work.mkdir()
     ring = {"kind": "ring", "balls": BALLS, "diameter": "300 mm"}
@@ -123,7 +102,7 @@ def told(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
     }.items():
         text = yaml.safe_dump(given, allow_unicode=True)
         (work / f"{name}.yaml").write_text(text, encoding="utf-8")
-    return said_by_copy(folder, SCRIPT, work)
+    return said_with(folder, SCRIPT, work)
 
 
 @pytest.fixture(scope="module")

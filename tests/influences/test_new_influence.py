@@ -1,5 +1,5 @@
-"""A kind of influence quantity added as one file and one line, styli that are longer than stated as
-the documentation has them: every command then knows it.
+"""A kind of influence quantity that an extension provides, styli that are longer than stated: every
+command knows it.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.loading import load
 
 from tests.reference import dense
-from tests.reference.package_copies import documented, package_copy, said_by_copy
+from tests.reference.installed_extension import install, said_with
 from tests.reference.small_quickstart import small_sections
 
 TOP = Path(__file__).parents[2]
@@ -59,17 +59,8 @@ def sections(*influences: dict[str, Any]) -> str:
 
 @pytest.fixture(scope="module")
 def told(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
-    """What a copy of the package says that has the file and the line of the documentation."""
-    folder = tmp_path_factory.mktemp("package")
-    package, (file, entry) = package_copy(folder), documented("**An influence quantity**")
-    rooms = package / "simulator" / "design" / "influences"
-    (rooms / "styli.py").write_text(file, encoding="utf-8")
-    kinds = (rooms / "kinds.py").read_text(encoding="utf-8")
-    line, registered = entry.strip().split("\n\n")
-    for mark, new in (("from .temperature", line), ("    TemperaturesSettings", registered)):
-        assert kinds.count(mark) == 1
-        kinds = kinds.replace(mark, new.rstrip() + "\n" + mark)
-    (rooms / "kinds.py").write_text(kinds, encoding="utf-8")
+    """What is said where the extension is installed."""
+    folder = install(tmp_path_factory.mktemp("package"))
     work = folder / "work"
     work.mkdir()
     for name, influences in {
@@ -78,7 +69,7 @@ def told(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
         "wrong": [STYLI | {"value": "1 um"}],
     }.items():
         (work / f"{name}.yaml").write_text(sections(*influences), encoding="utf-8")
-    return said_by_copy(folder, SCRIPT, work)
+    return said_with(folder, SCRIPT, work)
 
 
 @pytest.fixture(scope="module")

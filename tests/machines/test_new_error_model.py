@@ -1,4 +1,4 @@
-"""The error model of docs/how-to/extend.md, one file and one line, in a copy of the package."""
+"""An error model that an extension provides, one ratio of all scales."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ from typing import Any
 import ballplate as bp
 import pytest
 
+from tests.reference.installed_extension import install, said_with
 from tests.reference.model_options import estimate
-from tests.reference.package_copies import documented, package_copy, said_by_copy
 
 SCRIPT = """
 import json, sys
@@ -53,19 +53,8 @@ def experiment(dimension: int) -> dict[str, Any]:
     }
 
 
-def test_one_file_and_one_line_make_an_error_model(tmp_path: Path) -> None:
-    package = package_copy(tmp_path)
-    machines = package / "simulator" / "machines"
-    file, entry = documented("**An error model**")
-    (machines / "stretched.py").write_text(file, encoding="utf-8")
-    settings = (machines / "settings.py").read_text(encoding="utf-8")
-    imported, line = entry.strip().split("\n\n")
-    after, before = "from .spatial_metric import", "    KINEMATIC,\n"
-    assert after in settings and before in settings
-    settings = settings.replace(after, f"{imported}\n{after}")
-    settings = settings.replace(before, f"{before}{line}\n")
-    (machines / "settings.py").write_text(settings, encoding="utf-8")
-    said = said_by_copy(tmp_path, SCRIPT, *(json.dumps(experiment(d)) for d in (2, 3)))
+def test_an_error_model_of_an_extension(tmp_path: Path) -> None:
+    said = said_with(install(tmp_path), SCRIPT, *(json.dumps(experiment(d)) for d in (2, 3)))
     for dimension in (2, 3):
         # The design of the package itself, with another error model: its readings are the same.
         other = {"error_model": {"kind": "metric"}, "true_machine": {"kind": "zero"}}

@@ -31,7 +31,8 @@ from ballplate.simulator.estimation.functions import Parameters
 from ballplate.simulator.geometry.motions import vector_from_rotation
 from ballplate.simulator.machines.protocol import ErrorModel
 from ballplate.simulator.machines.spatial_metric import SpatialMetricModel
-from ballplate.uncertainty.quantities import QUANTITIES, QuantityKind
+from ballplate.uncertainty.kernel_quantities import QuantityKind
+from ballplate.uncertainty.quantities import QUANTITIES
 from numpy.typing import NDArray
 from scipy import stats
 

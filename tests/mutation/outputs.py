@@ -19,7 +19,7 @@ from typing import Any
 from tests.mutation.forks import change, in_fork, probed
 from tests.mutation.mutants import Mutant
 from tests.reference.copies import copy_file, copy_tree
-from tests.reference.package_copies import TOP
+from tests.reference.installed_extension import TOP
 from tests.robustness.kit import make_kit
 from tests.robustness.recipes import RECIPES
 from tests.robustness.worker import outcome

@@ -18,7 +18,7 @@ from tests.mutation.forks import change, in_fork
 from tests.mutation.mutants import KINDS, mutants, mutated, source_of
 from tests.mutation.outputs import lasting
 from tests.mutation.score import Outcome, summary
-from tests.reference.package_copies import TOP
+from tests.reference.installed_extension import TOP
 
 SOURCE = """
 def share(values: list[float], limit: float) -> float:

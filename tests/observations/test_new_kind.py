@@ -1,5 +1,5 @@
-"""A kind of observation added as one file and one line, heights of balls above a plane as the
-documentation has them: every command then knows it.
+"""Kinds of observation that an extension provides, heights of balls above a plane and angles at
+balls: every command knows them.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from scipy.optimize import least_squares
 from scipy.stats import norm
 
 from tests.reference import dense
-from tests.reference.package_copies import documented, package_copy, said_by_copy
+from tests.reference.installed_extension import install, said_with
 
 TOP = Path(__file__).parents[2]
 
@@ -41,78 +41,6 @@ CORNER = {
 }
 # Indices of the balls of the angle, its vertex in the middle, and 0.05 arcsec in radians.
 LEGS, ANGLE_UNCERTAINTY = (4, 0, 20), 0.05 * np.pi / 180 / 3600
-ANGLES = """
-from dataclasses import dataclass
-from typing import ClassVar, Literal
-
-import numpy as np
-
-from ...geometry.artefacts import Name
-from ...inputs.quantities import PositiveAngle
-from ...inputs.settings import Settings
-from .balls import BallObservations
-from .calibration import Calibration
-
-
-@dataclass(frozen=True)
-class Angles(BallObservations):
-    word: ClassVar[str] = "angle"
-    measured_in: ClassVar[str] = "rad"
-    ends: np.ndarray
-    value: np.ndarray
-    uncertainty: np.ndarray
-
-    @property
-    def balls(self):
-        return self.ends
-
-    def values(self, balls):
-        first, vertex, second = np.moveaxis(balls[..., self.ends, :], -2, 0)
-        legs = [first - vertex, second - vertex]
-        lengths = [np.linalg.norm(leg, axis=-1, keepdims=True) for leg in legs]
-        one, other = (leg / length for leg, length in zip(legs, lengths))
-        cosine = (one * other).sum(axis=-1, keepdims=True)
-        sine = np.sqrt(1.0 - cosine**2)
-        by_first = (cosine * one - other) / (sine * lengths[0])
-        by_second = (cosine * other - one) / (sine * lengths[1])
-        slopes = np.stack([by_first, -by_first - by_second, by_second], axis=-2)
-        return np.arccos(cosine[..., 0]), slopes
-
-    def name(self, design, k):
-        return f"angle at ball {design.ball_label(int(self.ends[k, 1]))}"
-
-
-@dataclass(frozen=True, eq=False)
-class CornerCalibration(Calibration):
-    artefact: str
-    ends: np.ndarray
-    values: np.ndarray
-    certified: bool
-    standard_uncertainty: float
-    kind: str = "corner"
-
-    def observed(self, first):
-        uncertainty = np.full(len(self.ends), self.standard_uncertainty)
-        return Angles(self.ends + first, self.values, uncertainty)
-
-    def names(self, layout):
-        return [(layout.names[ends[1]], "angle") for ends in self.ends]
-
-
-class CornerSettings(Settings):
-    kind: Literal["corner"]
-    artefact: Name | None = None
-    balls: tuple[Name, ...]
-    standard_uncertainty: PositiveAngle
-
-
-def read_corner(settings, artefact, steps, references):
-    layout = references.layouts[artefact]
-    found = [layout.names.index(ball) for ball in settings.balls]
-    ends = np.array(found, np.int64).reshape(-1, 3)
-    values = Angles(ends, np.zeros(0), np.zeros(0)).values(layout.coordinates)[0]
-    return CornerCalibration(artefact, ends, values, False, settings.standard_uncertainty)
-"""
 ONE_HEIGHT = HEIGHTS | {"values": ["0 mm"], "balls": ["r1c5"]}
 REFUSED = {
     "collinear plane": ONE_HEIGHT | {"plane": ["r1c1", "r1c2", "r1c4"]},
@@ -232,23 +160,8 @@ def standard() -> str:
 
 @pytest.fixture(scope="module")
 def told(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
-    """What a copy of the package says that has the file and the line of the documentation."""
-    folder = tmp_path_factory.mktemp("package")
-    package, (file, entry) = package_copy(folder), documented("**A kind of observation**")
-    rooms = package / "simulator" / "design" / "observations"
-    (rooms / "flatness.py").write_text(file, encoding="utf-8")
-    kinds = (rooms / "kinds.py").read_text(encoding="utf-8")
-    line, registered = entry.strip().split("\n\n")
-    for mark, new in (
-        ("from .radius import", line + "\n"),
-        ("    RadiusSettings: read", registered),
-    ):
-        assert kinds.count(mark) == 1
-        kinds = kinds.replace(mark, new.rstrip() + "\n" + mark)
-    (rooms / "angles.py").write_text(ANGLES, encoding="utf-8")
-    kinds = kinds.replace(line, line + "\nfrom .angles import CornerSettings, read_corner")
-    kinds = kinds.replace(registered, registered + "\n    CornerSettings: read_corner,")
-    (rooms / "kinds.py").write_text(kinds, encoding="utf-8")
+    """What is said where the extension is installed."""
+    folder = install(tmp_path_factory.mktemp("package"))
     work = folder / "work"
     work.mkdir()
     priced = {"name": "heights", "price": "1 h", **HEIGHTS}
@@ -271,7 +184,7 @@ def told(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
     }.items():
         (work / f"{name}.yaml").write_text(text, encoding="utf-8")
     (work / "goal.txt").write_text(f"U6 average {1e6 * angle_goal():.6f} um", encoding="utf-8")
-    return said_by_copy(folder, SCRIPT, work, *REFUSED, "length standard")
+    return said_with(folder, SCRIPT, work, *REFUSED, "length standard")
 
 
 def problem(**changes: Any) -> dense.Problem:

@@ -14,6 +14,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
+from itertools import chain
 from pathlib import Path
 from typing import TextIO
 
@@ -62,7 +63,7 @@ def certified_values(experiment: Experiment) -> list[CertifiedValue]:
     found = [
         replace(one, item=format_path(("calibration", k)))
         for k, item in enumerate(experiment.calibration)
-        for one in item.certified_values(experiment.layouts[item.artefact])
+        for one in item.certified_values(experiment.layout_of(item))
     ]
     for probe, axis, value, u in experiment.certified_offsets:
         item = format_path(("probes", probe.name))
@@ -95,7 +96,7 @@ def with_values(experiment: Experiment, values: Array) -> Experiment:
         return part
 
     calibration = tuple(
-        item.with_values(taken(len(list(item.certified_values(experiment.layouts[item.artefact])))))
+        item.with_values(taken(len(list(item.certified_values(experiment.layout_of(item))))))
         for item in experiment.calibration
     )
     probes = dict(experiment.probes)
@@ -126,8 +127,11 @@ def drawn_values(
     first_ball = {
         name: int(np.flatnonzero(design.balls.artefact == names.index(name))[0]) for name in names
     }
-    for item in experiment.calibration:
-        true += item.true_values(truth.balls, first_ball[item.artefact]).tolist()
+    of_items = [
+        item.true_values(design, truth, model, first_ball.get(item.artefact, 0)).tolist()
+        for item in experiment.calibration
+    ]
+    true += chain.from_iterable(of_items)
     # Those of offsets come last in the design, and first here.
     priors = design.of(Priors).true_values(design, truth, model)
     priors = priors[design.of(Priors).of_influence < 0]
@@ -141,8 +145,8 @@ def drawn_values(
     uncertainty = np.array([one.standard_uncertainty for one in certified_values(experiment)])
     normal = generator.standard_normal(len(true))
     errors, at = uncertainty * normal, 0
-    for item in experiment.calibration:
-        part = slice(at, at + len(item.true_values(truth.balls, first_ball[item.artefact])))
+    for item, own in zip(experiment.calibration, of_items, strict=True):
+        part = slice(at, at + len(own))
         errors[part] = item.drawn_errors(normal[part], uncertainty[part])
         at = part.stop
     return np.asarray(np.array(true, float) + errors)
@@ -254,7 +258,7 @@ def read_certificate(path: Path | GivenText, experiment: Experiment) -> Experime
 def _wrong_together(found: Experiment) -> Iterator[str]:
     """What is wrong with certified values of which each is possible."""
     for one in found.calibration:
-        if text := one.doubt(found.layouts[one.artefact]):
+        if text := one.doubt(found.layout_of(one)):
             yield text
     plates = [name for name, one in found.artefacts.items() if one.role != "length_standard"]
     calibrations = dict(enumerate(found.calibration))

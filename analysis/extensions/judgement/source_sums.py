@@ -123,11 +123,11 @@ def _names(design: Design, one: Observations, experiment: Experiment) -> list[st
         return [f"stars[{k}]" for k in one.star.tolist()]
     names: list[str] = []
     for k, item in enumerate(experiment.calibration):
-        if experiment.artefacts[item.artefact].role != "plate":
+        if not experiment.is_observed(item):
             continue
         given = item.observed(0)
         if isinstance(one, type(given) if item.root is None else JointValues):
-            names += [f"calibration[{k}]: {item.kind} of {item.artefact}"] * len(given)
+            names += [f"calibration[{k}]: {item.kind} of {item.subject}"] * len(given)
     others = kinds_of_rows(design, one)[len(names) :]
     if isinstance(one, CalibratedCoordinates):
         # What no item states is how flat artefacts that are read in their plane are taken to be.

@@ -48,7 +48,7 @@ def assumptions(experiment: Experiment, parameters: int) -> list[tuple[str, str]
 
 
 def _certificates(experiment: Experiment) -> str:
-    told = [f"{one.kind} of {one.artefact} ({one.size})" for one in experiment.calibration]
+    told = [f"{one.kind} of {one.subject} ({one.size})" for one in experiment.calibration]
     told += [f"prior of {one.name}" for one in experiment.priors]
     return listing(told) or "none: nothing is known of artefacts but what the readings say"
 

@@ -58,7 +58,7 @@ def better_certificates(experiment: Experiment) -> Iterator[Change]:
         if not can_be_written(item):
             continue
         for factor in (0.5, 0.1):
-            better, layout = item.times_as_uncertain(factor), experiment.layouts[item.artefact]
+            better, layout = item.times_as_uncertain(factor), experiment.layout_of(item)
             least = min(one.standard_uncertainty for one in better.certified_values(layout))
             if not least:
                 # What is exact cannot be calibrated better.

@@ -53,7 +53,11 @@ LEFT_OUT = (
 )
 # The same, of single classes: how the laboratory's tables are read; and functions in Python, which
 # the text of their module and their options tell.
-LEFT_OUT_OF = {"Experiment": ("readings",), "Prior": ("data",), "PythonCalibration": ("functions",)}
+LEFT_OUT_OF = {
+    "Experiment": ("readings", "extensions"),
+    "Prior": ("data",),
+    "PythonCalibration": ("functions",),
+}
 
 # Names of fields in the fingerprints that stores hold, where the field has another name today.
 EARLIER_NAMES = {"target_uncertainty": "target_accuracy"}  # earlier name second
@@ -61,7 +65,7 @@ EARLIER_NAMES = {"target_uncertainty": "target_accuracy"}  # earlier name second
 # Keys that files did not have at first, by what has them: where they are left out, all is as it was
 # without them.
 LATER_KEYS = {
-    "Experiment": ("influences", "noise", "stars"),
+    "Experiment": ("influences", "noise", "stars", "sections"),
     "ArtefactSettings": ("reads", "flatness"),
     "DistanceCalibration": ("root",),
     "CoordinateCalibration": ("root",),

@@ -1,7 +1,7 @@
 """All kinds of influence quantities that a file may state.
 
-A further kind is a file beside these, with its settings and what these come to in a design, and one
-line in `INFLUENCES`.
+A further kind of the kernel is a file beside these, with its settings and what these come to in a
+design, and one line in `INFLUENCES`; extensions have their own.
 """
 
 from __future__ import annotations
@@ -9,9 +9,8 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import TYPE_CHECKING, Annotated, Union, get_args
 
-from pydantic import Field
-
 from ...inputs.messages import refused
+from ...inputs.open_kinds import OpenKinds
 from .drift import DriftSettings
 from .position_scale import PositionScaleSettings
 from .probing import ProbingSettings
@@ -50,7 +49,12 @@ def once_each(classes: Iterable[type[InfluenceSettings]]) -> None:
 
 once_each(INFLUENCES)
 
+KINDS = tuple(kind for one in INFLUENCES for kind in get_args(one.model_fields["kind"].annotation))
+
 if TYPE_CHECKING:
     AnyInfluence = InfluenceSettings
 else:
-    AnyInfluence = Annotated[Union[INFLUENCES], Field(discriminator="kind")]  # noqa: UP007
+    AnyInfluence = Annotated[
+        Union[INFLUENCES],  # noqa: UP007
+        OpenKinds("influences", InfluenceSettings),
+    ]

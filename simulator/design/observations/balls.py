@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Sequence
 from typing import Self
 
 import numpy as np
@@ -35,12 +34,6 @@ class BallObservations(Observations):
 
     def loosened(self, least: float) -> Self:
         return self.given(uncertainty=np.maximum(self.uncertainty, least))
-
-    @classmethod
-    def joined(cls, parts: Sequence[BallObservations]) -> Self:
-        """The observations of all parts together."""
-        columns = zip(*(vars(one).values() for one in parts), strict=True)
-        return cls(*(np.concatenate(column) for column in columns))
 
     def rows(self, design: Design, state: State, x: Array | None) -> Rows:
         value, slope = self.values(state.balls)

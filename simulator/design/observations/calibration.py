@@ -10,7 +10,8 @@ from typing import Any, ClassVar, Self, cast
 import numpy as np
 
 from ...geometry.ball_layouts import BallLayout
-from ...machines.protocol import Array, Unit
+from ...machines.protocol import Array, ErrorModel, Unit
+from ..arrays import Design, Observations, State
 from .balls import BallObservations
 from .whitening import CovarianceRoot, at_least_exact
 
@@ -52,6 +53,7 @@ class Calibration(ABC):
     """An item of calibration of one `kind`; a frozen dataclass with the `values` (m, ...) that it
     states, nominal unless `certified`.
 
+    `artefact` is empty where values are of the machine; their observations have no balls then.
     `are_lengths`: values are distances between two balls, named in either order. `root` is that of
     the covariance of its values, None where they are uncorrelated.
     """
@@ -71,7 +73,12 @@ class Calibration(ABC):
         """How much it states."""
         return len(self._values)
 
-    def observed(self, first: int) -> BallObservations:
+    @property
+    def subject(self) -> str:
+        """What its values are of, in words."""
+        return self.artefact or "the machine"
+
+    def observed(self, first: int) -> Observations:
         """Its observations where the artefact's balls begin at `first`."""
         raise NotImplementedError
 
@@ -86,20 +93,21 @@ class Calibration(ABC):
     def certified_values(self, layout: BallLayout) -> Iterator[CertifiedValue]:
         """What it states, beside what the drawing has for lengths."""
         given = self.observed(0)
-        drawn = given.values(layout.coordinates)[0].tolist()
+        drawn = [None] * len(given)
+        if self.are_lengths and isinstance(given, BallObservations):
+            drawn = given.values(layout.coordinates)[0].tolist()
         # What counts as something in an adjustment is exact in a certificate.
         uncertainty = np.where(given.is_exact, 0.0, given.uncertainty).tolist()
         for (first, second), value, u, length in zip(
             self.names(layout), given.value.tolist(), uncertainty, drawn, strict=True
         ):
-            of_drawing = length if self.are_lengths else None
             yield CertifiedValue(
-                "", first, second, value, u, given.measured_in, self.are_lengths, of_drawing
+                "", first, second, value, u, given.measured_in, self.are_lengths, length
             )
 
-    def true_values(self, balls: Array, first: int) -> Array:
-        """Its values (m,) where all balls are at `balls` (n, d)."""
-        return self.observed(first).values(balls)[0]
+    def true_values(self, design: Design, truth: State, model: ErrorModel, first: int) -> Array:
+        """Its values (m,) where balls and the machine are `truth`, whose error model is `model`."""
+        return self.observed(first).true_values(design, truth, model)
 
     def with_values(self, values: Array) -> Self:
         """The same with other values (m,), from a certificate."""

@@ -1,17 +1,17 @@
 """All kinds of calibration that a file may state.
 
-A further kind is a file beside these, with its settings, what reads them and its observations, and
-one line in `CALIBRATIONS`.
+A further kind of the kernel is a file beside these, with its settings, what reads them and its
+observations, and one line in `CALIBRATIONS`; extensions have their own.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Annotated, Any, Union
+from typing import TYPE_CHECKING, Annotated, Any, Union, get_args
 
-from pydantic import Field
-
+from ...inputs.extensions import provided
 from ...inputs.messages import Steps
+from ...inputs.open_kinds import OpenKinds
 from ...inputs.settings import Settings
 from ..lookup import References
 from .calibration import Calibration
@@ -30,7 +30,30 @@ CALIBRATIONS: dict[type[Settings], Callable[[Any, str, Steps, References], Calib
 None after saying what is wrong.
 """
 
+KINDS = tuple(
+    kind for one in CALIBRATIONS for kind in get_args(one.model_fields["kind"].annotation)
+)
+
 if TYPE_CHECKING:
     CalibrationSettings = Settings
 else:
-    CalibrationSettings = Annotated[Union[tuple(CALIBRATIONS)], Field(discriminator="kind")]  # noqa: UP007
+    CalibrationSettings = Annotated[
+        Union[tuple(CALIBRATIONS)],  # noqa: UP007
+        OpenKinds("calibrations"),
+    ]
+
+
+def is_of_machine(kind: str) -> bool:
+    """Whether items of a kind are of no artefact."""
+    settings = None if kind in KINDS else provided("calibrations", kind, "SETTINGS")
+    return settings is not None and "artefact" not in settings.model_fields
+
+
+def read_calibration(
+    settings: Any, artefact: str, steps: Steps, references: References
+) -> Calibration | None:
+    """The item of an artefact that settings describe, or None after saying what is wrong."""
+    read = next((read for one, read in CALIBRATIONS.items() if isinstance(settings, one)), None)
+    read = read or provided("calibrations", settings.kind, "read")
+    assert read is not None
+    return read(settings, artefact, steps, references)

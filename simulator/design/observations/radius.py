@@ -14,7 +14,8 @@ from ...geometry.ball_layouts import BallLayout, Name
 from ...inputs.messages import Steps
 from ...inputs.quantities import LengthUncertainty, PositiveLength
 from ...inputs.settings import Settings
-from ...machines.protocol import Array
+from ...machines.protocol import Array, ErrorModel
+from ..arrays import Design, State
 from ..lookup import References
 from .calibration import FAR_FROM_DRAWING, Calibration, CertifiedValue, far_from_drawing
 
@@ -38,8 +39,8 @@ class RadiusCalibration(Calibration):
             "", self.artefact, "radius", self.value, self.standard_uncertainty, drawn=drawn
         )
 
-    def true_values(self, balls: Array, first: int) -> Array:
-        return np.sqrt((balls[first : first + 1] ** 2).sum(axis=1))
+    def true_values(self, design: Design, truth: State, model: ErrorModel, first: int) -> Array:
+        return np.sqrt((truth.balls[first : first + 1] ** 2).sum(axis=1))
 
     def with_values(self, values: Array) -> RadiusCalibration:
         return replace(self, value=float(values[0]))

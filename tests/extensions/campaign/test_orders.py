@@ -26,7 +26,7 @@ from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.experiment.model import Candidate, Position
 from ballplate.simulator.experiment.pool import with_chosen
 from ballplate.simulator.inputs.messages import ExperimentError
-from ballplate.uncertainty.quantities import evaluation_points
+from ballplate.uncertainty.kernel_quantities import evaluation_points
 from numpy.typing import NDArray
 
 from tests.reference.small_quickstart import small_sections

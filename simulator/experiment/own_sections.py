@@ -1,0 +1,37 @@
+"""Keys of an experiment file that extensions provide, and the extensions that a file needs."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from ..design.lookup import References
+from ..inputs.extensions import is_installed, module_with, owner
+from .structure import KEYS, Sections
+
+
+def resolve_own_sections(sections: Sections, references: References) -> dict[str, Any]:
+    """What is written under keys that extensions provide, as their `read` makes it, where they have
+    one; what is wrong goes to the problems.
+    """
+    for i, name in enumerate(sections.get("extensions") or ()):
+        if not is_installed(name):
+            text = f'the extension "{name}", which this file needs, is not installed; install it'
+            references.problems.add(("extensions", i), text)
+    found = {}
+    for steps, settings in sections.values.items():
+        key = str(steps[0])
+        if key not in KEYS:
+            read = getattr(module_with("sections", key), "read", None)
+            found[key] = settings if read is None else read(settings, (key,), references)
+    return found
+
+
+def needed_extensions(sections: Sections) -> tuple[str, ...]:
+    """Names of the extensions that a file states, or has kinds or keys of."""
+    classes = {type(one) for value in sections.values.values() for one in _parts(value)}
+    used = {name for one in classes if (name := owner(one)) is not None}
+    return tuple(dict.fromkeys((*(sections.get("extensions") or ()), *sorted(used))))
+
+
+def _parts(value: Any) -> tuple[Any, ...]:
+    return value if isinstance(value, tuple) else (value,)

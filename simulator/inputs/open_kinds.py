@@ -1,0 +1,80 @@
+"""Unions of settings that the word `kind` chooses among, and to which extensions add kinds."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Annotated, Any, ClassVar, get_args
+
+from pydantic import Field, GetCoreSchemaHandler, GetJsonSchemaHandler, ValidationError
+from pydantic_core import CoreSchema, PydanticCustomError, core_schema
+
+from .extensions import names, provided, provider
+from .settings import Settings
+from .unusable import UnusableError
+
+
+@dataclass(frozen=True)
+class OpenKinds:
+    """Annotation of a union: kinds that it lacks are looked for among those that extensions
+    provide, by the name of what they provide.
+
+    `base` is the class of their settings, and `form` makes of it the class that the union needs.
+    """
+
+    discriminator: ClassVar[str] = "kind"
+
+    provided: str
+    base: type[Settings] = Settings
+    form: Callable[[Any], Any] = lambda settings: settings
+
+    def settings(self, kind: str) -> Any | None:
+        """The settings of a kind of an extension; None where there is none.
+
+        :raises UnusableError: the extension does not have what it says.
+        """
+        settings = provided(self.provided, kind, "SETTINGS")
+        if settings is None:
+            return None
+        is_right = isinstance(settings, type) and issubclass(settings, self.base)
+        if not is_right or get_args(settings.model_fields["kind"].annotation) != (kind,):
+            extension = provider(self.provided, kind)
+            assert extension is not None
+            text = f"is no {self.base.__name__} with kind: Literal[{kind!r}]"
+            raise UnusableError(f"extension {extension.name}: SETTINGS of {kind} {text}")
+        return self.form(settings)
+
+    def __get_pydantic_core_schema__(
+        self, source: Any, handler: GetCoreSchemaHandler
+    ) -> CoreSchema:
+        # Chosen here, as a field would choose among what it annotates only afterwards.
+        of_kernel = handler.generate_schema(Annotated[source, Field(discriminator="kind")])
+        return core_schema.no_info_wrap_validator_function(self._validated, of_kernel)
+
+    def _validated(self, value: Any, of_kernel: Callable[[Any], Any]) -> Any:
+        try:
+            return of_kernel(value)
+        except ValidationError as refusal:
+            (first, *_) = refusal.errors(include_url=False, include_input=False)
+            if first["type"] != "union_tag_invalid" or first["loc"]:
+                raise
+        settings = self.settings(str(value["kind"]))
+        if settings is None:
+            raise PydanticCustomError("open_tag_invalid", "unknown kind")
+        return settings.model_validate(value)
+
+    def __get_pydantic_json_schema__(
+        self, schema: CoreSchema, handler: GetJsonSchemaHandler
+    ) -> dict[str, Any]:
+        found = handler(schema)
+        more: list[Any] = [
+            self.settings(kind) for kind in names(self.provided, with_registered=True)
+        ]
+        for settings in more:
+            settings.model_rebuild()
+        if more:
+            # Members of a union are put among the definitions.
+            union = core_schema.union_schema([one.__pydantic_core_schema__ for one in more])
+            of_more = handler(union)
+            found.setdefault("oneOf", []).extend(of_more.get("anyOf", [of_more]))
+        return found
