@@ -10,13 +10,7 @@ from ballplate.simulator.inputs.faces import lazily
 if TYPE_CHECKING:
     from .kernel_quantities import evaluation_points, task_distances
     from .pairs import PairSummary, PairTile, open_above, pair_tiles, pairs_of, relative
-    from .quantities import (
-        DESCRIPTIONS,
-        QUANTITIES,
-        RECORDED,
-        RECORDED_IF_TOLD,
-        functions_of,
-    )
+    from .quantities import DESCRIPTIONS, QUANTITIES, RECORDED, RECORDED_IF_TOLD, functions_of
     from .scale import (
         OFFSET_TRIAL,
         OWN_SCALES,
