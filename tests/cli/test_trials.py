@@ -68,18 +68,19 @@ def test_of_a_deficient_design_there_are_figures_too(capsys: pytest.CaptureFixtu
     assert "Monte Carlo: 10 data sets of the true machine" in capsys.readouterr().out
 
 
+def with_wild_machine(path: Path, errors: str) -> int:
+    """Write the first example with a true machine of large errors; their line."""
+    head, tail = Path(QUICKSTART).read_text(encoding="utf-8").split("true_machine:")
+    tail = tail.partition("\n\n")[2]
+    path.write_text(f"{head}true_machine: {{kind: random, {errors}}}\n\n{tail}", encoding="utf-8")
+    return 1 + head.count("\n")
+
+
 def test_a_true_machine_too_wild_is_told(
     capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:
-    text = Path(QUICKSTART).read_text(encoding="utf-8")
     wild = tmp_path / "wild.yaml"
-    head, tail = text.split("true_machine:")
-    tail = tail.partition("\n\n")[2]
-    wild.write_text(
-        f"{head}true_machine: {{kind: random, position: 30 m, rotation: 3 rad}}\n\n{tail}",
-        encoding="utf-8",
-    )
-    line = 1 + head.count("\n")
+    line = with_wild_machine(wild, "position: 30 m, rotation: 3 rad")
     for command in (["run", wild, "--trials", "10"], ["simulate", wild, "-o", tmp_path / "r.csv"]):
         assert run(*command) == 3
         err = capsys.readouterr().err
@@ -91,13 +92,8 @@ def test_a_true_machine_too_wild_is_told(
 def test_a_true_machine_that_cannot_be_fitted_is_told(
     capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:
-    text = Path(QUICKSTART).read_text(encoding="utf-8")
     wild = tmp_path / "wild.yaml"
-    head, tail = text.split("true_machine:")
-    tail = tail.partition("\n\n")[2]
-    wild.write_text(
-        f"{head}true_machine: {{kind: random, rotation: 200 mrad}}\n\n{tail}", encoding="utf-8"
-    )
+    with_wild_machine(wild, "rotation: 200 mrad")
     assert run("run", wild, "--trials", "10") == 3
     assert "true_machine: the e" in capsys.readouterr().err
 

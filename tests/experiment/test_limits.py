@@ -155,20 +155,22 @@ def test_gauges_of_too_many_lengths(tmp_path: Path, count: int, repeats: int) ->
     ]
 
 
-def test_a_length_standard_of_too_many_lengths(tmp_path: Path) -> None:
-    bar = (
-        "  bar: {kind: grid, balls: [20, 20], size: [500 mm, 500 mm], role:"
-        " length_standard}\npositions:"
-    )
-    text = replaced("positions:", bar).replace("name: low,", "name: low, artefact: plate,")
+def with_standard(balls: str) -> str:
+    """The good file with a plate of so many balls, all distances between which are certified."""
+    bar = f"  bar: {{kind: grid, balls: {balls}, size: [450 mm, 450 mm], role: length_standard}}\n"
+    text = replaced("positions:", f"{bar}positions:")
+    text = text.replace("name: low,", "name: low, artefact: plate,")
     text = text.replace("distances, pairs", "distances, artefact: plate, pairs")
-    text = text.replace(
+    return text.replace(
         "calibration:",
         "  - {name: bar, artefact: bar, plane: z, level: 0 mm, corner: {x: 0 mm, y: 0"
         " mm}}\ncalibration:\n  - {kind: distances, artefact: bar, pairs: all,"
         " standard_uncertainty: 1 um}",
     )
-    assert refusals(tmp_path, text) == [
+
+
+def test_a_length_standard_of_too_many_lengths(tmp_path: Path) -> None:
+    assert refusals(tmp_path, with_standard("[20, 20]")) == [
         '12:45: calibration[0].pairs: 79800 distances of "bar", read 1 times, are too many; at most'
         " 20000 lengths are possible"
     ]
@@ -178,18 +180,7 @@ def test_a_length_standard_of_too_many_lengths_between_the_same_balls(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Three thousand are possible; as many between balls of their own are no difficulty."""
-    bar = (
-        "  bar: {kind: grid, balls: [10, 8], size: [450 mm, 450 mm], role:"
-        " length_standard}\npositions:"
-    )
-    text = replaced("positions:", bar).replace("name: low,", "name: low, artefact: plate,")
-    text = text.replace("distances, pairs", "distances, artefact: plate, pairs")
-    text = text.replace(
-        "calibration:",
-        "  - {name: bar, artefact: bar, plane: z, level: 0 mm, corner: {x: 0 mm, y: 0"
-        " mm}}\ncalibration:\n  - {kind: distances, artefact: bar, pairs: all,"
-        " standard_uncertainty: 1 um}",
-    )
+    text = with_standard("[10, 8]")
     assert refusals(tmp_path, text) == [
         '12:45: calibration[0].pairs: 3160 distances of "bar" have balls in common; at most 3000'
         " such are possible: calibrate fewer of them"

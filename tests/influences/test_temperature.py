@@ -181,7 +181,7 @@ def as_told(change: dict[str, Any], folder: Path) -> Experiment:
     return file_with(folder, [told])
 
 
-# What is told of the same campaigns: everything, the values without their uncertainties, nothing.
+# The values without their uncertainties.
 EXACT = {
     "artefact_expansion": {"value": "11.5 um/m/K", "standard_uncertainty": "0 um/m/K"},
     "artefact_temperature": {"value": "21.5 degC"},

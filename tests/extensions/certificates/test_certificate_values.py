@@ -246,6 +246,14 @@ def test_both_files_are_written_or_none(tmp_path: Path, capsys: pytest.CaptureFi
     )
 
 
+def lines_of_simulated(certificate: Path) -> list[str]:
+    """The lines of a certificate of the first example, which is written."""
+    readings = certificate.with_name("r.csv")
+    command = ["simulate", QUICKSTART, "-o", str(readings), "--certificate", str(certificate)]
+    assert main(command) == 0
+    return certificate.read_text().splitlines()
+
+
 @pytest.mark.parametrize(
     ("number", "old", "new", "told"),
     [
@@ -261,20 +269,7 @@ def test_a_wrong_certificate_is_told_by_line(
     tmp_path: Path, number: int, old: str, new: str, told: str
 ) -> None:
     certificate = tmp_path / "c.csv"
-    assert (
-        main(
-            [
-                "simulate",
-                QUICKSTART,
-                "-o",
-                str(tmp_path / "r.csv"),
-                "--certificate",
-                str(certificate),
-            ]
-        )
-        == 0
-    )
-    lines = certificate.read_text().splitlines()
+    lines = lines_of_simulated(certificate)
     assert old in lines[number]
     lines[number] = lines[number].replace(old, new)
     certificate.write_text("\n".join(lines))
@@ -286,20 +281,7 @@ def test_a_wrong_certificate_is_told_by_line(
 
 def test_values_missing_or_given_twice_are_told(tmp_path: Path) -> None:
     certificate, experiment = tmp_path / "c.csv", load(Path(QUICKSTART))[0]
-    assert (
-        main(
-            [
-                "simulate",
-                QUICKSTART,
-                "-o",
-                str(tmp_path / "r.csv"),
-                "--certificate",
-                str(certificate),
-            ]
-        )
-        == 0
-    )
-    lines = certificate.read_text().splitlines()
+    lines = lines_of_simulated(certificate)
     certificate.write_text("\n".join(lines[:-1]))
     with pytest.raises(ExperimentError, match=r"no value of calibration\[0\] r1c5, r5c5; add it"):
         read_certificate(certificate, experiment)
