@@ -235,7 +235,7 @@ def __getattr__(name: str) -> Any:
         try:
             value = function(name)
         except KeyError:
-            from ballplate.moved import MOVED
+            from ballplate.simulator.inputs.moved import MOVED
 
             successor = MOVED.get(f"bp.{name}")
             moved = "" if successor is None else f"; it is now {successor}"

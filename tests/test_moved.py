@@ -5,7 +5,7 @@ from __future__ import annotations
 import ballplate as bp
 import pytest
 from ballplate.cli import commands_of_all, main
-from ballplate.moved import MOVED
+from ballplate.simulator.inputs.moved import MOVED
 
 
 @pytest.mark.parametrize("old", MOVED)

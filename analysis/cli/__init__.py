@@ -339,7 +339,7 @@ class _Parser(argparse.ArgumentParser):
 
     def meant_by(self, unknown: Sequence[str]) -> str:
         """Tell which of the command's options the unknown ones are probably meant for."""
-        from ballplate.moved import MOVED
+        from ballplate.simulator.inputs.moved import MOVED
         from ballplate.simulator.inputs.settings import nearest
 
         known = [
@@ -357,7 +357,7 @@ class _Parser(argparse.ArgumentParser):
 
     def _check_value(self, action: argparse.Action, value: Any) -> None:
         if action.choices is not None and value not in action.choices:
-            from ballplate.moved import MOVED
+            from ballplate.simulator.inputs.moved import MOVED
             from ballplate.simulator.inputs.settings import nearest
 
             if successor := MOVED.get(f"{self.prog} {value}"):

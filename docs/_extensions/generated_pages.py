@@ -18,10 +18,10 @@ from ballplate.extensions.reproduction.published import npl
 from ballplate.extensions.reproduction.reproduction_tables import reproduction_markdown
 from ballplate.extensions.reproduction.shipped import Shipped
 from ballplate.extensions.sweeps.sweep_schema import schema as sweep_schema
-from ballplate.moved import MOVED
 from ballplate.simulator.experiment.machine_sections import machine_schema
 from ballplate.simulator.experiment.map_sections import map_schema
 from ballplate.simulator.experiment.schema import schema
+from ballplate.simulator.inputs.moved import MOVED
 from ballplate.simulator.inputs.quantities import (
     UNITS,
     Angle,
