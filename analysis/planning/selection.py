@@ -12,9 +12,9 @@ from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.inputs.extensions import service
 from ballplate.simulator.inputs.settings import number_of
 
-from ..presentation.columns import table_lines
 from ..presentation.formatting import aligned, number, picked
 from ..presentation.result import Result
+from ..presentation.table_columns import table_lines
 from .choice import Gain, Selection
 from .constraints import HOUR, Spent
 from .criteria import DESCRIPTIONS

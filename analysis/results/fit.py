@@ -23,12 +23,12 @@ from ballplate.simulator.readings.point_files import ensure_points, probe_places
 from ..gross_errors.exact_values import has_exact_values
 from ..gross_errors.suspects import Diagnosis
 from ..gross_errors.wording import diagnosis_data, diagnosis_lines
-from ..presentation.columns import Columns, table_lines
 from ..presentation.files import write_file
 from ..presentation.formats import as_html
 from ..presentation.formatting import given, picked
 from ..presentation.result import FitResult
 from ..presentation.scene import box_edges, projection
+from ..presentation.table_columns import Columns, table_lines
 from ..presentation.vectors import Vectors, draw_vectors
 from ..rank.verdict import Verdict
 from ..uncertainty.summaries import Quantity, tasks_of

@@ -11,7 +11,6 @@ from ballplate.simulator.computing.rounding import printable
 from ballplate.simulator.inputs.settings import listing, number_of
 from ballplate.simulator.machines.protocol import Array
 
-from ..presentation.columns import table_lines
 from ..presentation.formatting import (
     by_name,
     given,
@@ -21,6 +20,7 @@ from ..presentation.formatting import (
     shown_unit,
     uncertainty_words,
 )
+from ..presentation.table_columns import table_lines
 from ..rank.verdict import GREAT, Verdict
 from ..uncertainty.scale import Scale
 from ..uncertainty.summaries import Quantity

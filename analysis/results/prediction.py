@@ -13,9 +13,9 @@ from ballplate.simulator.design.arrays import Design
 from ballplate.simulator.inputs.extensions import optional_service, service
 from ballplate.simulator.inputs.settings import hint, number_of
 
-from ..presentation.columns import Columns
 from ..presentation.formatting import given
 from ..presentation.result import Result
+from ..presentation.table_columns import Columns
 from ..rank.verdict import Verdict
 from ..uncertainty.scale import Scale
 from ..uncertainty.summaries import Quantity, tasks_of

@@ -8,9 +8,9 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from ballplate.extensions.requirements.goals import Goal, Judgement
-from ballplate.presentation.columns import Columns
 from ballplate.presentation.formatting import number
 from ballplate.presentation.result import Result
+from ballplate.presentation.table_columns import Columns
 from ballplate.results.adjustments import freedom_words
 from ballplate.results.fit import Fit
 from ballplate.results.study import PlannedUncertainty

@@ -8,9 +8,9 @@ from importlib.metadata import version
 from typing import Any
 
 import numpy as np
-from ballplate.presentation.columns import Columns
 from ballplate.presentation.formatting import aligned, number, picked, to_uncertainty
 from ballplate.presentation.result import Result
+from ballplate.presentation.table_columns import Columns
 from ballplate.results.adjustments import freedom_words
 from ballplate.simulator.inputs.settings import listing
 from ballplate.simulator.machines.protocol import Array

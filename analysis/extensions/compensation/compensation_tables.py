@@ -10,9 +10,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from ballplate.presentation.columns import Columns, table_lines
 from ballplate.presentation.formatting import aligned, given, picked
 from ballplate.presentation.result import Result
+from ballplate.presentation.table_columns import Columns, table_lines
 from ballplate.simulator.experiment.machine_file import load_machine
 from ballplate.simulator.experiment.map_files import BINARY, read_map
 from ballplate.simulator.geometry.grids import grid_points

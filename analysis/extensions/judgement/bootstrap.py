@@ -7,9 +7,9 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from ballplate.presentation.columns import Columns, table_lines
 from ballplate.presentation.formatting import picked
 from ballplate.presentation.result import Result
+from ballplate.presentation.table_columns import Columns, table_lines
 from ballplate.results.estimates import EstimatedFunctions, Function, estimated_functions
 from ballplate.simulator.computing.processes import in_processes
 from ballplate.simulator.computing.steps import ProgressStep, Report, unreported

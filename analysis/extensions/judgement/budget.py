@@ -7,9 +7,9 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from ballplate.presentation.columns import Columns
 from ballplate.presentation.formatting import aligned, number, picked
 from ballplate.presentation.result import Result
+from ballplate.presentation.table_columns import Columns
 from ballplate.results.adjustments import few_degrees_of_freedom
 from ballplate.results.fit import Fit
 from ballplate.results.groupings import Grouping

@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 from ballplate.gross_errors.leftover import leftover, too_many_entries
-from ballplate.presentation.columns import table_lines
 from ballplate.presentation.formatting import picked
 from ballplate.presentation.result import Result
+from ballplate.presentation.table_columns import table_lines
 from ballplate.results.groupings import Grouping
 from ballplate.results.observation_groups import ObservationGroup, groups_of
 from ballplate.simulator.computing.threads import single_threaded

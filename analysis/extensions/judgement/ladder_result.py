@@ -6,9 +6,9 @@ import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from ballplate.presentation.columns import table_lines
 from ballplate.presentation.formatting import number, picked
 from ballplate.presentation.result import FitResult
+from ballplate.presentation.table_columns import table_lines
 from ballplate.results.adjustments import freedom_words
 from ballplate.simulator.readings.observed_readings import ObservedReadings
 from ballplate.uncertainty.summaries import Quantity

@@ -6,9 +6,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from ballplate.presentation.columns import Columns
 from ballplate.presentation.formatting import aligned, number, picked
 from ballplate.presentation.result import FitResult
+from ballplate.presentation.table_columns import Columns
 from ballplate.simulator.readings.observed_readings import ObservedReadings
 
 from .lack_of_fit import chance_words

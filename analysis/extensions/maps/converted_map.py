@@ -7,11 +7,11 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from ballplate.presentation.columns import Columns, table_lines
 from ballplate.presentation.formatting import (
     number,
 )
 from ballplate.presentation.result import Result
+from ballplate.presentation.table_columns import Columns, table_lines
 from ballplate.results.estimates import ESTIMATE_COLUMNS, ParameterEstimate
 from ballplate.results.map_of_fit import FRAMES
 from ballplate.simulator.computing.threads import single_threaded

@@ -7,13 +7,13 @@ from dataclasses import dataclass
 from typing import Any, TextIO
 
 import numpy as np
-from ballplate.presentation.columns import Columns, by_axis, table_lines
 from ballplate.presentation.formatting import (
     number,
     picked,
     records,
 )
 from ballplate.presentation.result import Result
+from ballplate.presentation.table_columns import Columns, by_axis, table_lines
 from ballplate.results.adjustments import few_degrees_of_freedom, freedom_words
 from ballplate.results.map_of_fit import left_out_words
 from ballplate.simulator.computing.threads import single_threaded
@@ -192,18 +192,19 @@ class Correction(Result):
         told = ", ".join(f"{word} {value:.4g} °C" for word, value in stated.items())
         return [f"temperatures of the campaign: {told}; corrected for none of the points"]
 
-    def _columns(self) -> dict[str, Any]:
-        u = self.standard_uncertainties
+    def _columns(self, most: int | None = None) -> dict[str, Any]:
+        """The columns of the first points."""
+        u = self.standard_uncertainties[:most]
         return {
-            "point": [self.given.name(i) for i in range(len(self.points))],
-            "probe": [self.fitted.probes.names[probe] for probe in self.given.probes],
-            **by_axis("{}, mm", self.points, u),
-            **by_axis("correction {}, µm", self.corrections, u),
+            "point": [self.given.name(i) for i in range(len(u))],
+            "probe": [self.fitted.probes.names[probe] for probe in self.given.probes[:most]],
+            **by_axis("{}, mm", self.points[:most], u),
+            **by_axis("correction {}, µm", self.corrections[:most], u),
         }
 
     def _point_table(self) -> list[str]:
-        columns = self._columns() | by_axis("U {}, µm", self.expanded_uncertainties, 3)
-        found = table_lines(columns, unknown="undetermined")[: SHOWN + 1]
+        u = by_axis("U {}, µm", self.expanded_uncertainties[:SHOWN], 3)
+        found = table_lines(self._columns(SHOWN) | u, unknown="undetermined")
         more = len(self.points) - SHOWN
         return [*found, f"(and {more} more points, which -o writes)"] if more > 0 else found
 

@@ -9,9 +9,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from ballplate.presentation.columns import table_lines
 from ballplate.presentation.formatting import SHOWN, aligned, ascii_units, number, picked
 from ballplate.presentation.result import Result
+from ballplate.presentation.table_columns import table_lines
 from ballplate.simulator.geometry.motions import AXIS_NAMES
 from ballplate.simulator.inputs.spreadsheets import CsvWriter
 from ballplate.simulator.maps.fitted_map import FittedMap

@@ -11,10 +11,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from ballplate.presentation.columns import Columns, by_axis
 from ballplate.presentation.formatting import given, records
 from ballplate.presentation.result import Result
 from ballplate.presentation.scene import box_edges, projection
+from ballplate.presentation.table_columns import Columns, by_axis
 from ballplate.presentation.vectors import Vectors, draw_vectors
 from ballplate.results.adjustments import few_degrees_of_freedom
 from ballplate.results.map_of_fit import left_out_words

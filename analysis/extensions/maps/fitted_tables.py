@@ -6,8 +6,8 @@ from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
-from ballplate.presentation.columns import ROUNDING, by_axis, table_lines
 from ballplate.presentation.formatting import number, picked
+from ballplate.presentation.table_columns import ROUNDING, by_axis, table_lines
 from ballplate.simulator.computing.rounding import comparable
 from ballplate.simulator.machines.protocol import Array
 from ballplate.simulator.maps.fit_verdict import verdict_data, verdict_line

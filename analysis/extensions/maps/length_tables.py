@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from ballplate.presentation.columns import Columns, table_lines
 from ballplate.presentation.formatting import (
     csv_lines,
     number,
@@ -18,6 +17,7 @@ from ballplate.presentation.formatting import (
     uncertainty_words,
 )
 from ballplate.presentation.result import Result
+from ballplate.presentation.table_columns import Columns, table_lines
 from ballplate.simulator.computing.rounding import comparable
 from ballplate.simulator.machines.protocol import Array
 

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from ballplate.presentation.columns import ROUNDING, table_lines
 from ballplate.presentation.formatting import aligned, number, picked
+from ballplate.presentation.table_columns import ROUNDING, table_lines
 
 from .fitted_tables import UNDETERMINED
 from .part_budget import REST, PartBudget

@@ -10,9 +10,9 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ballplate.presentation.columns import Columns, by_axis
 from ballplate.presentation.result import Result
 from ballplate.presentation.scene import box_edges, projection
+from ballplate.presentation.table_columns import Columns, by_axis
 from ballplate.presentation.vectors import Vectors, draw_vectors
 from ballplate.simulator.experiment.machine_file import load_machine
 from ballplate.simulator.inputs.messages import Message

@@ -8,7 +8,6 @@ from itertools import islice
 from typing import Any
 
 import numpy as np
-from ballplate.presentation.columns import by_axis, table_lines
 from ballplate.presentation.formatting import (
     SHOWN,
     aligned,
@@ -19,6 +18,7 @@ from ballplate.presentation.formatting import (
     picked,
     records,
 )
+from ballplate.presentation.table_columns import by_axis, table_lines
 from ballplate.simulator.computing.rounding import comparable
 from ballplate.simulator.inputs.quantities import format_length
 from ballplate.simulator.inputs.settings import hint, listing
@@ -146,7 +146,7 @@ def _numbers(built: Volumetric) -> list[tuple[Parameter, float]]:
 def diagonal_lines(errors: LengthErrors) -> list[str]:
     """Length errors of the body diagonals."""
     columns = {
-        "body diagonal": range(1, len(errors.error) + 1),
+        "body diagonal": [str(k + 1) for k in range(len(errors.error))],
         "from": list(map(_point, errors.starts)),
         "to": list(map(_point, errors.ends)),
         "length, mm": (errors.nominal, lambda value: f"{1e3 * value:.3f}"),

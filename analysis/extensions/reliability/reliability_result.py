@@ -14,7 +14,6 @@ from typing import TYPE_CHECKING, Any, TextIO
 import numpy as np
 from ballplate.gross_errors.names import name
 from ballplate.gross_errors.patterns import DRIFTS, Patterns, single_kinds
-from ballplate.presentation.columns import table_lines
 from ballplate.presentation.formatting import (
     SHOWN,
     aligned,
@@ -24,6 +23,7 @@ from ballplate.presentation.formatting import (
 )
 from ballplate.presentation.panels import RowOfPoints, draw_rows
 from ballplate.presentation.result import Result
+from ballplate.presentation.table_columns import table_lines
 from ballplate.rank.proposed_bars import listed
 from ballplate.simulator.computing.rounding import comparable
 from ballplate.simulator.design.arrays import Design

@@ -7,9 +7,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
-from ballplate.presentation.columns import table_lines
 from ballplate.presentation.panels import TriedValues, draw_tried
 from ballplate.presentation.result import Result
+from ballplate.presentation.table_columns import table_lines
 
 from .goals import Goal, Judgement
 from .unknowns import UnknownName

@@ -7,7 +7,6 @@ import math
 from typing import Any
 
 import numpy as np
-from ballplate.presentation.columns import table_lines
 from ballplate.presentation.formatting import (
     aligned,
     ascii_units,
@@ -16,6 +15,7 @@ from ballplate.presentation.formatting import (
     picked,
     records,
 )
+from ballplate.presentation.table_columns import table_lines
 from ballplate.simulator.computing.rounding import comparable
 from ballplate.simulator.inputs.settings import listing
 from ballplate.simulator.inputs.spreadsheets import CsvWriter
