@@ -85,8 +85,8 @@ class Result:
         return table_rows(*found)
 
     def columns(self) -> tuple[Columns, Sequence[Any]] | None:
-        """The columns of its main table, see `presentation.table_columns`, and the items that are its
-        rows; None where `rows` has them.
+        """The columns of its main table, see `presentation.table_columns`, and the items that are
+        its rows; None where `rows` has them.
         """
         return None
 
