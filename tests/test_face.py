@@ -310,7 +310,7 @@ def test_tables_are_written_as_well(tmp_path: Path) -> None:
 def test_a_check_has_a_table() -> None:
     (row,) = bp.check(QUICKSTART).to_frame().to_dict("records")
     assert row["rank"] == "full rank" and row["as expected"]
-    assert row["U6 average"] == bp.run(QUICKSTART).quantities["U6"].average
+    assert row["U6 average, µm"] == 1e6 * bp.run(QUICKSTART)["U6"].average
     open_, deficiency = deficient()
     (row,) = bp.check(open_).to_frame().to_dict("records")
     assert row["rank deficiency"] == deficiency and not row["as expected"]

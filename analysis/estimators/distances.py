@@ -37,9 +37,9 @@ from ballplate.simulator.readings.generate import (
 from ballplate.simulator.readings.observed_readings import ObservedReadings, observe
 from ballplate.simulator.readings.simulated import on_stated_machine, too_large
 
-from ..presentation.columns import Columns, table_lines
 from ..presentation.formatting import by_name, given, number, picked
 from ..presentation.result import FitResult, Result
+from ..presentation.table_columns import Columns, table_lines
 from ..results.estimates import ESTIMATE_COLUMNS, ParameterEstimate
 from ..results.text_blocks import iteration_lines
 from ..uncertainty.summaries import uncertainties

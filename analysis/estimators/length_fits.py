@@ -26,9 +26,9 @@ from ballplate.simulator.machines.protocol import Array
 from ballplate.simulator.machines.spatial_metric import SpatialMetricModel
 from ballplate.simulator.readings.observed_readings import ObservedReadings
 
-from ..presentation.columns import Columns, table_lines
 from ..presentation.formatting import picked
 from ..presentation.result import FitResult
+from ..presentation.table_columns import Columns, table_lines
 from ..rank.verdicts import rank_complaint
 from ..results.adjustments import Adjustment, adjustments, few_degrees_of_freedom, freedom_words
 from ..results.text_blocks import adjustment_data, adjustment_lines

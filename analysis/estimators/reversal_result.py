@@ -15,7 +15,6 @@ from ballplate.simulator.machines.metric import Scale
 from ballplate.simulator.machines.protocol import Array, Integers
 from ballplate.simulator.readings.observed_readings import ObservedReadings
 
-from ..presentation.columns import Columns, table_lines
 from ..presentation.formatting import (
     SHOWN,
     by_name,
@@ -23,6 +22,7 @@ from ..presentation.formatting import (
     picked,
 )
 from ..presentation.result import FitResult
+from ..presentation.table_columns import Columns, table_lines
 from ..presentation.vectors import Vectors, draw_vectors
 from ..results.estimates import ParameterEstimate
 from ..results.fits import Fit

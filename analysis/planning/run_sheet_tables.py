@@ -8,8 +8,8 @@ from ballplate.simulator.inputs.messages import in_one_line
 from ballplate.simulator.inputs.quantities import format_duration
 from ballplate.simulator.inputs.settings import number_of
 
-from ..presentation.columns import table_lines
 from ..presentation.formatting import picked
+from ..presentation.table_columns import table_lines
 from .constraints import SLACK
 from .schedule import RunSheet, Step
 

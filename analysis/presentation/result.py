@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING, Any
 
 from ballplate.simulator.inputs.settings import number_of
 
-from .columns import Columns, table_rows
 from .files import write_file
 from .formats import as_html, as_latex, as_markdown
 from .formatting import as_data
 from .table import Block, Entry, Row, Table
+from .table_columns import Columns, table_rows
 
 if TYPE_CHECKING:
     import pandas
@@ -85,8 +85,8 @@ class Result:
         return table_rows(*found)
 
     def columns(self) -> tuple[Columns, Sequence[Any]] | None:
-        """The columns of its main table, see `presentation.columns`, and the items that are its
-        rows; None where `rows` has them.
+        """The columns of its main table, see `presentation.table_columns`, and the items that are
+        its rows; None where `rows` has them.
         """
         return None
 

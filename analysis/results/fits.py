@@ -8,12 +8,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from ballplate.presentation.columns import Columns, table_lines
 from ballplate.presentation.files import write_file
 from ballplate.presentation.formats import as_html
 from ballplate.presentation.formatting import given, picked
 from ballplate.presentation.result import FitResult
 from ballplate.presentation.scenes import box_edges, projection
+from ballplate.presentation.table_columns import Columns, table_lines
 from ballplate.presentation.vectors import Vectors, draw_vectors
 from ballplate.rank.verdicts import Verdict
 from ballplate.results.adjustments import Adjustment, few_degrees_of_freedom, freedom_words

@@ -10,7 +10,7 @@ import numpy as np
 from ballplate.simulator.estimation.linearisation import Linearisation
 from ballplate.simulator.machines.protocol import Unit
 
-from ..presentation.columns import table_lines
+from ..presentation.table_columns import table_lines
 
 # Lines of a table; displacements of single readings may be thousands.
 MOST_LINES = 30

@@ -12,9 +12,9 @@ import numpy as np
 from ballplate.simulator.design.arrays import Design
 from ballplate.simulator.inputs.settings import hint, number_of
 
-from ..presentation.columns import Columns
 from ..presentation.formatting import given
 from ..presentation.result import Result
+from ..presentation.table_columns import Columns
 from ..rank.verdicts import Verdict
 from ..uncertainty.scale import Scale
 from ..uncertainty.summaries import Quantity, tasks_of

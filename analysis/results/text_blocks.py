@@ -7,7 +7,6 @@ from collections.abc import Callable, Collection, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from ballplate.presentation.columns import table_lines
 from ballplate.presentation.formatting import (
     by_name,
     given,
@@ -17,6 +16,7 @@ from ballplate.presentation.formatting import (
     shown_unit,
     uncertainty_words,
 )
+from ballplate.presentation.table_columns import table_lines
 from ballplate.rank.verdicts import GREAT, Verdict
 from ballplate.results.adjustments import ARCSECOND, Adjustment
 from ballplate.results.plates import PlateCoordinates

@@ -10,19 +10,7 @@ from ballplate.simulator.inputs.faces import lazily
 if TYPE_CHECKING:
     from .corrections import corrected_points, correction_rows
     from .covariance import MICROMETRE
-    from .functions import (
-        BallPlaces,
-        Coordinates,
-        Displacements,
-        Distances,
-        Functions,
-        MeasuredPoints,
-        Parameters,
-        Places,
-        displacements,
-        function_name,
-        linear_functions,
-    )
+    from .functions import BallPlaces, Coordinates, Displacements, Distances, Functions, MeasuredPoints, Parameters, Places, displacements, function_name, linear_functions
     from .gauss_newton import Solution, Status, as_drawn, estimate, linearised_fit
     from .hat import hat_rows, row_count, row_places, whitened_residuals
     from .initial import initial_state

@@ -91,7 +91,7 @@ def assert_shows(cells: list[list[str]], rows: list[dict[str, Any]]) -> None:
 
 def test_every_form_has_every_row(results: list[Result]) -> None:
     for result in results:
-        rows = result.to_frame().to_dict("records")
+        rows = result._shown_rows()
         page = Cells(result.to_html())
         shown = Cells(result._repr_html_())
         most = 12 if isinstance(result, Fit) else 60
@@ -137,7 +137,7 @@ def test_check_has_a_row() -> None:
 
 def test_without_rows_the_result_is_told_in_words(monkeypatch: pytest.MonkeyPatch) -> None:
     found = bp.check(bp.quickstart())
-    monkeypatch.setattr(type(found), "rows", lambda _: [])
+    monkeypatch.setattr(type(found), "columns", lambda _: ({}, ()))
     for text in (found.to_markdown(), found.to_latex(), found.to_html()):
         assert (
             "full rank" in text

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from importlib.metadata import version
 from typing import Any
 
 import numpy as np
-from ballplate.presentation import Result, aligned, number, picked, to_uncertainty
+from ballplate.presentation import Columns, Result, aligned, number, picked, to_uncertainty
 from ballplate.results import freedom_words
 from ballplate.simulator.inputs import listing
 from ballplate.simulator.machines import Array
@@ -193,11 +193,14 @@ class CertifiedBalls(Result):
             "notes": list(self.notes),
         }
 
-    def rows(self) -> list[dict[str, Any]]:
+    def columns(self) -> tuple[Columns, Sequence[Any]]:
         """One row for each co-ordinate."""
-        u = self.standard_uncertainties.tolist()
-        return [
-            {"ball": name, "axis": axis, "value": value, "standard uncertainty": one, "unit": "m"}
-            for name, place, own in zip(self.names, self.coordinates.tolist(), u, strict=True)
-            for axis, value, one in zip("xyz", place, own, strict=False)
-        ]
+        count, d = self.coordinates.shape
+        columns = {
+            "ball": np.repeat(self.names, d),
+            "axis": list("xyz"[:d]) * count,
+            "value, mm": self.coordinates.ravel(),
+            "standard uncertainty, µm": self.standard_uncertainties.ravel(),
+            "unit": ["m"] * (count * d),
+        }
+        return columns, ()

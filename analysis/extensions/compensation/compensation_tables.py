@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from ballplate.presentation import Result, aligned, given, picked, table_lines
+from ballplate.presentation import Columns, Result, aligned, given, picked, table_lines
 from ballplate.simulator.experiment import BINARY, load_machine, read_map
 from ballplate.simulator.geometry import grid_points
 from ballplate.simulator.inputs import (
@@ -66,11 +66,11 @@ class CompensationTable(Result):
         p = np.zeros(x.shape) if offset is None else np.broadcast_to(offset, x.shape)
         return correction(self.table, x, np.asarray(p, float)) - p
 
-    def rows(self) -> list[dict[str, Any]]:
-        """One row for each node of an axis, or of the volume, in metres and radians."""
+    def columns(self) -> tuple[Columns, Sequence[Any]]:
+        """One row for each node of an axis, or of the volume."""
         if isinstance(self.table, VolumeTable):
             places = np.stack(np.meshgrid(*self.table.nodes, indexing="ij"), axis=-1)
-            return [
+            rows: list[dict[str, Any]] = [
                 dict(zip((*AXES[: len(place)], *_PARTS), (*place, *values), strict=True))
                 for place, values in zip(
                     places.reshape(-1, self.table.dimension).tolist(),
@@ -78,11 +78,14 @@ class CompensationTable(Result):
                     strict=True,
                 )
             ]
-        return [
+            return {f"{name}, {_UNITS.get(name, 'mm')}": name for name in rows[0]}, rows
+        rows = [
             {"axis": AXES[one.axis], "position": position, **dict(zip(_PARTS, values, strict=True))}
             for one in self.table.axes
             for position, values in zip(one.positions.tolist(), one.values.tolist(), strict=True)
         ]
+        parts = {f"{name}, {unit}": name for name, unit in _UNITS.items()}
+        return {"axis": "axis", "position, mm": "position", **parts}, rows
 
     def data(self) -> dict[str, Any]:
         found: dict[str, Any] = {
@@ -116,7 +119,11 @@ class CompensationTable(Result):
         ]
 
 
-_PARTS = (*(f"displacement {axis}" for axis in AXES), *(f"turn about {axis}" for axis in AXES))
+_UNITS = {
+    **{f"displacement {axis}": "µm" for axis in AXES},
+    **{f"turn about {axis}": "µrad" for axis in AXES},
+}
+_PARTS = tuple(_UNITS)
 
 
 def _axis_lines(table: AxisTables) -> list[str]:

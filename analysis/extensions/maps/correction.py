@@ -182,18 +182,19 @@ class Correction(Result):
         told = ", ".join(f"{word} {value:.4g} °C" for word, value in stated.items())
         return [f"temperatures of the campaign: {told}; corrected for none of the points"]
 
-    def _columns(self) -> dict[str, Any]:
-        u = self.standard_uncertainties
+    def _columns(self, most: int | None = None) -> dict[str, Any]:
+        """The columns of the first points."""
+        u = self.standard_uncertainties[:most]
         return {
-            "point": [self.given.name(i) for i in range(len(self.points))],
-            "probe": [self.fitted.probes.names[probe] for probe in self.given.probes],
-            **by_axis("{}, mm", self.points, u),
-            **by_axis("correction {}, µm", self.corrections, u),
+            "point": [self.given.name(i) for i in range(len(u))],
+            "probe": [self.fitted.probes.names[probe] for probe in self.given.probes[:most]],
+            **by_axis("{}, mm", self.points[:most], u),
+            **by_axis("correction {}, µm", self.corrections[:most], u),
         }
 
     def _point_table(self) -> list[str]:
-        columns = self._columns() | by_axis("U {}, µm", self.expanded_uncertainties, 3)
-        found = table_lines(columns, unknown="undetermined")[: SHOWN + 1]
+        u = by_axis("U {}, µm", self.expanded_uncertainties[:SHOWN], 3)
+        found = table_lines(self._columns(SHOWN) | u, unknown="undetermined")
         more = len(self.points) - SHOWN
         return [*found, f"(and {more} more points, which -o writes)"] if more > 0 else found
 

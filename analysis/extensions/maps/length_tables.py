@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from ballplate.presentation import (
+    Columns,
     Result,
     csv_lines,
     number,
@@ -129,8 +130,8 @@ class LengthMap(GroupedLengths, Result):
             "by_point": _group_data([{"point": point} for point in self.points], self.by_point),
         }
 
-    def rows(self) -> list[dict[str, Any]]:
-        """One row for each class of length, direction and point of the grid, lengths in metres."""
+    def columns(self) -> tuple[Columns, Sequence[Any]]:
+        """One row for each class of length, direction and point of the grid."""
         data = self.to_dict()
         rows = []
         for group, name in (
@@ -141,7 +142,8 @@ class LengthMap(GroupedLengths, Result):
             for one in data[group]:
                 kept = {k.replace("_", " "): v for k, v in one.items() if k not in HEADS}
                 rows.append({"group": group.replace("_", " "), "of": name(one), **kept})
-        return rows
+        lengths = {"average": "average, µm", "maximum": "maximum, µm"}
+        return {lengths.get(name, name): name for name in rows[0]}, rows
 
     def plot(self, path: str | Path | None = None) -> Figure:
         """The largest ratio of u to the target at each point, and u over the length.

@@ -152,7 +152,7 @@ def _numbers(built: Volumetric) -> list[tuple[Parameter, float]]:
 def diagonal_lines(errors: LengthErrors) -> list[str]:
     """Length errors of the body diagonals."""
     columns = {
-        "body diagonal": range(1, len(errors.error) + 1),
+        "body diagonal": [str(k + 1) for k in range(len(errors.error))],
         "from": list(map(_point, errors.starts)),
         "to": list(map(_point, errors.ends)),
         "length, mm": (errors.nominal, lambda value: f"{1e3 * value:.3f}"),

@@ -36,7 +36,7 @@ def readings() -> pandas.DataFrame:
 
 @pytest.fixture(scope="module")
 def plain(readings: pandas.DataFrame) -> pandas.DataFrame:
-    return bp.fit(DESIGN, readings).to_frame()
+    return pandas.DataFrame(bp.fit(DESIGN, readings).rows())
 
 
 def centres(
@@ -62,7 +62,7 @@ def worst(found: bp.Fit, plain: pandas.DataFrame) -> tuple[float, float]:
     """Largest difference of machine parameters in standard uncertainties, and of distances between
     balls in metres.
     """
-    frame = found.to_frame()
+    frame = pandas.DataFrame(found.rows())
     assert list(frame["parameter"]) == list(plain["parameter"])
     of_machine = (plain["kind"] == "machine").to_numpy()
     apart = (frame["value"] - plain["value"]).abs() / plain["standard uncertainty"]

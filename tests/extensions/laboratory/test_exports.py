@@ -54,7 +54,7 @@ def plain(rows: Rows) -> str:
 def estimates(readings: Rows, tmp_path_factory: pytest.TempPathFactory) -> pandas.DataFrame:
     path = tmp_path_factory.mktemp("plain") / "readings.csv"
     path.write_text(plain(readings), encoding="utf-8")
-    return bp.fit(DESIGN, path).to_frame()
+    return pandas.DataFrame(bp.fit(DESIGN, path).rows())
 
 
 def fitted(
@@ -306,4 +306,4 @@ def test_missing_balls(readings: Rows, tmp_path: Path, capsys: pytest.CaptureFix
     found, err = fitted([path], capsys)
     assert "without co-ordinates, left out: lines 9, 62, 63" in err
     assert "planned but not read (3)" in err
-    same(found, bp.fit(DESIGN, other).to_frame(), 1e-9)
+    same(found, pandas.DataFrame(bp.fit(DESIGN, other).rows()), 1e-9)

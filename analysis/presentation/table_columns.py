@@ -11,8 +11,7 @@ the third digit of standard uncertainties, or by a function.
 from __future__ import annotations
 
 import math
-import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from itertools import repeat
 from typing import Any
 
@@ -35,17 +34,13 @@ def table_lines(
 
     `unknown` stands for what is undetermined.
     """
-    texts, right, used = [], [], [one for one in _pairs(columns) if one[0] != without]
-    has_units = isinstance(dict(columns).get("unit"), str)
-    of_rows = _factors_of_rows(columns, items)
-    for heading, source, form in used:
-        unit, values = heading.split(", ")[-1], _values(source, items)
-        factors = repeat(FACTORS[unit]) if unit in FACTORS else of_rows
-        form = unit_of if has_units and unit == "unit" else form
-        is_one = callable(form) or isinstance(form, int)
-        forms = repeat(form) if is_one else _values(form, items)
-        texts.append([heading, *map(_text, values, forms, factors, repeat(unknown))])
-        right.append(any(isinstance(v, (int, float)) and not isinstance(v, bool) for v in values))
+    texts, right = [], []
+    for heading, _, values, form, factors in _read(columns, items):
+        if heading != without:
+            is_one = callable(form) or isinstance(form, int)
+            forms = repeat(form) if is_one else _values(form, items)
+            texts.append([heading, *map(_text, values, forms, factors, repeat(unknown))])
+            right.append(any(isinstance(v, int | float) and type(v) is not bool for v in values))
     return aligned(list(zip(*texts, strict=True)), right)
 
 
@@ -65,44 +60,35 @@ def table_rows(
     """A table as a mapping for each row: in metres, radians and ratios, without units in the names,
     or in the units of the headings and of the column "unit".
     """
-    if in_units:
-        used = _in_units(columns, items)
-    else:
-        unit = f", ({'|'.join(FACTORS)})$"
-        used = {
-            re.sub(unit, "", heading): _values(source, items)
-            for heading, source, _ in _pairs(columns)
-        }
+    used = {}
+    for heading, name, values, form, factors in _read(columns, items):
+        if not in_units:
+            used[name] = values
+        elif form is unit_of:
+            used[name] = list(map(unit_of, values))
+        elif name != "unit":  # A list of units is that of rows in metres.
+            cells = zip(values, factors, strict=False)
+            used[heading] = [one * by if isinstance(one, float) else one for one, by in cells]
     return [dict(zip(used, row, strict=True)) for row in zip(*used.values(), strict=True)]
 
 
-def _in_units(columns: Columns, items: Sequence[Any]) -> dict[str, list[Any]]:
-    """Values by headings; a list of units is that of rows in metres, and left out."""
-    own, found = _factors_of_rows(columns, items), {}
-    for heading, source, _ in _pairs(columns):
-        unit, values = heading.split(", ")[-1], _values(source, items)
-        if unit == "unit" and isinstance(source, str):
-            values = list(map(unit_of, values))
-        factors = repeat(FACTORS[unit]) if unit in FACTORS else own
-        if heading != "unit" or isinstance(source, str):
-            found[heading] = [
-                factor * value if isinstance(value, float) else value
-                for value, factor in zip(values, factors, strict=False)
-            ]
-    return found
-
-
-def _factors_of_rows(columns: Columns, items: Sequence[Any]) -> Iterable[float]:
-    """What takes values to the units that the column "unit" shows."""
-    if not isinstance(dict(columns).get("unit"), str):
-        return repeat(1.0)
-    return [amount_of(1.0, unit)[0] for unit in _values("unit", items)]
-
-
-def _pairs(columns: Columns) -> list[tuple[str, Any, Any]]:
-    """Headings, values and forms."""
-    pairs = columns.items() if isinstance(columns, Mapping) else columns
-    return [(name, *(one if isinstance(one, tuple) else (one, 4))) for name, one in pairs]
+def _read(
+    columns: Columns, items: Sequence[Any]
+) -> Iterator[tuple[str, str, list[Any], Any, Iterable[float]]]:
+    """Headings of columns, also without units, values, forms, and what takes values to units."""
+    of_rows: Iterable[float] = repeat(1.0)
+    has_units = isinstance(dict(columns).get("unit"), str)
+    if has_units:
+        of_rows = [amount_of(1.0, unit)[0] for unit in _values("unit", items)]
+    for heading, column in columns.items() if isinstance(columns, Mapping) else columns:
+        source, form = column if isinstance(column, tuple) else (column, 4)
+        form = unit_of if has_units and heading == "unit" else form
+        name, _, unit = heading.rpartition(", ")
+        values = _values(source, items)
+        if unit in FACTORS:
+            yield heading, name, values, form, repeat(FACTORS[unit])
+        else:
+            yield heading, heading, values, form, of_rows
 
 
 def _value(item: Any, path: str) -> Any:
