@@ -22,6 +22,7 @@ from ballplate.extensions.maps.campaign_tests import (
     with_common,
 )
 from ballplate.extensions.maps.same_readings import read_once_words, same_positions, same_readings
+from ballplate.extensions.reliability.hat import hat_rows, row_count, row_places
 from ballplate.presentation.formatting import aligned, as_data, number, picked
 from ballplate.presentation.result import FitResult
 from ballplate.results.campaign_sigmas import campaign_sigmas
@@ -29,7 +30,6 @@ from ballplate.simulator.computing.threads import single_threaded
 from ballplate.simulator.design.observations.readings import rotation_sensitivity
 from ballplate.simulator.estimation.corrections import corrected_points, correction_rows
 from ballplate.simulator.estimation.gauss_newton import estimate, linearised_fit
-from ballplate.simulator.estimation.hat import hat_rows, row_count, row_places
 from ballplate.simulator.estimation.linearisation import Linearisation
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.inputs.messages import refused

@@ -14,6 +14,12 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
+from ballplate.extensions.reliability.hat import (
+    hat_rows,
+    row_count,
+    row_places,
+    whitened_residuals,
+)
 from ballplate.results.campaign_sigmas import campaign_sigmas
 from ballplate.simulator.computing.steps import ProgressStep, Report, unreported
 from ballplate.simulator.computing.threads import single_threaded
@@ -31,7 +37,6 @@ from ballplate.simulator.estimation.functions import (
     linear_functions,
 )
 from ballplate.simulator.estimation.gauss_newton import estimate, linearised_fit
-from ballplate.simulator.estimation.hat import hat_rows, row_count, row_places, whitened_residuals
 from ballplate.simulator.estimation.linearisation import Linearisation
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.geometry.motions import AXIS_NAMES

@@ -6,11 +6,11 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from ballplate.extensions.reliability.hat import row_count, row_places
 from ballplate.results.groupings import Grouping
 from ballplate.simulator.design.arrays import Design, Observations, measured, reading_uncertainties
 from ballplate.simulator.design.observations.lengths import Lengths
 from ballplate.simulator.design.observations.priors import Priors
-from ballplate.simulator.estimation.hat import row_count, row_places
 from ballplate.simulator.geometry.motions import AXIS_NAMES
 from ballplate.simulator.machines.protocol import Array, Integers
 

@@ -14,6 +14,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from ballplate.extensions.reliability.hat import hat_rows, row_count, row_places
 from ballplate.results.groupings import Grouping
 from ballplate.simulator.computing.threads import single_threaded
 from ballplate.simulator.design.arrays import Design, Observations
@@ -22,7 +23,6 @@ from ballplate.simulator.design.observations.joint_values import JointValues
 from ballplate.simulator.design.observations.lengths import Lengths, length_whitening
 from ballplate.simulator.design.observations.priors import Priors
 from ballplate.simulator.design.observations.star import Stars
-from ballplate.simulator.estimation.hat import hat_rows, row_count, row_places
 from ballplate.simulator.estimation.linearisation import Linearisation
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.machines.protocol import Array

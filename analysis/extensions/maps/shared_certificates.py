@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
+from ballplate.extensions.reliability.hat import hat_rows, row_count, row_places
 from ballplate.results.fit import Fit
 from ballplate.simulator.computing.threads import single_threaded
 from ballplate.simulator.design.arrays import Design, Observations
@@ -17,7 +18,6 @@ from ballplate.simulator.design.observations.lengths import (
     length_name,
     length_whitening,
 )
-from ballplate.simulator.estimation.hat import hat_rows, row_count, row_places
 from ballplate.simulator.machines.protocol import Array, Integers
 
 from .compared_maps import ComparedMap, without_shared

@@ -10,9 +10,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 from ballplate.simulator.design.arrays import Design
 from ballplate.simulator.design.parameters import shared_layout
-from ballplate.simulator.estimation.hat import hat_rows, row_count, whitened_residuals
 from ballplate.simulator.estimation.linearisation import Linearisation
 from ballplate.simulator.machines.protocol import Array, Integers
+
+from .hat import hat_rows, row_count, whitened_residuals
 
 if TYPE_CHECKING:
     from scipy.sparse import csc_array, csr_array

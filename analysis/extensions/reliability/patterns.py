@@ -26,8 +26,9 @@ from ballplate.simulator.design.observations.readings import (
     reading_weights,
     rotation_sensitivity,
 )
-from ballplate.simulator.estimation.hat import row_count, row_places
 from ballplate.simulator.machines.protocol import Array, Integers, Unit
+
+from .hat import row_count, row_places
 
 if TYPE_CHECKING:
     from ballplate.simulator.design.observations.whitening import Whitening

@@ -13,7 +13,6 @@ from ballplate.simulator.computing.steps import ProgressStep, Report, unreported
 from ballplate.simulator.computing.threads import single_threaded
 from ballplate.simulator.design.arrays import Design, measured
 from ballplate.simulator.estimation.functions import Parameters
-from ballplate.simulator.estimation.hat import row_count, row_places
 from ballplate.simulator.estimation.linearisation import linearise
 from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.model import Experiment
@@ -23,6 +22,7 @@ from ballplate.uncertainty.quantities import QUANTITIES, functions_of
 from .cause_search import FAMILY
 from .effects import SYMBOLS, Changes, Largest, across_probes, changes_of
 from .events import event_groups
+from .hat import row_count, row_places
 from .leftover import Columns, leftover, too_many_entries
 from .patterns import patterns
 from .power import noncentrality

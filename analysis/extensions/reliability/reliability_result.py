@@ -20,7 +20,6 @@ from ballplate.presentation.formatting import (
     number,
     picked,
 )
-from ballplate.presentation.panels import RowOfPoints, draw_rows
 from ballplate.presentation.result import Result
 from ballplate.simulator.computing.rounding import comparable
 from ballplate.simulator.design.arrays import Design
@@ -34,6 +33,7 @@ from ballplate.uncertainty.quantities import QUANTITIES
 from .effects import MOST_PLACES, across_probes
 from .names import name
 from .patterns import DRIFTS, Patterns, single_kinds
+from .rows_of_points import RowOfPoints, draw_rows
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from ballplate.simulator.estimation.hat import hat_rows
 from ballplate.simulator.estimation.linearisation import Linearisation
 from ballplate.simulator.machines.protocol import Array, Integers
 
+from .hat import hat_rows
 from .leftover import columns_of_balls
 from .patterns import Patterns
 

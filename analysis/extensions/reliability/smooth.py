@@ -9,11 +9,11 @@ from itertools import product
 import numpy as np
 from ballplate.simulator.design.arrays import Design, State, locations
 from ballplate.simulator.design.observations.readings import rotation_sensitivity
-from ballplate.simulator.estimation.hat import row_count
 from ballplate.simulator.geometry.motions import AXIS_NAMES
 from ballplate.simulator.machines.protocol import Array
 from numpy.polynomial import legendre
 
+from .hat import row_count
 from .patterns import LinearisedDesign
 
 # Scale readings closer than this (m) count as the same place on a scale.

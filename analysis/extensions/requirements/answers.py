@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 from ballplate.presentation.formatting import aligned
-from ballplate.presentation.panels import TriedValues, draw_tried
 from ballplate.presentation.result import Result
 
 from .goals import Goal, Judgement
+from .tried_values import TriedValues, draw_tried
 from .unknowns import UnknownName
 
 if TYPE_CHECKING:

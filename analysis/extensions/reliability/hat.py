@@ -13,14 +13,13 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
-
-from ..computing.threads import single_threaded
-from ..design.arrays import Design, State
-from ..design.observations.readings import reading_blocks
-from ..design.parameters import SharedLayout
-from ..machines.protocol import Array, Integers
-from .elimination import ROWS_AT_ONCE
-from .linearisation import Linearisation
+from ballplate.simulator.computing.threads import single_threaded
+from ballplate.simulator.design.arrays import Design, State
+from ballplate.simulator.design.observations.readings import reading_blocks
+from ballplate.simulator.design.parameters import SharedLayout
+from ballplate.simulator.estimation.elimination import ROWS_AT_ONCE
+from ballplate.simulator.estimation.linearisation import Linearisation
+from ballplate.simulator.machines.protocol import Array, Integers
 
 
 @dataclass(frozen=True)

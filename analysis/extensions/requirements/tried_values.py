@@ -1,0 +1,87 @@
+"""A drawing of what was tried of unknowns, in panels below one another."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from ballplate.presentation.svg import (
+    INK,
+    MARKERS,
+    MUTED,
+    PAPER,
+    SERIES,
+    drawing,
+    placed_axes,
+    save,
+    scaled_axis,
+)
+from ballplate.simulator.machines.protocol import Array
+from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+# Points: of the drawing, of a panel and what stands around it.
+WIDTH, PANEL, LEFT, RIGHT, BELOW, ABOVE = 480.0, 120.0, 60.0, 16.0, 46.0, 24.0
+
+
+@dataclass(frozen=True, eq=False)
+class TriedValues:
+    """Values (m,) of an unknown that were tried in its `unit`, how far from the goal each is, and
+    which meet it.
+    """
+
+    name: str
+    unit: str
+    values: Array
+    distances: Array
+    is_met: NDArray[np.bool_]
+
+
+def draw_tried(
+    panels: Sequence[TriedValues],
+    axis: str,
+    limit: float,
+    words: str,
+    path: str | Path | None = None,
+) -> Figure:
+    """How far from a goal the values tried are, a panel for each unknown, with the limit below
+    which it is met.
+
+    :raises ImportError: matplotlib is missing.
+    :raises ValueError: the name ends in none of the kinds of pictures.
+    :raises OSError: the file cannot be written.
+    """
+    height = PANEL + BELOW + ABOVE
+    with drawing(len(panels) * height, WIDTH) as figure:
+        for k, one in enumerate(panels):
+            bottom = (len(panels) - 1 - k) * height + BELOW
+            axes = placed_axes(figure, LEFT, bottom, WIDTH - LEFT - RIGHT, PANEL)
+            axes.plot(one.values, one.distances, color=MUTED, linewidth=0.8)
+            for chosen, face, label in (
+                (one.is_met, SERIES[0], "met"),
+                (~one.is_met, PAPER, "not met"),
+            ):
+                axes.plot(
+                    one.values[chosen],
+                    one.distances[chosen],
+                    color=SERIES[0],
+                    marker=MARKERS[0],
+                    linestyle="none",
+                    markersize=4.0,
+                    markerfacecolor=face,
+                    label=label,
+                )
+            axes.axhline(limit, color=INK, linewidth=1.0, linestyle="--")
+            scaled_axis(axes, one.values, "x")
+            scaled_axis(axes, one.distances, "y")
+            axes.grid(True)
+            axes.set_xlabel(f"{one.name}, {one.unit}" if one.unit else one.name)
+            axes.set_ylabel(axis)
+            if k == 0:
+                axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=2, borderpad=0.0)
+        return save(figure, path, words)
