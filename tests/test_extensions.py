@@ -31,6 +31,7 @@ BUILDS_ON = {
     ("judgement", "maps"): "campaigns are compared as maps are",
     ("judgement", "reliability"): "the residuals of each model are searched as those of a fit",
     ("certificates", "laboratory"): "both read XML",
+    ("maps", "reliability"): "certificates in common act on fits as gross errors do",
     ("pages", "campaign"): "the page of a design has its run sheet",
     ("pages", "maps"): "the page of a design has its map of lengths",
     ("pages", "reliability"): "pages show how gross errors would act",

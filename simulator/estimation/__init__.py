@@ -10,9 +10,9 @@ from ballplate.simulator.inputs.faces import lazily
 if TYPE_CHECKING:
     from .corrections import corrected_points, correction_rows
     from .covariance import MICROMETRE
+    from .elimination import ROWS_AT_ONCE
     from .functions import BallPlaces, Coordinates, Displacements, Distances, Functions, MeasuredPoints, Parameters, Places, displacements, function_name, linear_functions
     from .gauss_newton import Solution, Status, as_drawn, estimate, linearised_fit
-    from .hat import hat_rows, row_count, row_places, whitened_residuals
     from .initial import initial_state
     from .linearisation import LinearFunctions, Linearisation, linearise
     from .spheres import FEWEST_POINTS, FLAT, SphereFit, closest_sphere, fit_sphere

@@ -234,7 +234,7 @@ def found_once(monkeypatch: pytest.MonkeyPatch) -> None:
         return known[experiment.label]
 
     known: dict[str, Repairs | None] = {}
-    monkeypatch.setattr("ballplate.extensions.repair.repair_search.repairs", repairs_of)
+    monkeypatch.setattr("ballplate.extensions.repair.suggestions.repairs", repairs_of)
 
 
 def test_suggestions_in_every_format(

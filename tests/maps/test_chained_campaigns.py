@@ -13,11 +13,11 @@ from typing import Any
 import ballplate as bp
 import numpy as np
 import pytest
+from ballplate.extensions.reliability.hat import whitened_residuals
 from ballplate.results.fitting import fit
 from ballplate.results.sigmas_by_campaign import compared
 from ballplate.simulator.design.parameters import shared_layout
 from ballplate.simulator.estimation.gauss_newton import moved
-from ballplate.simulator.estimation.hat import whitened_residuals
 from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.maps.map_prior import EarlierCampaign
 from ballplate.simulator.readings.observed_readings import ObservedReadings, observe

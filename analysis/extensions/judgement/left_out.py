@@ -14,6 +14,7 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
+from ballplate.extensions.reliability.hat import hat_rows, row_count, row_places, whitened_residuals
 from ballplate.results import campaign_sigmas
 from ballplate.simulator.computing import ProgressStep, Report, single_threaded, unreported
 from ballplate.simulator.design import (
@@ -29,12 +30,8 @@ from ballplate.simulator.estimation import (
     Linearisation,
     MeasuredPoints,
     estimate,
-    hat_rows,
     linear_functions,
     linearised_fit,
-    row_count,
-    row_places,
-    whitened_residuals,
 )
 from ballplate.simulator.experiment import Experiment
 from ballplate.simulator.geometry import AXIS_NAMES

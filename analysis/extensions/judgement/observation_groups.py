@@ -6,6 +6,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from ballplate.extensions.reliability.hat import row_count, row_places
 from ballplate.results import Grouping
 from ballplate.simulator.design import (
     Design,
@@ -15,7 +16,6 @@ from ballplate.simulator.design import (
     measured,
     reading_uncertainties,
 )
-from ballplate.simulator.estimation import row_count, row_places
 from ballplate.simulator.geometry import AXIS_NAMES
 from ballplate.simulator.machines import Array, Integers
 

@@ -14,6 +14,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from ballplate.extensions.reliability.hat import hat_rows, row_count, row_places
 from ballplate.results import Grouping
 from ballplate.simulator.computing import single_threaded
 from ballplate.simulator.design import (
@@ -26,7 +27,7 @@ from ballplate.simulator.design import (
     Stars,
     length_whitening,
 )
-from ballplate.simulator.estimation import Linearisation, hat_rows, row_count, row_places
+from ballplate.simulator.estimation import Linearisation
 from ballplate.simulator.experiment import Experiment
 from ballplate.simulator.machines import Array
 

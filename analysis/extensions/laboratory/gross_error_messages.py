@@ -25,7 +25,7 @@ def refuse_gross_errors(
 
     `marks` tell where each of the design's readings stands, and `settings` what the scale readings
     x (readings, d) were made of. The rules are those of
-    `readings.gross_errors` and `estimation.length_ratios`.
+    `gross_errors` and `length_ratios`.
 
     :raises ExperimentError: some readings are wrong; names all of them.
     """

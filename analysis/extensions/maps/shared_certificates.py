@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
+from ballplate.extensions.reliability.hat import hat_rows, row_count, row_places
 from ballplate.results import Fit
 from ballplate.simulator.computing import single_threaded
 from ballplate.simulator.design import (
@@ -18,7 +19,6 @@ from ballplate.simulator.design import (
     length_name,
     length_whitening,
 )
-from ballplate.simulator.estimation import hat_rows, row_count, row_places
 from ballplate.simulator.machines import Array, Integers
 
 from .compared_maps import ComparedMap, without_shared

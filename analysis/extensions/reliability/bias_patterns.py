@@ -27,8 +27,9 @@ from ballplate.simulator.design import (
     reading_weights,
     rotation_sensitivity,
 )
-from ballplate.simulator.estimation import row_count, row_places
 from ballplate.simulator.machines import Array, Integers, Unit
+
+from .hat import row_count, row_places
 
 if TYPE_CHECKING:
     from ballplate.simulator.design import Whitening

@@ -16,7 +16,7 @@ from ballplate.simulator.computing import (
     unreported,
 )
 from ballplate.simulator.design import Design, measured
-from ballplate.simulator.estimation import Parameters, linearise, row_count, row_places
+from ballplate.simulator.estimation import Parameters, linearise
 from ballplate.simulator.experiment import Experiment, lay_out
 from ballplate.simulator.machines import Integers
 from ballplate.uncertainty import QUANTITIES, functions_of
@@ -25,6 +25,7 @@ from .bias_patterns import patterns
 from .cause_search import FAMILY
 from .effects import SYMBOLS, Changes, Largest, across_probes, changes_of
 from .events import event_groups
+from .hat import row_count, row_places
 from .power import noncentrality
 from .reliability_result import Effects, Reliability
 from .remainders import Columns, leftover, too_many_entries

@@ -9,8 +9,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from ballplate.simulator.design import Design, shared_layout
-from ballplate.simulator.estimation import Linearisation, hat_rows, row_count, whitened_residuals
+from ballplate.simulator.estimation import Linearisation
 from ballplate.simulator.machines import Array, Integers
+
+from .hat import hat_rows, row_count, whitened_residuals
 
 if TYPE_CHECKING:
     from scipy.sparse import csc_array, csr_array

@@ -7,10 +7,11 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from ballplate.simulator.estimation import Linearisation, hat_rows
+from ballplate.simulator.estimation import Linearisation
 from ballplate.simulator.machines import Array, Integers
 
 from .bias_patterns import Patterns
+from .hat import hat_rows
 from .remainders import columns_of_balls
 
 if TYPE_CHECKING:

@@ -8,12 +8,12 @@ from itertools import product
 
 import numpy as np
 from ballplate.simulator.design import Design, State, locations, rotation_sensitivity
-from ballplate.simulator.estimation import row_count
 from ballplate.simulator.geometry import AXIS_NAMES
 from ballplate.simulator.machines import Array
 from numpy.polynomial import legendre
 
 from .bias_patterns import LinearisedDesign
+from .hat import row_count
 
 # Scale readings closer than this (m) count as the same place on a scale.
 SAME_PLACE = 1e-3

@@ -19,13 +19,13 @@ import numpy as np
 from ballplate.extensions.laboratory.gross_error_messages import refuse_gross_errors
 from ballplate.extensions.laboratory.offsets_applied import doubt_about_offsets
 from ballplate.extensions.reliability.cause_search import FAMILY, Search
+from ballplate.extensions.reliability.hat import row_places
 from ballplate.extensions.reliability.power import noncentrality
 from ballplate.extensions.reliability.refits import diagnosis_with_refits
 from ballplate.extensions.reliability.wording import diagnosis_words
 from ballplate.simulator.design.arrays import Design
 from ballplate.simulator.design.observations.priors import Priors
 from ballplate.simulator.estimation.gauss_newton import estimate, linearised_fit
-from ballplate.simulator.estimation.hat import row_places
 from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.readings_section import no_settings
 from ballplate.simulator.inputs.messages import ExperimentError

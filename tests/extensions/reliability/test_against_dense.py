@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from ballplate.extensions.reliability.bias_patterns import Patterns, patterns
+from ballplate.extensions.reliability.hat import row_places, whitened_residuals
 from ballplate.extensions.reliability.redundancy import reliability_of
 from ballplate.extensions.reliability.reliability_result import Reliability
 from ballplate.simulator.design.arrays import Design, State, nominal_state
@@ -20,7 +21,6 @@ from ballplate.simulator.design.observations.lengths import Lengths
 from ballplate.simulator.design.observations.readings import expected_readings
 from ballplate.simulator.design.parameters import shared_layout
 from ballplate.simulator.estimation.gauss_newton import gauss_newton, moved
-from ballplate.simulator.estimation.hat import row_places, whitened_residuals
 from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.geometry.motions import rotation_from_vector

@@ -11,12 +11,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 from ballplate.extensions.reliability.cause_search import diagnosis
+from ballplate.extensions.reliability.hat import whitened_residuals
 from ballplate.extensions.reliability.suspects import Diagnosis, Suspect
 from ballplate.extensions.reliability.wording import diagnosis_lines, unexplained_words
 from ballplate.simulator.design.arrays import Design
 from ballplate.simulator.design.observations.distances import CalibratedDistances
 from ballplate.simulator.estimation.gauss_newton import Solution, estimate, linearised_fit
-from ballplate.simulator.estimation.hat import whitened_residuals
 from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.machines.truth import true_machine

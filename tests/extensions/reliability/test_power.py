@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from ballplate.extensions.reliability.bias_patterns import Patterns, patterns
 from ballplate.extensions.reliability.cause_search import diagnosis
+from ballplate.extensions.reliability.hat import hat_rows, row_count
 from ballplate.extensions.reliability.power import (
     alarm_limit,
     chance_of_alarm,
@@ -25,7 +26,6 @@ from ballplate.simulator.design.observations.distances import CalibratedDistance
 from ballplate.simulator.design.observations.lengths import Lengths
 from ballplate.simulator.design.observations.readings import rotation_sensitivity
 from ballplate.simulator.estimation.gauss_newton import Solution, estimate, linearised_fit
-from ballplate.simulator.estimation.hat import hat_rows, row_count
 from ballplate.simulator.estimation.linearisation import linearise
 from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.machines.truth import true_machine

@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from ballplate.extensions.reliability.cause_search import Search
+from ballplate.extensions.reliability.hat import whitened_residuals
 from ballplate.extensions.reliability.remainders import leftover
 from ballplate.extensions.reliability.scatter import (
     log_chances,
@@ -20,7 +21,6 @@ from ballplate.extensions.reliability.scatter import (
 from ballplate.simulator.design.arrays import Design, State
 from ballplate.simulator.design.parameters import shared_layout
 from ballplate.simulator.estimation.gauss_newton import estimate, moved
-from ballplate.simulator.estimation.hat import whitened_residuals
 from ballplate.simulator.estimation.linearisation import linearise
 from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.machines.truth import true_machine

@@ -543,8 +543,9 @@ def test_a_pool_of_a_file(tmp_path: Path) -> None:
     path.write_text(yaml.safe_dump(said), encoding="utf-8")
     (checked,) = check_files([path], wanted=Wanted(repairs=True))
     (one,) = checked.designs
-    assert one.repairs is not None and one.prediction.verdict.deficiency
-    first = one.repairs.complete[0]
+    suggested = one.suggestions.repairs
+    assert suggested is not None and one.prediction.verdict.deficiency
+    first = suggested.complete[0]
     assert [change.kind for change in first.changes] == [ChangeKind.POOL]
     after = check(written_out(said, first, tmp_path)).verdict
     assert not after.deficiency and not after.weak

@@ -10,7 +10,7 @@ from typing import NoReturn
 import numpy as np
 import pytest
 from ballplate.cli import main
-from ballplate.extensions.repair import repair_search, whole_pool
+from ballplate.extensions.repair import whole_pool
 from ballplate.extensions.repair.changes import ChangeKind, apply_all
 from ballplate.extensions.repair.whole_pool import PoolGap, pool_gap, spanning
 from ballplate.planning.information import pool_information
@@ -119,7 +119,7 @@ def test_a_few_candidates_leave_open_what_all_of_them_do(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Against the rank of a design with all, for pools at random and for parts of them."""
-    monkeypatch.setattr(repair_search, "repairs", lambda *_, **__: None)
+    monkeypatch.setattr(whole_pool, "repairs", lambda *_, **__: None)
     fewer = told = 0
     for seed in range(60):
         experiment = random_pool(tmp_path, seed).experiment
@@ -161,7 +161,7 @@ def test_words_that_cannot_be_had_do_not_stop_a_plan(
     assert main(arguments) == 1
     told = capsys.readouterr().out
     assert "even all 8 candidates" in told and "what would determine it" in told
-    monkeypatch.setattr(repair_search, "repairs", refuses)
+    monkeypatch.setattr(whole_pool, "repairs", refuses)
     assert main(arguments) == 1
     assert "even all 8 candidates" in capsys.readouterr().out
     monkeypatch.setattr(whole_pool, "MOST_WORK", 1.0)
@@ -220,7 +220,7 @@ def test_a_pool_that_determines_nothing_is_refused_with_what_it_lacks(
 def test_a_ball_that_nothing_ties_to_its_plate_is_counted(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, balls: str, pairs: str, open_: int
 ) -> None:
-    monkeypatch.setattr(repair_search, "repairs", lambda *_, **__: None)
+    monkeypatch.setattr(whole_pool, "repairs", lambda *_, **__: None)
     path = written(tmp_path, "[down, right]")
     text = path.read_text("utf-8").replace("corner sides", pairs)
     others = "probes: [[down, right]], balls: [r1c1, r1c2, r1c3, r2c1, r2c2, r2c3, r3c1, r3c2]"

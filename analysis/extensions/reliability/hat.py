@@ -13,14 +13,10 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
-
-from ..computing.threads import single_threaded
-from ..design.arrays import Design, State
-from ..design.observations.readings import reading_blocks
-from ..design.parameters import SharedLayout
-from ..machines.protocol import Array, Integers
-from .elimination import ROWS_AT_ONCE
-from .linearisation import Linearisation
+from ballplate.simulator.computing import single_threaded
+from ballplate.simulator.design import Design, SharedLayout, State, reading_blocks
+from ballplate.simulator.estimation import ROWS_AT_ONCE, Linearisation
+from ballplate.simulator.machines import Array, Integers
 
 
 @dataclass(frozen=True)
