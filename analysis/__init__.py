@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from ballplate.extensions.campaign.interface import sheet
     from ballplate.extensions.certificates.interface import certificate
     from ballplate.extensions.compensation.interface import compensation, read_compensation
-    from ballplate.extensions.judgement.interface import budget, models, validate
+    from ballplate.extensions.judgement.interface import budget, compare_models, validate
     from ballplate.extensions.laboratory.interface import read_report
     from ballplate.extensions.maps.interface import (
         adjust,
@@ -122,6 +122,7 @@ __all__ = [
     "certificate",
     "check",
     "compare",
+    "compare_models",
     "compensation",
     "convert",
     "correct",
@@ -138,7 +139,6 @@ __all__ = [
     "load_all",
     "load_map",
     "map",
-    "models",
     "page",
     "parse_length",
     "plan",
@@ -167,6 +167,7 @@ _KERNEL = {
     "ballplate.api": (
         "check",
         "compare",
+    "compare_models",
         "experiment",
         "fit",
         "load_map",

@@ -28,7 +28,6 @@ NAMES = tuple(extension.name for extension in SHIPPED)
 # What an extension takes from another one, and why that is no part of the kernel.
 BUILDS_ON = {
     ("campaign", "requirements"): "the next position is chosen for the goals of `reach`",
-    ("judgement", "maps"): "campaigns are compared as maps are",
     ("judgement", "reliability"): "the residuals of each model are searched as those of a fit",
     ("certificates", "laboratory"): "both read XML",
     ("maps", "reliability"): "certificates in common act on fits as gross errors do",

@@ -96,7 +96,7 @@ SHIPPED = (
                 "uncertainties by their sources: readings, certificates, probes, influences",
             ),
         },
-        functions=_from("interface", "budget", "models", "validate"),
+        functions=_from("interface", "budget", "compare_models", "validate"),
         services=_from("bootstrap", "bootstrap") | _from("components", "variance_components"),
     ),
     _here(

@@ -18,5 +18,5 @@ MOVED = {
     "ballplate validate --against": "ballplate diff FILE FILE --readings FIRST SECOND",
     "ballplate validate --other-plate": "ballplate diff, without --shared",
     "bp.cross_validate": "bp.diff",
-    "bp.ladder": "bp.models",
+    "bp.ladder": "bp.compare_models",
 }

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from .left_out_result import Validation
 
 
-def models(
+def compare_models(
     experiment: Experiment | PathLike,
     readings: Tables = None,
     sigma: Literal["estimated", "given"] | None = None,
@@ -38,7 +38,7 @@ def models(
 
     >>> import ballplate as bp
     >>> readings = bp.simulate(bp.quickstart())
-    >>> bp.models(bp.quickstart(), readings, coefficients=6).recommended
+    >>> bp.compare_models(bp.quickstart(), readings, coefficients=6).recommended
     'kinematic, 5 and 5 coefficients'
     """
     from .compared_models import compared_models

@@ -347,7 +347,7 @@ def test_the_richest_polynomials_leave_none_of_both_kinds_behind(
 def test_changes_of_lengths_are_those_between_fits() -> None:
     experiment = small()
     readings = bp.simulate(experiment)
-    found = bp.models(experiment, readings, coefficients=3)
+    found = bp.compare_models(experiment, readings, coefficients=3)
     chosen = experiment.with_({"error_model": found.error_model})
     points = bp.fit(experiment, readings).design.evaluation.points
     first, second = (bp.fit(one, readings).correct(points).points for one in (experiment, chosen))
@@ -378,7 +378,7 @@ def test_knowledge_of_one_models_parameters_is_refused() -> None:
 
 def test_two_dimensions() -> None:
     experiment = bp.load("designs/hocken_borchardt/real.yaml", "with scale")
-    found = bp.models(experiment, "designs/hocken_borchardt/real-readings.csv")
+    found = bp.compare_models(experiment, "designs/hocken_borchardt/real-readings.csv")
     assert any(one.is_of_file for one in found.rungs)
     assert all(np.isfinite(one.criteria.bic) for one in found.rungs)
 
