@@ -167,7 +167,7 @@ _KERNEL = {
     "ballplate.api": (
         "check",
         "compare",
-    "compare_models",
+        "compare_models",
         "experiment",
         "fit",
         "load_map",

@@ -416,12 +416,58 @@ class _Version(argparse.Action):
 
 # Public names of this package: extensions import these alone, and its modules are private.
 if TYPE_CHECKING:
-    from .common import add_file, add_formats, add_goal, add_json, add_picture, add_workers, argument_type, at_most, count, coverage_factor, day, experiments, grid, map_path, number, percentage, print_json, print_lines, show, single, trial_count, whole, write_noted, write_picture
+    from .common import (
+        add_file,
+        add_formats,
+        add_goal,
+        add_json,
+        add_picture,
+        add_workers,
+        argument_type,
+        at_most,
+        count,
+        coverage_factor,
+        day,
+        experiments,
+        grid,
+        map_path,
+        number,
+        percentage,
+        print_json,
+        print_lines,
+        show,
+        single,
+        trial_count,
+        whole,
+        write_noted,
+        write_picture,
+    )
     from .excerpts import print_errors
     from .notes import complain, note, warn
-    from .outputs import Needed, Output, OutputAction, PAGE, PARQUET, UsageError, Writer, add_force, add_output, check_outputs, check_overwritten, text_writer, write, write_outputs
+    from .outputs import (
+        PAGE,
+        PARQUET,
+        Needed,
+        Output,
+        OutputAction,
+        UsageError,
+        Writer,
+        add_force,
+        add_output,
+        check_outputs,
+        check_overwritten,
+        text_writer,
+        write,
+        write_outputs,
+    )
     from .progress_bars import duration, progress
-    from .reading_options import add_readings, add_readings_argument, observed_readings, refuse_wrong_order, warn_of
+    from .reading_options import (
+        add_readings,
+        add_readings_argument,
+        observed_readings,
+        refuse_wrong_order,
+        warn_of,
+    )
     from .table_options import KEYS, add_tables, named_sources, rule, with_options
 
 __getattr__, __dir__ = lazily(__name__, __file__)

@@ -10,14 +10,63 @@ from ballplate.simulator.inputs.faces import lazily
 if TYPE_CHECKING:
     from .files import write_file
     from .formats import FORMATS
-    from .formatting import SHOWN, aligned, amount_of, as_data, ascii_units, csv_lines, finite, fixed, given, micro, number, percent, picked, records, shown_unit, to_uncertainty, uncertainty_words
+    from .formatting import (
+        SHOWN,
+        aligned,
+        amount_of,
+        as_data,
+        ascii_units,
+        csv_lines,
+        finite,
+        fixed,
+        given,
+        micro,
+        number,
+        percent,
+        picked,
+        records,
+        shown_unit,
+        to_uncertainty,
+        uncertainty_words,
+    )
     from .paper import escaped, on_paper, pitch
     from .pictures import draw_box, draw_scene, scene_figure
     from .result import FitResult, Result
-    from .scenes import Box, DrawnPosition, MOST_BALLS, RISE, Scene, TURN, box, box_edges, hull, names_fit, projection, scene
-    from .svg import DASHES, INK, MARKERS, MUTED, PAPER, SERIES, WIDTH, blank_axes, common_legend, drawing, legend_above, placed_axes, round_number, save, scale_bar, scaled_axis, sticks
+    from .scenes import (
+        MOST_BALLS,
+        RISE,
+        TURN,
+        Box,
+        DrawnPosition,
+        Scene,
+        box,
+        box_edges,
+        hull,
+        names_fit,
+        projection,
+        scene,
+    )
+    from .svg import (
+        DASHES,
+        INK,
+        MARKERS,
+        MUTED,
+        PAPER,
+        SERIES,
+        WIDTH,
+        blank_axes,
+        common_legend,
+        drawing,
+        legend_above,
+        placed_axes,
+        round_number,
+        save,
+        scale_bar,
+        scaled_axis,
+        sticks,
+    )
     from .table import Block, Entry, Row, Table
-    from .table_columns import Columns, ROUNDING, by_axis, table_lines
+    from .table_columns import ROUNDING, Columns, by_axis, table_lines
     from .vectors import Vectors, draw_vectors
 
 __getattr__, __dir__ = lazily(__name__, __file__)

@@ -8,6 +8,18 @@ from ballplate.simulator.inputs.faces import lazily
 
 # Public names of this package: extensions import these alone, and its modules are private.
 if TYPE_CHECKING:
-    from .verdicts import Direction, Verdict, changed_names, effects, independent_mixture, length, null_changes, relative_changes, verdict, weak_changes, weak_limit
+    from .verdicts import (
+        Direction,
+        Verdict,
+        changed_names,
+        effects,
+        independent_mixture,
+        length,
+        null_changes,
+        relative_changes,
+        verdict,
+        weak_changes,
+        weak_limit,
+    )
 
 __getattr__, __dir__ = lazily(__name__, __file__)

@@ -11,7 +11,14 @@ if TYPE_CHECKING:
     from .adjustments import ARCSECOND, FEW, coverage_factor, few_degrees_of_freedom, freedom_words
     from .checked_designs import PlannedUncertainty, check, planned_uncertainty, predict
     from .diagnosis import has_exact_values
-    from .estimates import ESTIMATE_COLUMNS, EstimatedFunctions, Function, ParameterEstimate, estimated_functions, labels
+    from .estimates import (
+        ESTIMATE_COLUMNS,
+        EstimatedFunctions,
+        Function,
+        ParameterEstimate,
+        estimated_functions,
+        labels,
+    )
     from .fits import Fit
     from .fitting import fit
     from .groupings import GROUPINGS, Grouping

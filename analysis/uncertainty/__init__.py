@@ -11,7 +11,16 @@ if TYPE_CHECKING:
     from .kernel_quantities import evaluation_points, task_distances
     from .pairs import PairSummary, PairTile, open_above, pair_tiles, pairs_of, relative
     from .quantities import DESCRIPTIONS, QUANTITIES, RECORDED, RECORDED_IF_TOLD, functions_of
-    from .scale import OFFSET_TRIAL, OWN_SCALES, Scale, can_stretch, exact_offsets, lengths_with_offsets, scale_of, stretches
+    from .scale import (
+        OFFSET_TRIAL,
+        OWN_SCALES,
+        Scale,
+        can_stretch,
+        exact_offsets,
+        lengths_with_offsets,
+        scale_of,
+        stretches,
+    )
     from .summaries import Quantity, point_pairs, summarise, uncertainties
     from .tasks import expansion
 

@@ -8,22 +8,67 @@ from ballplate.simulator.inputs.faces import lazily
 
 # Public names of this package: extensions import these alone, and its modules are private.
 if TYPE_CHECKING:
-    from .arrays import Design, Observations, Readings, Rows, State, locations, measured, nominal_places, nominal_state, read_in_positions, reading_noise, reading_uncertainties
-    from .influences.drift import Clock, Drift, DriftSettings, HOUR, PointDriftSettings, ScaleDriftSettings, even_clock
-    from .influences.protocol import DesignParts, Disturbed, Influence, InfluenceParameter, InfluenceSettings
-    from .influences.temperature import COLDEST, TemperaturesSettings, WARMEST
+    from .arrays import (
+        Design,
+        Observations,
+        Readings,
+        Rows,
+        State,
+        locations,
+        measured,
+        nominal_places,
+        nominal_state,
+        read_in_positions,
+        reading_noise,
+        reading_uncertainties,
+    )
+    from .influences.drift import (
+        HOUR,
+        Clock,
+        Drift,
+        DriftSettings,
+        PointDriftSettings,
+        ScaleDriftSettings,
+        even_clock,
+    )
+    from .influences.protocol import (
+        DesignParts,
+        Disturbed,
+        Influence,
+        InfluenceParameter,
+        InfluenceSettings,
+    )
+    from .influences.temperature import COLDEST, WARMEST, TemperaturesSettings
     from .lookup import Indices, References
-    from .objects import Flags, SLIGHTLY, Tasks, Volume
+    from .objects import SLIGHTLY, Flags, Tasks, Volume
     from .observations.balls import BallObservations
-    from .observations.calibration import Calibration, CertifiedValue, FAR_FROM_DRAWING, far_from_drawing
+    from .observations.calibration import (
+        FAR_FROM_DRAWING,
+        Calibration,
+        CertifiedValue,
+        far_from_drawing,
+    )
     from .observations.coordinates import CalibratedCoordinates, CoordinateCalibration
     from .observations.distances import CalibratedDistances, DistanceCalibration
     from .observations.joint_values import JointValues
-    from .observations.lengths import Lengths, length_directions, length_name, length_values, length_whitening
+    from .observations.lengths import (
+        Lengths,
+        length_directions,
+        length_name,
+        length_values,
+        length_whitening,
+    )
     from .observations.priors import Priors
     from .observations.python_values import PythonCalibration
     from .observations.radius import RadiusCalibration
-    from .observations.readings import expected_readings, offset_sensitivity, reading_blocks, reading_weights, rotation_sensitivity, seen_places
+    from .observations.readings import (
+        expected_readings,
+        offset_sensitivity,
+        reading_blocks,
+        reading_weights,
+        rotation_sensitivity,
+        seen_places,
+    )
     from .observations.star import Stars
     from .observations.stated_values import CertificateEntry, FileValues, value_name
     from .observations.whitening import CovarianceRoot, Whitening, at_least_exact

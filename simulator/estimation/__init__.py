@@ -11,7 +11,19 @@ if TYPE_CHECKING:
     from .corrections import corrected_points, correction_rows
     from .covariance import MICROMETRE
     from .elimination import ROWS_AT_ONCE
-    from .functions import BallPlaces, Coordinates, Displacements, Distances, Functions, MeasuredPoints, Parameters, Places, displacements, function_name, linear_functions
+    from .functions import (
+        BallPlaces,
+        Coordinates,
+        Displacements,
+        Distances,
+        Functions,
+        MeasuredPoints,
+        Parameters,
+        Places,
+        displacements,
+        function_name,
+        linear_functions,
+    )
     from .gauss_newton import Solution, Status, as_drawn, estimate, linearised_fit
     from .initial import initial_state
     from .linearisation import LinearFunctions, Linearisation, linearise

@@ -21,12 +21,32 @@ if TYPE_CHECKING:
     from .model_files import absolute
     from .modules import python_models, runs_code
     from .name_rules import PLACE, check_rule
-    from .named_files import existing_file, files_of_machine, is_rooted, keyed_paths, model_modules, module_files, named_in
+    from .named_files import (
+        existing_file,
+        files_of_machine,
+        is_rooted,
+        keyed_paths,
+        model_modules,
+        module_files,
+        named_in,
+    )
     from .pool import placed_only, with_chosen
     from .pools import seconds_of
-    from .readings_section import ColumnsSettings, CompensationSettings, Coordinate, ReadingsSettings
+    from .readings_section import (
+        ColumnsSettings,
+        CompensationSettings,
+        Coordinate,
+        ReadingsSettings,
+    )
     from .sections import Line, Seed
     from .star_tables import doubt_of_table
-    from .variants import is_same_place, node_at, override, place_of, variant_trees, with_present_keys
+    from .variants import (
+        is_same_place,
+        node_at,
+        override,
+        place_of,
+        variant_trees,
+        with_present_keys,
+    )
 
 __getattr__, __dir__ = lazily(__name__, __file__)

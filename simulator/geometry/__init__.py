@@ -13,7 +13,24 @@ if TYPE_CHECKING:
     from .ball_layouts import ArtefactSettings, BallLayout, Name, frozen, pairs
     from .grids import even_grid, grid_points
     from .listed_directions import directions
-    from .motions import AXIS_NAMES, Array, cross_matrices, fit_motion, fixes_pose, pose_size, rigid_motions, without_rigid_motion
-    from .positions import AXIS_INDEX, Axis, IN_PLANE_AXES, Pose, QUARTER_TURNS, ball_coordinates, plane_rotation
+    from .motions import (
+        AXIS_NAMES,
+        Array,
+        cross_matrices,
+        fit_motion,
+        fixes_pose,
+        pose_size,
+        rigid_motions,
+        without_rigid_motion,
+    )
+    from .positions import (
+        AXIS_INDEX,
+        IN_PLANE_AXES,
+        QUARTER_TURNS,
+        Axis,
+        Pose,
+        ball_coordinates,
+        plane_rotation,
+    )
 
 __getattr__, __dir__ = lazily(__name__, __file__)

@@ -10,19 +10,108 @@ from ballplate.simulator.inputs.faces import lazily
 
 # Public names of this package: extensions import these alone, and its modules are private.
 if TYPE_CHECKING:
-    from .arguments import ensure_one_of, ensure_path, ensure_positive, ensure_report, ensure_type, ensure_whole
-    from .covariances import Floats, MOST_NAMES, NamedMatrix, half_digit, matrix_problems, unit_of_area
+    from .arguments import (
+        ensure_one_of,
+        ensure_path,
+        ensure_positive,
+        ensure_report,
+        ensure_type,
+        ensure_whole,
+    )
+    from .covariances import (
+        MOST_NAMES,
+        Floats,
+        NamedMatrix,
+        half_digit,
+        matrix_problems,
+        unit_of_area,
+    )
     from .days import stated_day
     from .decoding import LINE_END, decoded, refuse_controls, text_and_encoding
-    from .messages import ExperimentError, MORE_ERRORS, MOST_MESSAGES, Message, Step, Steps, format_path, in_lines, in_one_line, refused
+    from .messages import (
+        MORE_ERRORS,
+        MOST_MESSAGES,
+        ExperimentError,
+        Message,
+        Step,
+        Steps,
+        format_path,
+        in_lines,
+        in_one_line,
+        refused,
+    )
     from .problems import Problems
-    from .quantities import ANGLE_UNITS, BASE_UNITS, DURATION_UNITS, LENGTH_UNITS, Length, LengthFunction, PositiveAngle, PositiveLength, QUANTITY, QuantityError, Ratio, SMALLEST, Target, UNITS, exact_number, format_length, length_text, metres_or_radians, parse_angle, parse_length, parse_length_drift, parse_length_function, parse_positive_angle, parse_positive_length, parse_ratio, parse_ratio_drift, plain_number, plain_unit, power_of_ten, typed_length
+    from .quantities import (
+        ANGLE_UNITS,
+        BASE_UNITS,
+        DURATION_UNITS,
+        LENGTH_UNITS,
+        QUANTITY,
+        SMALLEST,
+        UNITS,
+        Length,
+        LengthFunction,
+        PositiveAngle,
+        PositiveLength,
+        QuantityError,
+        Ratio,
+        Target,
+        exact_number,
+        format_length,
+        length_text,
+        metres_or_radians,
+        parse_angle,
+        parse_length,
+        parse_length_drift,
+        parse_length_function,
+        parse_positive_angle,
+        parse_positive_length,
+        parse_ratio,
+        parse_ratio_drift,
+        plain_number,
+        plain_unit,
+        power_of_ten,
+        typed_length,
+    )
     from .settings import Forms, NonEmpty, Settings, hint, listed, listing, number_of, shorten
     from .spreadsheets import CsvWriter, cell_of_text, text_of_cell
-    from .tables import FileRow, MOST_COLUMNS, MOST_ROWS, header_cells, header_names, header_texts, headings, read_number, read_table, split_cells, table_lines, wrong_count
-    from .trust import OPENED, Trust, UNKNOWN
+    from .tables import (
+        MOST_COLUMNS,
+        MOST_ROWS,
+        FileRow,
+        header_cells,
+        header_names,
+        header_texts,
+        headings,
+        read_number,
+        read_table,
+        split_cells,
+        table_lines,
+        wrong_count,
+    )
+    from .trust import OPENED, UNKNOWN, Trust
     from .unusable import UnusableError
     from .validation import validated
-    from .yamltree import GivenText, LOADER, Mapping, Mark, Node, Scalar, Sequence, child, mark_of, parse_tree, read_bytes, read_text, read_tree, resolve_scalar, to_list, to_python, utf8_text, walk, written
+    from .yamltree import (
+        LOADER,
+        GivenText,
+        Mapping,
+        Mark,
+        Node,
+        Scalar,
+        Sequence,
+        child,
+        mark_of,
+        parse_tree,
+        read_bytes,
+        read_text,
+        read_tree,
+        resolve_scalar,
+        to_list,
+        to_python,
+        utf8_text,
+        walk,
+        written,
+    )
 
 __getattr__, __dir__ = lazily(__name__, __file__)

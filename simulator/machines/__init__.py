@@ -13,16 +13,48 @@ if TYPE_CHECKING:
     from .basis_settings import SplineSettings
     from .curves import NAMES, Points, SmoothedPoints, curves_model
     from .custom import CustomModelError, module_source
-    from .description import Combination, MachineDescription, ParametricError, PowerSeries, reference_functions, stated_function, true_volumetric
-    from .empirical import EmpiricalModel, USUAL_OFFSET
-    from .empirical_settings import EmpiricalSettings, OF_BASIS
+    from .description import (
+        Combination,
+        MachineDescription,
+        ParametricError,
+        PowerSeries,
+        reference_functions,
+        stated_function,
+        true_volumetric,
+    )
+    from .empirical import USUAL_OFFSET, EmpiricalModel
+    from .empirical_settings import OF_BASIS, EmpiricalSettings
     from .error_names import AXIS_ERRORS, SQUARENESS_ERRORS, SquarenessError
     from .kinematic import ErrorFunction, KinematicModel, carried_vectors, error_function
     from .kinematic_settings import FunctionsSettings, KinematicSettings
     from .model_kinds import Corner, ErrorModelKind
     from .plane import PlaneModel
-    from .protocol import Array, ErrorModel, HasLines, Integers, Parameter, Reported, TrueMachine, Unit
-    from .settings import ErrorModelSettings, MachineFileSettings, PythonSettings, build_error_model, kind_of, with_defaults
-    from .volumetric import Field, SQUARENESS, VolumetricModel, meaning, squareness_field, symbol, thermal_field
+    from .protocol import (
+        Array,
+        ErrorModel,
+        HasLines,
+        Integers,
+        Parameter,
+        Reported,
+        TrueMachine,
+        Unit,
+    )
+    from .settings import (
+        ErrorModelSettings,
+        MachineFileSettings,
+        PythonSettings,
+        build_error_model,
+        kind_of,
+        with_defaults,
+    )
+    from .volumetric import (
+        SQUARENESS,
+        Field,
+        VolumetricModel,
+        meaning,
+        squareness_field,
+        symbol,
+        thermal_field,
+    )
 
 __getattr__, __dir__ = lazily(__name__, __file__)

@@ -9,6 +9,14 @@ from ballplate.simulator.inputs.faces import lazily
 # Public names of this package: extensions import these alone, and its modules are private.
 if TYPE_CHECKING:
     from .fit_verdict import LackOfFit, verdict_data, verdict_line
-    from .fitted_map import CONVERSION, FittedMap, InCommon, LeftOut, MapData, determined_only, readings_in_common
+    from .fitted_map import (
+        CONVERSION,
+        FittedMap,
+        InCommon,
+        LeftOut,
+        MapData,
+        determined_only,
+        readings_in_common,
+    )
 
 __getattr__, __dir__ = lazily(__name__, __file__)

@@ -13,7 +13,15 @@ if TYPE_CHECKING:
     from .given_points import ensure_points, probe_places
     from .observed_readings import ObservedReadings, reading_keys
     from .reading_files import AXES, read_readings
-    from .reading_sources import Source, SourceRows, SourceText, Units, is_plain, named_rows, plain_rows
+    from .reading_sources import (
+        Source,
+        SourceRows,
+        SourceText,
+        Units,
+        is_plain,
+        named_rows,
+        plain_rows,
+    )
     from .simulated import Simulated, on_stated_machine, simulated_readings
 
 __getattr__, __dir__ = lazily(__name__, __file__)

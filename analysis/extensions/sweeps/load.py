@@ -39,9 +39,9 @@ from ballplate.simulator.inputs import (
 
 from .axes import read_axis
 from .bundle import bundle_of, code_digest, has_code
-from .columns import is_reserved
 from .conditions import holds
 from .model import Sweep, SweepAxis
+from .store_columns import is_reserved
 from .sweep_settings import SweepSettings
 from .values import entry_names
 

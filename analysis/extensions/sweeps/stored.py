@@ -23,7 +23,7 @@ from pydantic import (
     ValidationError,
 )
 
-from .columns import is_reserved
+from .store_columns import is_reserved
 
 # Columns of a table that are no figures.
 OWN = ("cell", "status", "reason", "data_set_seed", "fingerprint", "duration_s")

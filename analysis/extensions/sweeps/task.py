@@ -24,10 +24,10 @@ from ballplate.simulator.computing import single_threaded, versions, want_of_mem
 from ballplate.simulator.experiment import Experiment
 from ballplate.simulator.inputs import ExperimentError, UnusableError
 
-from .columns import symbol_column, unit_suffix
 from .fingerprint import fingerprint, with_method, without_method
 from .load import experiment_of
 from .model import Sweep
+from .store_columns import symbol_column, unit_suffix
 
 # Replicates of a block, a multiple of a batch's; a cell with no more is computed at one go.
 BLOCK = 8192

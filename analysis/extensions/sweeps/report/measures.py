@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from ballplate.presentation import shown_unit
 from ballplate.uncertainty import DESCRIPTIONS
 
-from ..columns import MORE, symbol_column
+from ..store_columns import MORE, symbol_column
 from .results import ReportedSweep
 
 STATISTICS = ("maximum", "average")

@@ -32,9 +32,9 @@ from ballplate.simulator.experiment import Experiment, lay_out
 from ballplate.simulator.inputs import in_one_line, listing
 from ballplate.uncertainty import DESCRIPTIONS
 
-from ..columns import symbol_column
 from ..error_map_uncertainty import error_map
 from ..store import Store
+from ..store_columns import symbol_column
 from .answer import answer
 from .cells import NoExperimentError, experiments
 from .design_pictures import probes_svg, scene_svg, slice_svg, slice_words

@@ -14,9 +14,9 @@ from ballplate.simulator.inputs import QUANTITY, exact_number, in_one_line
 from ballplate.uncertainty import RECORDED
 from numpy.typing import NDArray
 
-from ..columns import MORE, symbol_column
 from ..frame import frame_of
 from ..store import Store, chosen_sweep, definition_of, results
+from ..store_columns import MORE, symbol_column
 from ..stored import StoredResults as Found
 
 if TYPE_CHECKING:

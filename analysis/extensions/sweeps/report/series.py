@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..columns import symbol_column
+from ..store_columns import symbol_column
 from .measures import Measure, trial_symbols, uncertainty_measures
 from .results import ReportAxis, ReportedSweep, criterion, partly_open, ranked
 

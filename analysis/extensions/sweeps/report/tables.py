@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from ballplate.montecarlo import MonteCarloEstimate, with_error
 from ballplate.presentation import Block, Entry, Row, Table, number, percent
 
-from ..columns import symbol_column
+from ..store_columns import symbol_column
 from .measures import (
     Measure,
     descriptions,
