@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from ..columns import MORE, symbol_column
 from ..frame import frame_of
-from ..store import Store, chosen_sweep, definition_of, results
+from ..store import Store, chosen_sweep, results
 from ..stored import StoredResults as Found
 
 if TYPE_CHECKING:
@@ -86,7 +86,7 @@ class ReportedSweep:
 
     @property
     def left(self) -> int:
-        return len(self.cells) - len(self.frame) - len(self.found.unreadable)
+        return len(self.cells) - len(self.frame) - len(self.found.damaged)
 
     def label(self, cell: int) -> str:
         """A cell in words."""
@@ -123,8 +123,7 @@ def read_results(store: Store, sweep: int | None) -> ReportedSweep:
 
     :raises StoreError: there is no such sweep, or the store cannot be read.
     """
-    number = chosen_sweep(store, sweep)
-    definition = definition_of(store, number)
+    number, definition = chosen_sweep(store, sweep)
     axes = tuple(_axis(one) for one in definition["axes"])
     cells = np.array(definition["cells"], np.int64).reshape(len(definition["cells"]), len(axes))
     found = results(store, number, len(cells))
