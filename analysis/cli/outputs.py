@@ -8,22 +8,29 @@ writes.
 
 from __future__ import annotations
 
-import errno
 import importlib.util
 import os
-import re
-import shutil
 import stat
 import sys
-import tempfile
 from argparse import Action, ArgumentParser, Namespace
-from collections.abc import Callable, Iterable, Iterator, Mapping
-from contextlib import AbstractContextManager, ExitStack, contextmanager, nullcontext, suppress
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
 from functools import partial
 from itertools import combinations
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, BinaryIO, TextIO
+from typing import TYPE_CHECKING, Any, TextIO
+
+from ballplate.presentation.files import (
+    UnwrittenError,
+    Writer,
+    beside,
+    is_device,
+    make,
+    real,
+    status_of,
+    write_files,
+)
 
 from .interruption import named_paths
 
@@ -32,20 +39,15 @@ if TYPE_CHECKING:
 
 EXISTS = "exists already; name a new file, or overwrite it with --force"
 FORCE = "overwrite existing files"
+REMEDY = (
+    "check the folder, its permissions and its room, and whether another program has the file open"
+)
 
 # Options that name files which name others, as experiment, machine and map files do.
 NAMING = ("files", "file", "earlier", "map", "tasks", "after")
 
-# Names of files that a process has open; the group is the number of one of this process.
-OPEN_FILE = re.compile(
-    r"/dev/(?:stdout|stderr|fd/([0-9]+))|/proc/(?:self/fd/([0-9]+)|[^/]+/(?:task/[^/]+/)?fd/[0-9]+)"
-)
-
 # What belongs to a store besides its file.
 BESIDE_STORE = ("-wal", "-shm", "-journal", ".lock")
-
-Writer = Callable[[Path], object]
-"""Writes a file of the kind that the path's name ends in."""
 
 Contents = Mapping[Path, Writer | str] | Mapping[Path | None, Writer | str]
 """What files are to hold, texts or by writers; None stands for one that no option names."""
@@ -167,14 +169,12 @@ def check_outputs(options: Namespace) -> None:
         raise UsageError(f"{' and '.join(screens)} both go to the screen; name a file for one")
     outputs = [one for one in given if not one.is_screen]
     _refuse_screen(outputs)
-    # What is tried is taken away.
-    held = options.interruption.held
-    with held():
-        _refuse_same(outputs)
+    _refuse_same(outputs)
     _refuse_inputs(outputs, options)
     messages = []
     for one in outputs:
-        with held():
+        # What is tried is taken away.
+        with options.interruption.held():
             messages += _reasons_against(one, options.force)
     if messages:
         raise ExperimentError(messages)
@@ -198,8 +198,8 @@ def _refuse_screen(outputs: list[Output]) -> None:
             raise UsageError(
                 f"{one.option} - would be standard output, which has the rest; name a file"
             )
-        found = _status(one.path)
-        if found is not None and not _is_in_place(one.path) and _is_standard_output(found):
+        status = status_of(one.path)
+        if status is not None and not is_device(one.path) and _is_standard_output(status):
             raise UsageError(
                 f"{one.option} {one.path} is where standard output goes; name another file"
             )
@@ -207,11 +207,8 @@ def _refuse_screen(outputs: list[Output]) -> None:
 
 def _refuse_same(outputs: list[Output]) -> None:
     for one, other in combinations(outputs, 2):
-        first, second = _target(one.path), _target(other.path)
-        is_same = first == second
-        if first.parent == second.parent and first.name.casefold() == second.name.casefold():
-            is_same |= _is_case_blind(first.parent)
-        if is_same:
+        # There are disks on which capitals make no other file.
+        if str(real(one.path)).casefold() == str(real(other.path)).casefold():
             raise UsageError(
                 f"{one.option} {one.path} and {other.option} {other.path} are the same file; name"
                 " another"
@@ -222,12 +219,12 @@ def _refuse_inputs(outputs: list[Output], options: Namespace) -> None:
     there = [
         (one, found)
         for one in outputs
-        if (found := _status(one.path)) and stat.S_ISREG(found.st_mode)
+        if (found := status_of(one.path)) and stat.S_ISREG(found.st_mode)
     ]
     if not there:
         return
     for path in inputs(options, {one.dest for one in outputs}):
-        status = _status(path)
+        status = status_of(path)
         for one, found in there:
             if status is not None and os.path.samestat(status, found):
                 raise UsageError(
@@ -258,18 +255,18 @@ def _reasons_against(output: Output, force: bool) -> list[Message]:
     if output.needed is not None and output.needed.is_missing:
         reasons.append(output.needed.told)
     try:
-        found = _status_or_none(path)
-        if found is not None and stat.S_ISDIR(found.st_mode):
+        if path.is_dir():
             reasons.append("is a folder; name a file in it")
-        elif found is None or not _is_in_place(path):
-            if found is not None and not force:
+        elif not is_device(path):
+            if path.exists() and not force:
                 reasons.append(EXISTS)
-            elif found is not None:
+            elif path.exists():
                 # Without writing anything; tells of permissions, and of other programs that hold it
                 # on Windows.
                 path.open("r+b").close()
-            with _tried(_target(path)):
-                pass
+            temporary = beside(real(path))
+            make(temporary)
+            temporary.unlink()
     except (OSError, ValueError) as error:
         reasons.append(_cannot(error))
     return [Message(str(path), 0, 0, "", reason) for reason in reasons]
@@ -280,41 +277,16 @@ def write_outputs(
     force: bool,
     held: Callable[[], AbstractContextManager[None]] = nullcontext,
 ) -> bool:
-    """Let each writer write its file, all of them or, as far as the system allows, none; False
-    after saying why not.
-
-    Each is written beside its place under another name and put there only when all have been
-    written to the disk, with the permissions of the file that was there before. A link stays one:
-    what it leads to is replaced. Devices and pipes are written as they are. Without `force` no file
-    is put in the place of another that has come meanwhile. `held` keeps signals back while files
-    are put into their places or taken away.
-    """
+    """Write files as `write_files` does; False after saying why not."""
     from ballplate.simulator.inputs.messages import Message
 
-    temporaries: dict[Path, Path] = {}
-    path = Path()
     try:
-        for path, writer in writers.items():
-            if not _is_in_place(path):
-                temporaries[path] = temporary = _beside(_target(path))
-                _make(temporary)
-                writer(temporary)
-                _settle(temporary, _target(path))
-        for path, writer in writers.items():
-            if _is_in_place(path):
-                _write_in_place(path, writer)
-        with held(), _exchange(force) as put:
-            for path, temporary in temporaries.items():
-                put(temporary, _target(path))
-    except (OSError, UnicodeEncodeError, ImportError) as error:
-        kept = (
-            "" if _status(path) is None or _is_in_place(path) else "; the file there is as it was"
-        )
-        print(Message(str(path), 0, 0, "", _cannot(error) + kept), file=sys.stderr)
+        write_files(writers, force, held)
+    except UnwrittenError as error:
+        path = Path(error.filename)
+        kept = "" if status_of(path) is None or is_device(path) else "; the file there is as it was"
+        print(Message(str(path), 0, 0, "", _cannot(error.__cause__) + kept), file=sys.stderr)
         return False
-    finally:
-        with held():
-            _remove(temporaries.values())
     return True
 
 
@@ -348,7 +320,7 @@ def text_writer(print_to: Callable[[TextIO], object]) -> Writer:
     return write_file
 
 
-def _cannot(error: Exception) -> str:
+def _cannot(error: BaseException | None) -> str:
     """That a file cannot be written, why, and what to do."""
     if isinstance(error, ImportError):
         missing = (error.name or "").partition(".")[0]
@@ -358,59 +330,7 @@ def _cannot(error: Exception) -> str:
         raise error
     if isinstance(error, FileExistsError):
         return EXISTS
-    number = getattr(error, "errno", None)
-    remedies = {
-        errno.ENOENT: "check the folder",
-        errno.ENOTDIR: "check the folder",
-        errno.ENOSPC: "make room, or name a file on another disk",
-        errno.EDQUOT: "make room, or name a file on another disk",
-        errno.EFBIG: (
-            "files may not be so large here; raise the limit, or name a file on another disk"
-        ),
-        errno.EROFS: "name a file on another disk",
-        errno.ENAMETOOLONG: "name it shorter",
-    }
-    remedy = remedies.get(number or 0, "name another file")
-    if isinstance(error, PermissionError):
-        remedy = (
-            "if another program has it open, close it there; check the permissions, or name another"
-            " file"
-        )
-    return f"cannot be written ({getattr(error, 'strerror', None) or error}); {remedy}"
-
-
-def _status(path: Path) -> os.stat_result | None:
-    """What there is, None where that cannot be told."""
-    try:
-        return path.stat()
-    except (OSError, ValueError):
-        return None
-
-
-def _status_or_none(path: Path) -> os.stat_result | None:
-    """What there is, None where there is nothing.
-
-    :raises OSError: it cannot be told.
-    """
-    try:
-        return path.stat()
-    except FileNotFoundError:
-        return None
-
-
-def _target(path: Path) -> Path:
-    """Where a path leads to by its links."""
-    return Path(os.path.realpath(path))
-
-
-def _is_in_place(path: Path) -> bool:
-    """Whether it is a device, a pipe, or an open file of the process's, of which no other can take
-    the place.
-    """
-    if OPEN_FILE.fullmatch(os.path.abspath(path)):
-        return True
-    found = _status(path)
-    return found is not None and not stat.S_ISREG(found.st_mode) and not stat.S_ISDIR(found.st_mode)
+    return f"cannot be written ({getattr(error, 'strerror', None) or error}); {REMEDY}"
 
 
 def _is_standard_output(status: os.stat_result) -> bool:
@@ -418,128 +338,3 @@ def _is_standard_output(status: os.stat_result) -> bool:
         return os.path.samestat(status, os.fstat(1))
     except OSError:
         return False
-
-
-def _is_case_blind(folder: Path) -> bool:
-    """Whether names in a folder that differ in capitals alone mean the same file; False where
-    nothing can be tried.
-    """
-    try:
-        with _tried(folder / "a") as temporary:
-            return temporary.with_name(temporary.name.upper()).exists()
-    except OSError:
-        return False
-
-
-@contextmanager
-def _tried(target: Path) -> Iterator[Path]:
-    """An empty file beside another one, for as long as it takes to see what the folder makes of
-    it.
-    """
-    path = _beside(target)
-    try:
-        _make(path)
-        yield path
-    finally:
-        with suppress(OSError):
-            path.unlink()
-
-
-def _beside(target: Path) -> Path:
-    """A name that no other file has, beside one, for a content of the same kind."""
-    return target.with_name(f".ballplate-{os.urandom(8).hex()}{target.suffix.lower()}")
-
-
-def _make(path: Path) -> None:
-    """Make a new file with the permissions that new files have."""
-    os.close(os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o666))
-
-
-def _settle(temporary: Path, target: Path) -> None:
-    """Give a finished file the permissions of the one whose place it takes, and have all of it on
-    the disk.
-    """
-    with temporary.open("r+b") as stream:
-        os.fsync(stream.fileno())
-    before = _status(target)
-    if before is None:
-        return
-    if hasattr(os, "chown"):
-        # Of root, who may give files away; others own what they write.
-        with suppress(OSError):
-            os.chown(temporary, before.st_uid, before.st_gid)
-    temporary.chmod(stat.S_IMODE(before.st_mode))
-
-
-def _remove(paths: Iterable[Path]) -> None:
-    for path in paths:
-        with suppress(OSError):
-            path.unlink(missing_ok=True)
-
-
-@contextmanager
-def _exchange(force: bool) -> Iterator[Callable[[Path, Path], None]]:
-    """Put files in the places of others; if one cannot be put, those before it go back."""
-    with ExitStack() as names, ExitStack() as back:
-
-        def put(temporary: Path, target: Path) -> None:
-            undo: Callable[[], object] = partial(target.unlink, missing_ok=True)
-            if force and _status(target) is not None:
-                kept = _beside(target)
-                undo = partial(os.replace, kept, target)
-                try:
-                    os.link(target, kept)
-                    names.callback(_remove, [kept])
-                except (OSError, NotImplementedError):
-                    # On disks without hard links the file that was there cannot come back.
-                    undo = nullcontext
-            _put(temporary, target, force)
-            back.callback(undo)
-
-        yield put
-        back.pop_all()
-
-
-def _put(temporary: Path, target: Path, force: bool) -> None:
-    if not force:
-        try:
-            # Unlike a change of name this never takes the place of another file.
-            os.link(temporary, target)
-        except FileExistsError:
-            raise
-        except (OSError, NotImplementedError):
-            # No hard links on this disk.
-            if os.path.lexists(target):
-                raise FileExistsError(
-                    errno.EEXIST, os.strerror(errno.EEXIST), str(target)
-                ) from None
-        else:
-            return
-    os.replace(temporary, target)
-
-
-def _write_in_place(path: Path, writer: Writer) -> None:
-    """Write a device or pipe: what is drawn may need a file in which one can go back."""
-    with tempfile.TemporaryDirectory(prefix="ballplate-") as folder:
-        whole = Path(folder, f"whole{path.suffix.lower()}")
-        writer(whole)
-        found = _status(path)
-        with whole.open("rb") as content:
-            if found is not None and _is_standard_output(found) and hasattr(sys.stdout, "buffer"):
-                sys.stdout.flush()
-                shutil.copyfileobj(content, sys.stdout.buffer)
-                sys.stdout.buffer.flush()
-            else:
-                with _in_place(path, found) as stream:
-                    shutil.copyfileobj(content, stream)
-
-
-def _in_place(path: Path, status: os.stat_result | None) -> BinaryIO:
-    """A device or pipe to be written, or an open file of the process's, which goes on where it is
-    and loses nothing.
-    """
-    own = OPEN_FILE.fullmatch(os.path.abspath(path))
-    if own is None or status is None or not stat.S_ISREG(status.st_mode):
-        return path.open("wb")
-    number = own[1] or own[2]
-    return os.fdopen(os.dup(int(number)), "wb") if number else path.open("ab")

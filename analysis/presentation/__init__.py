@@ -8,7 +8,7 @@ from ballplate.simulator.inputs.faces import lazily
 
 # Public names of this package: extensions import these alone, and its modules are private.
 if TYPE_CHECKING:
-    from .files import write_file
+    from .files import write_file, write_files
     from .formats import FORMATS
     from .formatting import (
         SHOWN,

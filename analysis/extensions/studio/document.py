@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import hashlib
-import os
-import tempfile
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+from ballplate.presentation import write_files
 from ballplate.simulator.experiment import Experiment, load
 from ballplate.simulator.inputs import (
     OPENED,
@@ -172,41 +170,10 @@ def saved(document: DesignDocument, path: Path | None = None) -> DesignDocument:
             raise ChangedOnDiskError(f"{path.name} is there already; choose another name")
     ensure_as_read(document)
     content = encoded(document)
-    target = document.path.resolve()
-    mode = target.stat().st_mode if target.exists() else 0o666 & ~_mask()
-    replace_file(target, content, mode, lambda: ensure_as_read(document))
+
+    def write(place: Path) -> None:
+        place.write_bytes(content)
+        ensure_as_read(document)
+
+    write_files({document.path: write}, force=True)
     return replace(document, content=content)
-
-
-def replace_file(
-    target: Path,
-    content: bytes,
-    mode: int,
-    ensure: Callable[[], None] = lambda: None,
-    is_lasting: bool = True,
-) -> None:
-    """Write a file as a whole; `ensure` may still refuse when everything is written. What is not
-    lasting outlives this program, and not a failure of power.
-
-    :raises OSError: it cannot be written.
-    """
-    number, name = tempfile.mkstemp(dir=target.parent, prefix=".ballplate-")
-    beside = Path(name)
-    try:
-        with open(number, "wb") as file:
-            file.write(content)
-            file.flush()
-            if is_lasting:
-                os.fsync(file.fileno())
-        beside.chmod(mode)
-        ensure()
-        beside.replace(target)
-    finally:
-        beside.unlink(missing_ok=True)
-
-
-def _mask() -> int:
-    """What permissions new files of this process do without."""
-    mask = os.umask(0)
-    os.umask(mask)
-    return mask

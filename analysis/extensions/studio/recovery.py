@@ -9,10 +9,11 @@ from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 
+from ballplate.presentation import write_files
 from ballplate.simulator.experiment import runs_code, trees_of
 from ballplate.simulator.inputs import UNKNOWN, ExperimentError, Mapping, to_python, walk
 
-from .document import DesignDocument, changed, replace_file
+from .document import DesignDocument, changed
 
 
 def kept_in(path: Path, owner: str = "") -> Path:
@@ -116,8 +117,13 @@ def _write(path: Path, document: DesignDocument, owner: str) -> None:
     }
     whole = json.dumps(said).encode()
     if not path.exists() or path.read_bytes() != whole:
-        # For nobody else, whatever the folder's other files are.
-        replace_file(path, whole, 0o600, is_lasting=False)
+
+        def write(place: Path) -> None:
+            # For nobody else, whatever the folder's other files are.
+            place.chmod(0o600)
+            place.write_bytes(whole)
+
+        write_files({path: write}, force=True)
 
 
 def _owner(path: Path) -> str | None:

@@ -63,13 +63,11 @@ def warn_of_other_methods(path: Path, keys: Iterable[str]) -> None:
         complain(f"{path}: {text}; run ballplate sweep again to compute them anew")
 
 
-def warn_of_damage(path: Path, results: StoredResults, count: int) -> bool:
+def warn_of_damage(path: Path, results: StoredResults) -> bool:
     """Tell what of a store could not be read; whether there is anything."""
-    from .store import unread
-    from .store_file import GO_ON
+    from .store import damaged_cells
 
-    go_on = GO_ON if results.damage else "ballplate sweep computes anew what is missing"
-    text = unread(path, results.unreadable, results.strays, count, results.damage, go_on)
+    text = damaged_cells(path, results, "ballplate sweep computes them anew")
     if text:
         complain(text)
     return bool(text)
@@ -80,23 +78,15 @@ def run(options: Namespace) -> int:
     from ballplate.simulator.inputs import cell_of_text
 
     from .frame import frame_of
-    from .store import StoreError, chosen_sweep, definition_of, open_store, results
+    from .store import chosen_sweep, open_store, results
 
     suffix = options.output.suffix.lower()
     if suffix not in (".csv", ".parquet") and str(options.output) != "-":
         raise UsageError(f"{options.output} should end in .csv or .parquet")
     with closing(open_store(options.store)) as store:
-        number = chosen_sweep(store, options.sweep)
-        defined, cells = None, None
-        try:
-            defined = definition_of(store, number)
-            cells = len(defined["cells"])
-        except StoreError as error:
-            complain(error)
-        found = results(store, number, cells)
-        if cells is None:
-            cells = len(found.rows) + len(found.unreadable)
-        is_damaged = warn_of_damage(store.path, found, cells) or defined is None
+        number, defined = chosen_sweep(store, options.sweep)
+        found = results(store, number, len(defined["cells"]))
+        is_damaged = warn_of_damage(store.path, found)
         table = frame_of(found, defined)
         warn_of_other_methods(store.path, found.keys)
     if suffix != ".parquet":

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from .store import Store, chosen_sweep, definition_of, results
+from .store import Store, chosen_sweep, results
 from .stored import StoredResults
 
 if TYPE_CHECKING:
@@ -29,25 +29,22 @@ def frame(store: Store, sweep: int | None = None) -> pandas.DataFrame:
 
     :raises StoreError: there is no such sweep, or the store cannot be read.
     """
-    number = chosen_sweep(store, sweep)
-    defined = definition_of(store, number)
+    number, defined = chosen_sweep(store, sweep)
     return frame_of(results(store, number, len(defined["cells"])), defined)
 
 
-def frame_of(results: StoredResults, defined: dict[str, Any] | None) -> pandas.DataFrame:
-    """The table of `frame`; without a definition it has no columns for the axes."""
+def frame_of(results: StoredResults, defined: dict[str, Any]) -> pandas.DataFrame:
+    """The table of `frame`."""
     import pandas
 
-    axes, cells = (defined["axes"], defined["cells"]) if defined is not None else ([], [])
+    axes = defined["axes"]
     columns: dict[str, Any] = {"cell": results.cells}
-    chosen = (
-        np.array(cells, np.int64).reshape(len(cells), len(axes))[results.cells] if axes else None
-    )
+    chosen = np.array(defined["cells"], np.int64).reshape(-1, len(axes))[results.cells]
     for k, axis in enumerate(axes):
         values = np.array(axis["values"] if axis["unit"] else axis["labels"])
         if axis["unit"] == "1" and ((abs(values) < MOST_WHOLE) & (values % 1.0 == 0.0)).all():
             values = values.astype(np.int64)
-        columns[axis["column"]] = values[chosen[:, k]] if chosen is not None else []
+        columns[axis["column"]] = values[chosen[:, k]]
     columns |= {name: [getattr(row, name) for row in results.rows] for name in ("status", "reason")}
     columns |= results.figures
     columns |= {

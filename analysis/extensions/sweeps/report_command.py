@@ -86,7 +86,7 @@ def run(options: Namespace) -> int:
         raise UsageError("--compare is for the page; leave it out, or name a page with -o")
     with closing(open_store(options.store)) as store:
         results = read_results(store, options.sweep)
-        is_damaged = warn_of_damage(store.path, results.found, len(results.cells))
+        is_damaged = warn_of_damage(store.path, results.found)
         warn_of_other_methods(store.path, results.found.keys)
         if form == "html":
             from ballplate.cli import progress
@@ -126,7 +126,7 @@ def _comparison(results: ReportedSweep, path: Path | None) -> StoreComparison | 
 
     with closing(open_store(path)) as store:
         other = read_results(store, None)
-        warn_of_damage(store.path, other.found, len(other.cells))
+        warn_of_damage(store.path, other.found)
         try:
             return compared(results, other, path.name)
         except IncomparableError as error:

@@ -22,16 +22,13 @@ from .store import (
     Store,
     add_sweep,
     chosen_sweep,
-    definition_of,
+    damaged_cells,
     definitions,
     ensure_in_place,
-    keys,
-    mend,
     of_other_methods,
     open_store,
     results,
     statuses,
-    unread,
 )
 from .store_file import StoreError, check_place
 
@@ -159,35 +156,23 @@ def enter(store: Store, sweep: Sweep, bundle: Bundle, beside: bool) -> Entered:
     :raises StoreError: what it holds cannot be read.
     """
     new = definition(sweep, bundle)
-    stored, unreadable = definitions(store)
+    stored = definitions(store)
     number = next((k for k, old in stored.items() if not changes(old, new)), None)
     has_results = "done" in statuses(store).values()
-    if number is None and unreadable and not beside:
-        which, why = next(iter(unreadable.items()))
-        text = (
-            f"the definition of sweep {which} in it cannot be read ({why}); enter this one anew"
-            " with --beside, where what"
-        )
-        raise StoreError(f"{store.path}: {text} is the same is not computed again")
     if number is None and stored and has_results and not beside:
-        found = [
+        differences = [
             f"  {in_one_line(line)}" for line in changes(stored[max(stored)], new)[:MOST_CHANGES]
         ]
         first = in_one_line(f"{store.path}: holds another sweep; what has changed:")
         last = "name another store with --store, or keep both in this one with --beside"
-        raise OtherSweepError("\n".join([first, *found, last]))
+        raise OtherSweepError("\n".join([first, *differences, last]))
     if number is None:
         number = add_sweep(store, new, bundle.files)
-    mended, strays = mend(store, number, len(sweep.cells))
-    remarks = [
-        unread(store.path, mended, strays, len(sweep.cells), "", "what is missing is computed anew")
-    ]
-    found_keys = statuses(store)
-    for text in of_other_methods(
-        key for key in keys(store, number).values() if (key, 0) in found_keys
-    ):
+    found = results(store, number, len(sweep.cells))
+    remarks = [damaged_cells(store.path, found, "they are computed anew")]
+    for text in of_other_methods(found.keys):
         remarks.append(in_one_line(f"{store.path}: {text}, and computes these cells anew"))
-    has_others = len({*stored, *unreadable, number}) > 1
+    has_others = len({*stored, number}) > 1
     return Entered(number, has_others, tuple(filter(None, remarks)))
 
 
@@ -252,15 +237,12 @@ def stored_result(store: Store, sweep: int | None = None) -> SweepResult:
 
     :raises StoreError: there is no such sweep, or its definition cannot be read.
     """
-    number = chosen_sweep(store, sweep)
-    defined = definition_of(store, number)
+    number, defined = chosen_sweep(store, sweep)
     cells = len(defined["cells"])
     found = results(store, number, cells)
     status = [row.status for row in found.rows]
     summary = Summary(cells, len(status), status.count("done"), status.count("failed"))
-    damage = unread(
-        store.path, found.unreadable, found.strays, cells, found.damage, "their cells are left out"
-    )
+    damage = damaged_cells(store.path, found, "they are left out")
     return SweepResult(
         Path(store.path).stem,
         str(defined["title"]),

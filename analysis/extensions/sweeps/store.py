@@ -13,62 +13,26 @@ import sqlite3
 from collections import Counter
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass, field, replace
-from itertools import count as numbers_from
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from ballplate.montecarlo import Accumulator, QuantityAccumulator
-from ballplate.simulator.inputs import in_one_line
+from ballplate.simulator.inputs import in_one_line, number_of
 
 from .fingerprint import METHOD, METHODS, method_of
-from .load import MOST_CELLS
-from .store_file import (
-    GO_ON,
-    NEWEST,
-    WITH_DIGEST,
-    StoreError,
-    connected,
-    damage,
-    format_of,
-    in_words,
-    is_damage,
-    unnumbered,
-)
+from .store_file import ANEW, StoreError, connected, in_words
 from .stored import (
-    OF_RESULT,
+    DamagedError,
     StoredResults,
-    UnreadableError,
-    check_key,
-    checked_definition,
-    checked_row,
+    check_digest,
     digest_of,
-    read_rows,
-    salvaged_rows,
-    texts_of,
+    plain,
+    read_results,
+    whole_results,
 )
 from .task import CellResult
-
-FORMAT = f"ballplate sweep store {NEWEST}"
-
-TABLES = """
-CREATE TABLE about (name TEXT PRIMARY KEY, value TEXT NOT NULL) WITHOUT ROWID;
-CREATE TABLE sweep (id INTEGER PRIMARY KEY, definition TEXT NOT NULL, digest BLOB);
-CREATE TABLE bundle (
-    sweep INTEGER, path TEXT, content BLOB NOT NULL, digest BLOB, PRIMARY KEY (sweep, path)
-) WITHOUT ROWID;
-CREATE TABLE cell (
-    sweep INTEGER, number INTEGER, key TEXT NOT NULL, digest BLOB, PRIMARY KEY (sweep, number)
-) WITHOUT ROWID;
-CREATE TABLE text (id INTEGER PRIMARY KEY, value TEXT NOT NULL UNIQUE);
-CREATE TABLE result (
-    key TEXT, block INTEGER, status TEXT NOT NULL, reason TEXT NOT NULL, seed INTEGER NOT NULL,
-    names INTEGER NOT NULL REFERENCES text, figures BLOB NOT NULL, details TEXT NOT NULL,
-    versions INTEGER NOT NULL REFERENCES text, seconds REAL NOT NULL, tally BLOB, digest BLOB,
-    PRIMARY KEY (key, block)
-);
-"""
 
 COLUMNS = (
     *("key", "block", "status", "reason", "seed", "names", "figures", "details", "versions"),
@@ -78,93 +42,40 @@ INSERT = (
     f"INSERT INTO result ({', '.join(COLUMNS)}) VALUES ({', '.join('?' * len(COLUMNS))})"
     " ON CONFLICT (key, block) DO UPDATE"
     f" SET {', '.join(f'{column} = excluded.{column}' for column in COLUMNS[2:])}"
-    " WHERE result.status = 'failed'"
+    " WHERE result.status <> 'done' OR excluded.status = 'done'"
 )
 
 
 @dataclass
 class Store:
-    """An open store; `texts` are those known by number.
-
-    `has_digests` is False of the first format, `damage` says what showed as it was opened, and
-    `place` states the file from another in its place.
+    """An open store; `texts` are those known by number, and `place` states the file from another in
+    its place.
     """
 
     path: Path
     connection: sqlite3.Connection
-    has_digests: bool = True
-    damage: str = ""
-    place: tuple[int, int] | None = None
+    place: tuple[int, int]
     texts: dict[str, int] = field(default_factory=dict)
 
     def close(self) -> None:
         self.connection.close()
 
-    @property
-    def digest(self) -> str:
-        """The column of digests, or what stands for it."""
-        return "digest" if self.has_digests else "NULL"
-
 
 def open_store(path: Path, create: bool = False) -> Store:
     """Open a store for reading or, with `create`, for writing: it is made where there is none.
 
-    A store of an earlier format is read as it is, and brought to the newest format before it is
-    written to.
-
     :raises StoreError: no such store, a file that is none, or one that is damaged and to be written
         to.
     """
-    connection = None
     try:
-        connection, wrong = connected(path, create)
-        found = format_of(path, connection)
-        if create:
-            _prepare(path, connection, found)
-        elif found is None:
-            raise StoreError(f"{path}: is empty; name a store that ballplate sweep has made")
+        connection = connected(path, create)
         place = os.stat(path)
-        return Store(path, connection, create or found != 1, wrong, (place.st_dev, place.st_ino))
-    except (sqlite3.Error, UnicodeDecodeError, OSError, StoreError) as error:
-        if connection is not None:
-            connection.close()
-        if isinstance(error, UnicodeDecodeError):
-            # Of what SQLite says about names that are no text.
-            raise StoreError(
-                f"{path}: is damaged (names of its tables are no text); restore a copy"
-            ) from None
-        if isinstance(error, sqlite3.Error) and create and is_damage(error):
-            raise StoreError(f"{path}: is damaged ({error}); {GO_ON}") from None
-        if isinstance(error, sqlite3.Error):
-            raise in_words(path, error) from None
-        raise
-
-
-def _prepare(path: Path, connection: sqlite3.Connection, found: int | None) -> None:
-    """Make the tables of an empty store, and of a store one of the newest format.
-
-    :raises StoreError: the store is damaged.
-    """
-    if found is not None:
-        wrong = damage(connection) or unnumbered(connection)
-        if wrong:
-            raise StoreError(f"{path}: is damaged ({wrong}); {GO_ON}")
-    connection.execute("PRAGMA journal_mode = WAL")
-    # What is written is on disk when the call returns.
-    connection.execute("PRAGMA synchronous = FULL")
-    if found == NEWEST:
-        return
-    connection.execute("BEGIN IMMEDIATE")
-    known = format_of(path, connection)
-    if known is None:
-        for statement in TABLES.split(";"):
-            connection.execute(statement)
-        connection.execute("INSERT INTO about VALUES ('format', ?)", [FORMAT])
-    elif known == 1:
-        for table in WITH_DIGEST:
-            connection.execute(f"ALTER TABLE {table} ADD COLUMN digest BLOB")
-        connection.execute("UPDATE about SET value = ? WHERE name = 'format'", [FORMAT])
-    connection.execute("COMMIT")
+    except sqlite3.Error as error:
+        raise in_words(path, error) from None
+    except UnicodeDecodeError:
+        # Of what SQLite says about names that are no text.
+        raise StoreError(f"{path}: is damaged; {ANEW}") from None
+    return Store(path, connection, (place.st_dev, place.st_ino))
 
 
 def ensure_in_place(store: Store) -> None:
@@ -172,22 +83,17 @@ def ensure_in_place(store: Store) -> None:
 
     :raises StoreError: it was deleted, moved or replaced since it was opened.
     """
-    try:
+    with suppress(OSError):
         found = os.stat(store.path)
-        is_same = store.place in (None, (found.st_dev, found.st_ino))
-        what = "has been replaced by another file"
-    except OSError:
-        is_same, what = False, "has been deleted or moved"
-    if not is_same:
-        # SQLite leaves to its log what it wrote to a file that has moved.
-        with suppress(sqlite3.Error):
-            store.connection.execute("PRAGMA wal_checkpoint(TRUNCATE)")
-        text = (
-            "the sweep ends here, and nothing was written to what is there now; if the store was"
-            " moved, it has the "
-        )
-        text += "rows computed until then, and --store continues with it"
-        raise StoreError(f"{store.path}: {what} while the sweep ran; {text}")
+        if store.place == (found.st_dev, found.st_ino):
+            return
+    # SQLite leaves to its log what it wrote to a file that has moved.
+    with suppress(sqlite3.Error):
+        store.connection.execute("PRAGMA wal_checkpoint(TRUNCATE)")
+    raise StoreError(
+        f"{store.path}: has been deleted, moved or replaced while the sweep ran, which ends here;"
+        " if it was moved, it has the rows computed until then, and --store continues with it"
+    )
 
 
 @contextmanager
@@ -208,7 +114,6 @@ def _transaction(store: Store) -> Iterator[sqlite3.Connection]:
     except sqlite3.Error as error:
         store.texts.clear()
         raise in_words(store.path, error) from None
-    ensure_in_place(store)
 
 
 @contextmanager
@@ -237,10 +142,8 @@ def add_sweep(store: Store, definition: dict[str, Any], files: Iterable[tuple[st
             )
     with _transaction(store) as connection:
         text = json.dumps(definition, sort_keys=True)
-        # Of a sweep whose definition is lost there may be cells.
-        used = "SELECT id FROM sweep UNION SELECT sweep FROM bundle UNION SELECT sweep FROM cell"
-        taken = {one for (one,) in connection.execute(used)}
-        number = next(number for number in numbers_from(1) if number not in taken)
+        query = "SELECT coalesce(max(id), 0) + 1 FROM sweep"
+        number = int(connection.execute(query).fetchone()[0])
         insert = "INSERT INTO sweep (id, definition, digest) VALUES (?, ?, ?)"
         connection.execute(insert, [number, text, digest_of(number, text)])
         connection.executemany(
@@ -250,64 +153,39 @@ def add_sweep(store: Store, definition: dict[str, Any], files: Iterable[tuple[st
     return number
 
 
-def definitions(store: Store) -> tuple[dict[int, dict[str, Any]], dict[int, str]]:
-    """Definitions of the sweeps of a store by number, and of those that cannot be read why.
+def definitions(store: Store) -> dict[int, dict[str, Any]]:
+    """Definitions of the sweeps of a store by number, with their words in lines.
 
-    :raises StoreError: the store cannot be read.
+    :raises StoreError: the store cannot be read, or a definition is not as it was stored.
     """
-    found: dict[int, dict[str, Any]] = {}
-    unreadable: dict[int, str] = {}
     with _reading(store) as connection:
-        rows = connection.execute(
-            f"SELECT id, definition, {store.digest} FROM sweep ORDER BY id"
-        ).fetchall()
+        rows = connection.execute("SELECT id, definition, digest FROM sweep ORDER BY id").fetchall()
     for number, text, digest in rows:
-        try:
-            found[number] = checked_definition(number, text, digest)
-        except UnreadableError as error:
-            unreadable[number] = str(error)
-    return found, unreadable
+        with _as_stored(store, f"the definition of sweep {number}"):
+            check_digest(digest, number, text)
+    return {number: plain(json.loads(text)) for number, text, _ in rows}
 
 
-def definition_of(store: Store, sweep: int) -> dict[str, Any]:
-    """Definition of one sweep of the store.
-
-    :raises StoreError: it cannot be read.
-    """
+@contextmanager
+def _as_stored(store: Store, what: str) -> Iterator[None]:
     try:
-        query = f"SELECT definition, {store.digest} FROM sweep WHERE id = ?"
-        row = store.connection.execute(query, [sweep]).fetchone()
-        if row is None:
-            raise UnreadableError("it is not there")
-        return checked_definition(sweep, *row)
-    except (sqlite3.DatabaseError, UnreadableError) as error:
-        text = (
-            f"the definition of sweep {sweep} cannot be read ({error}); ballplate sweep --export"
-            " gives its cells by their numbers"
-        )
-        raise StoreError(f"{store.path}: {text}") from None
+        yield
+    except DamagedError as error:
+        raise StoreError(f"{store.path}: is damaged: {what}: {error}; {ANEW}") from None
 
 
-def chosen_sweep(store: Store, number: int | None) -> int:
-    """The number of a sweep of the store: the one asked for, or the newest.
+def chosen_sweep(store: Store, number: int | None) -> tuple[int, dict[str, Any]]:
+    """The number and the definition of a sweep of the store: the one asked for, or the newest.
 
     :raises StoreError: there is no such sweep.
     """
-    known: set[int] = set()
-    for table, column in (("sweep", "id"), ("cell", "sweep")):
-        try:
-            found = store.connection.execute(f"SELECT DISTINCT {column} FROM {table}").fetchall()
-        except sqlite3.DatabaseError as error:
-            if not is_damage(error):
-                raise in_words(store.path, error) from None
-            continue
-        known |= {one for (one,) in found if isinstance(one, int)}
+    known = definitions(store)
     if not known or (number is not None and number not in known):
         raise StoreError(
-            f"{store.path}: there is no such sweep; it has"
-            f" {', '.join(map(str, sorted(known))) or 'none'}"
+            f"{store.path}: there is no such sweep; it has {', '.join(map(str, known)) or 'none'}"
         )
-    return max(known) if number is None else number
+    number = max(known) if number is None else number
+    return number, known[number]
 
 
 def files(store: Store, sweep: int) -> tuple[tuple[str, bytes], ...]:
@@ -315,23 +193,20 @@ def files(store: Store, sweep: int) -> tuple[tuple[str, bytes], ...]:
 
     :raises StoreError: they cannot be read, or are not as they were stored.
     """
-    query = f"SELECT path, content, {store.digest} FROM bundle WHERE sweep = ? ORDER BY path"
+    query = "SELECT path, content, digest FROM bundle WHERE sweep = ? ORDER BY path"
     with _reading(store) as connection:
         rows = connection.execute(query, [sweep]).fetchall()
     for name, content, digest in rows:
-        is_file = isinstance(name, str) and isinstance(content, bytes)
-        if not is_file or (digest is not None and digest != digest_of(sweep, name, content)):
-            raise StoreError(f"{store.path}: the file {name} in it is not as it was stored")
+        with _as_stored(store, f"the file {name} in it"):
+            check_digest(digest, sweep, name, content)
     return tuple((name, content) for name, content, _ in rows)
 
 
 def keys(store: Store, sweep: int) -> dict[int, str]:
     """Keys of the cells that are known, by number."""
     with _reading(store) as connection:
-        rows = connection.execute(
-            "SELECT number, key FROM cell WHERE sweep = ?", [sweep]
-        ).fetchall()
-    return {number: key for number, key in rows if isinstance(number, int) and isinstance(key, str)}
+        rows = connection.execute("SELECT number, key, digest FROM cell WHERE sweep = ?", [sweep])
+        return {k: key for k, key, digest in rows if digest == digest_of(sweep, k, key)}
 
 
 def of_other_methods(found: Iterable[str]) -> list[str]:
@@ -350,55 +225,9 @@ def of_other_methods(found: Iterable[str]) -> list[str]:
 
 
 def statuses(store: Store) -> dict[tuple[str, int], str]:
-    """Status of every result by key and block."""
+    """Status by key and block of every result that is as it was stored."""
     with _reading(store) as connection:
-        rows = connection.execute("SELECT key, block, status FROM result").fetchall()
-    return {(key, block): status for key, block, status in rows}
-
-
-def mend(store: Store, sweep: int, count: int) -> tuple[dict[int, str], int]:
-    """Take out what is not as it was stored, so that it is computed anew.
-
-    Of a sweep's cells why, by their number, and how many entries belonged to none of them.
-
-    :raises StoreError: the store cannot be read or written.
-    """
-    found: dict[int, str] = {}
-    strays = 0
-    with _transaction(store) as connection:
-        texts = texts_of(connection)
-        bad: dict[object, str] = {}
-        places: list[tuple[int]] = []
-        rows = connection.execute(f"SELECT rowid, key, {OF_RESULT}, {store.digest} FROM result")
-        for place, key, *raw in rows:
-            try:
-                if not isinstance(key, str):
-                    raise UnreadableError("its key is none")
-                checked_row(0, key, tuple(raw), texts)
-                if raw[0] and raw[-2] is not None:
-                    _unpacked(raw[-2])
-            except UnreadableError as error:
-                bad[key] = str(error)
-                places.append((place,))
-        connection.executemany("DELETE FROM result WHERE rowid = ?", places)
-        entries = connection.execute(
-            f"SELECT sweep, number, key, {store.digest} FROM cell"
-        ).fetchall()
-        owned = {key for _, _, key, _ in entries}
-        for of_sweep, number, key, digest in entries:
-            try:
-                check_key(of_sweep, number, key, digest)
-                reason = bad.get(key, "")
-            except UnreadableError as error:
-                reason = str(error)
-                connection.execute(
-                    "DELETE FROM cell WHERE sweep IS ? AND number IS ?", [of_sweep, number]
-                )
-            if reason and of_sweep == sweep and isinstance(number, int) and 0 <= number < count:
-                found[number] = reason
-            elif reason:
-                strays += 1
-    return found, strays + len(bad.keys() - owned)
+        return {(key, block): status for key, block, status in whole_results(connection)}
 
 
 def add_keys(store: Store, sweep: int, found: dict[int, str]) -> None:
@@ -479,87 +308,30 @@ def _packed(accumulator: Accumulator) -> bytes:
 
 
 def _unpacked(content: bytes) -> Accumulator:
-    """The sums that `_packed` made bytes of.
-
-    :raises UnreadableError: it did not.
-    """
+    """The sums that `_packed` made bytes of."""
     line, _, body = content.partition(b"\n")
-    try:
-        head = json.loads(line)
-        arrays = np.split(np.frombuffer(body, "<f8"), np.cumsum(head["sizes"])[:-1])
-        if [len(array) for array in arrays] != head["sizes"] or len(arrays) % 4 != 1:
-            raise ValueError
-        quantities = tuple(
-            QuantityAccumulator(*arrays[k : k + 4]) for k in range(1, len(arrays), 4)
-        )
-        return Accumulator(
-            head["count"],
-            tuple(head["failed"]),
-            head["passes"],
-            arrays[0],
-            head["rejected"],
-            quantities,
-        )
-    except (ValueError, TypeError, KeyError, IndexError, RecursionError):
-        raise UnreadableError("its sums over data sets are none") from None
+    head = json.loads(line)
+    first, *arrays = np.split(np.frombuffer(body, "<f8"), np.cumsum(head["sizes"])[:-1])
+    quantities = tuple(QuantityAccumulator(*arrays[k : k + 4]) for k in range(0, len(arrays), 4))
+    failed = tuple(head["failed"])
+    return Accumulator(head["count"], failed, head["passes"], first, head["rejected"], quantities)
 
 
-def results(store: Store, sweep: int, count: int | None = None) -> StoredResults:
-    """Results of the first `count` cells of a sweep, or of all; cells that are not done yet are
-    left out.
+def results(store: Store, sweep: int, count: int) -> StoredResults:
+    """Results of a sweep of so many cells; those that are not done yet are left out.
 
-    Each row is checked. Of a damaged store they are the rows that can be read.
-
-    :raises StoreError: the store cannot be read, or nothing of it.
+    :raises StoreError: the store cannot be read.
     """
-    wrong = store.damage
-    try:
-        if count is None:
-            found = store.connection.execute(
-                "SELECT max(number) FROM cell WHERE sweep = ? AND typeof(number) = 'integer'",
-                [sweep],
-            ).fetchone()[0]
-            count = 0 if found is None else min(int(found) + 1, MOST_CELLS)
-        reading = read_rows(store.connection, sweep, count, store.has_digests)
-        if not wrong and (reading.unreadable or reading.strays or len(reading.rows) < count):
-            wrong = damage(store.connection)
-    except sqlite3.DatabaseError as error:
-        if not is_damage(error):
-            raise in_words(store.path, error) from None
-        wrong = damage(store.connection) or str(error)
-    if wrong:
-        reading = salvaged_rows(store.connection, sweep, count or 0, store.has_digests)
-    if (wrong or reading.unreadable) and not reading.rows:
-        why = wrong or next(iter(reading.unreadable.values()))
-        text = (
-            f"none of its cells can be read ({why}); restore a copy, or start anew with ballplate"
-            " sweep --store"
-        )
-        raise StoreError(f"{store.path}: is damaged: {text} and a new name")
-    return replace(reading, damage=wrong)
+    with _reading(store) as connection:
+        return read_results(connection, sweep, count)
 
 
-def unread(
-    path: Path, unreadable: dict[int, str], strays: int, count: int, wrong: str, what_next: str
-) -> str:
-    """Words for what of a store could not be read; empty where everything was."""
-    if not unreadable and not strays and not wrong:
+def damaged_cells(path: Path, results: StoredResults, what_next: str) -> str:
+    """Words for the cells of a store that are damaged; empty where none is."""
+    if not results.damaged:
         return ""
-    cells = sorted(unreadable)
-    told = (
-        f"{len(cells)} of {count} cells could not be read"
-        if cells
-        else "what it holds is not all as it was stored"
-    )
-    if cells:
-        some = ", ".join(map(str, cells[:10])) + (
-            f" and {len(cells) - 10} more" if len(cells) > 10 else ""
-        )
-        told += f": {some} ({unreadable[cells[0]]})"
-    told += (
-        f"; {strays} {'entry belongs' if strays == 1 else 'entries belong'} to no cell"
-        if strays
-        else ""
-    )
-    told += f"; SQLite finds: {wrong}" if wrong else ""
-    return in_one_line(f"{path}: {told}; {what_next}")
+    cells = sorted(results.damaged)
+    more = f" and {len(cells) - 10} more" if len(cells) > 10 else ""
+    counted = f"{number_of(len(cells), 'cell')} could not be read"
+    text = f"{', '.join(map(str, cells[:10]))}{more} ({results.damaged[cells[0]]})"
+    return in_one_line(f"{path}: {counted}: {text}; {what_next}")

@@ -1,5 +1,4 @@
-"""The file of a store: its kind, whether it can be used as a database, and SQLite's errors in
-words.
+"""The file of a store: its kind, the form of its tables, and SQLite's errors in words.
 
 A store is input like any file: it may be cut off, of another program, of a later version, or no
 file at all.
@@ -8,77 +7,47 @@ file at all.
 from __future__ import annotations
 
 import os
-import re
 import sqlite3
-import stat
-from collections.abc import Callable
 from pathlib import Path, PurePath
 from urllib.parse import quote
 
 from ballplate.simulator.inputs import UnusableError, in_one_line
 
-# The second format has digests of what it keeps; rows that came from the first have none.
-NEWEST = 2
+FORMAT = "ballplate sweep store 2"
 
 # Seconds to wait for another process that writes.
 PATIENCE = 20.0
 
 MAGIC = b"SQLite format 3\0"
 MEND = "name a store that ballplate sweep has made"
-GO_ON = (
-    "ballplate sweep --export and --report give what can still be read, and ballplate sweep with"
-    " --store and a new name computes everything anew"
-)
+ANEW = "ballplate sweep with --store and a new name computes anew, and leaves this file as it is"
 
-COLUMNS = {
-    "about": {"name", "value"},
-    "sweep": {"id", "definition"},
-    "bundle": {"sweep", "path", "content"},
-    "cell": {"sweep", "number", "key"},
-    "text": {"id", "value"},
-    "result": {
-        *(
-            "key",
-            "block",
-            "status",
-            "reason",
-            "seed",
-            "names",
-            "figures",
-            "details",
-            "versions",
-            "seconds",
-            "tally",
-        ),
-    },
-}
-# Tables whose rows have a digest.
-WITH_DIGEST = ("sweep", "bundle", "cell", "result")
-
-# Kinds of places that keep no store, as their modes tell them.
-NO_FILES: tuple[tuple[Callable[[int], bool], str], ...] = (
-    (stat.S_ISDIR, "a folder"),
-    (stat.S_ISFIFO, "a pipe"),
-    (stat.S_ISSOCK, "a socket"),
-    (stat.S_ISCHR, "a device"),
-    (stat.S_ISBLK, "a device"),
-)
+TABLES = """
+CREATE TABLE about (name TEXT PRIMARY KEY, value TEXT NOT NULL) WITHOUT ROWID;
+CREATE TABLE sweep (id INTEGER PRIMARY KEY, definition TEXT NOT NULL, digest BLOB);
+CREATE TABLE bundle (
+    sweep INTEGER, path TEXT, content BLOB NOT NULL, digest BLOB, PRIMARY KEY (sweep, path)
+) WITHOUT ROWID;
+CREATE TABLE cell (
+    sweep INTEGER, number INTEGER, key TEXT NOT NULL, digest BLOB, PRIMARY KEY (sweep, number)
+) WITHOUT ROWID;
+CREATE TABLE text (id INTEGER PRIMARY KEY, value TEXT NOT NULL UNIQUE);
+CREATE TABLE result (
+    key TEXT, block INTEGER, status TEXT NOT NULL, reason TEXT NOT NULL, seed INTEGER NOT NULL,
+    names INTEGER NOT NULL REFERENCES text, figures BLOB NOT NULL, details TEXT NOT NULL,
+    versions INTEGER NOT NULL REFERENCES text, seconds REAL NOT NULL, tally BLOB, digest BLOB,
+    PRIMARY KEY (key, block)
+);
+"""
 
 # What SQLite's result codes mean to the person whose store it is, by the beginning of their names.
 WORDS = {
     "SQLITE_FULL": "cannot be written ({}); make room, then start again: nothing done is lost",
     "SQLITE_IOERR": "cannot be written ({}); make room, then start again: nothing done is lost",
     "SQLITE_BUSY": "another process is writing to it; wait for it, or end it",
-    "SQLITE_LOCKED": "another process is writing to it; wait for it, or end it",
     "SQLITE_READONLY": "cannot be written ({}); check its permissions and those of its folder",
-    "SQLITE_PERM": "cannot be opened ({}); check its permissions and those of its folder",
-    "SQLITE_CANTOPEN": (
-        "cannot be opened ({}); check its permissions, its folder's, and those of its -wal and -shm"
-    ),
-    "SQLITE_NOTADB": f"is no store of ballplate sweep, or its beginning is damaged ({{}}); {MEND}",
-    "SQLITE_CORRUPT": (
-        "is damaged ({}); restore a copy, or start anew with ballplate sweep --store and a new name"
-    ),
+    "SQLITE_CANTOPEN": "cannot be opened ({}); check its permissions and those of its folder",
+    "SQLITE_CORRUPT": f"is damaged ({{}}); restore a copy, or {ANEW}",
 }
 
 
@@ -92,55 +61,45 @@ class StoreError(UnusableError):
 def in_words(path: Path, error: sqlite3.Error) -> StoreError:
     """What SQLite says of a store, and what would help."""
     name = getattr(error, "sqlite_errorname", None) or ""
-    for start, words in WORDS.items():
-        if name.startswith(start):
-            return StoreError(f"{path}: {words.format(error)}")
-    return StoreError(f"{path}: cannot be used as a store ({error}); {MEND}")
+    other = f"is no store of ballplate sweep, or damaged ({{}}); {MEND}"
+    words = next((words for start, words in WORDS.items() if name.startswith(start)), other)
+    return StoreError(f"{path}: {words.format(error)}")
 
 
-def connected(path: Path, create: bool) -> tuple[sqlite3.Connection, str]:
-    """A connection to what is a store as far as its beginning tells, and what damage shows; with
-    `create` to a new one.
+def connected(path: Path, create: bool) -> sqlite3.Connection:
+    """A connection to a store, of whose tables those can be read that are whole; with `create`, to
+    one that is sound, made where there is none.
 
-    Without `create` it only reads, also where nothing can be written, or where the end of the file
-    is missing. Nothing blocks, and nothing is written yet.
+    Without `create` it only reads, also where nothing can be written.
 
-    :raises StoreError: no file that is, or may become, a store.
+    :raises StoreError: no file that is, or may become, a store; with `create`, a damaged one.
     :raises sqlite3.Error: SQLite cannot open it.
     """
     check_place(path, create)
     address = address_of(PurePath(os.path.abspath(path)))
-    if create:
-        return _opened(f"{address}?mode=rwc"), ""
-    connection, wrong = _opened(f"{address}?mode=rw"), ""
+    connection = _opened(f"{address}?mode={'rwc' if create else 'rw'}")
     try:
-        connection.execute("SELECT count(*) FROM sqlite_master").fetchone()
-    except sqlite3.OperationalError as error:
-        connection.close()
-        if not error.sqlite_errorname.startswith(
-            ("SQLITE_CANTOPEN", "SQLITE_READONLY", "SQLITE_IOERR")
-        ):
-            raise
-        # In a place that cannot be written, or is full, as long as nobody else writes to the store.
-        log = Path(f"{path}-wal")
-        if log.exists() and log.stat().st_size > 0:
-            words = (
-                f"the latest changes are in {log.name}, which cannot be read in this folder"
-                f" ({error})"
-            )
-            raise StoreError(
-                f"{path}: {words}; copy both to a folder that can be written"
-            ) from None
-        connection = _opened(f"{address}?immutable=1")
-    except sqlite3.DatabaseError as error:
-        if not is_damage(error):
-            connection.close()
-            raise
+        if create:
+            _prepare(path, connection)
+            return connection
         # So SQLite looks at a file from which pages are missing.
         connection.execute("PRAGMA writable_schema = ON")
-        wrong = str(error)
-    connection.execute("PRAGMA query_only = ON")
-    return connection, wrong
+        try:
+            connection.execute("SELECT count(*) FROM sqlite_master").fetchone()
+        except sqlite3.OperationalError as error:
+            log = Path(f"{path}-wal")
+            is_closed = error.sqlite_errorname.startswith(("SQLITE_CANTOPEN", "SQLITE_READONLY"))
+            if not is_closed or (log.exists() and log.stat().st_size > 0):
+                raise
+            # In a folder that cannot be written, as long as nobody else writes to the store.
+            connection.close()
+            connection = _opened(f"{address}?immutable=1")
+        connection.execute("PRAGMA query_only = ON")
+        check_tables(path, connection)
+    except BaseException:
+        connection.close()
+        raise
+    return connection
 
 
 def address_of(path: PurePath) -> str:
@@ -156,11 +115,6 @@ def address_of(path: PurePath) -> str:
     return f"file://{'' if text.startswith('/') else '/'}{quote(os.fsencode(text))}"
 
 
-def is_damage(error: sqlite3.Error) -> bool:
-    """Whether it is the content of the file that is wrong."""
-    return (getattr(error, "sqlite_errorname", None) or "").startswith("SQLITE_CORRUPT")
-
-
 def _opened(address: str) -> sqlite3.Connection:
     connection = sqlite3.connect(address, uri=True, isolation_level=None, timeout=PATIENCE)
     # Text that is none is a matter of its row, not of the whole store.
@@ -171,149 +125,90 @@ def _opened(address: str) -> sqlite3.Connection:
     return connection
 
 
-def is_same_file(one: Path, other: Path) -> bool:
-    """Whether two names mean the same file, which may not be there yet."""
-    try:
-        return one.resolve() == other.resolve()
-    except (OSError, RuntimeError):
-        # Links in a circle lead to no file.
-        return False
-
-
 def check_place(path: Path, create: bool) -> None:
     """Refuse what is no file that is a store as its beginning tells or, with `create`, could become
     one.
 
     :raises StoreError: it is not.
     """
+    if path.exists() and not path.is_file():
+        raise StoreError(f"{path}: is no file; {MEND}")
     try:
-        found = os.stat(path)
-        for is_kind, words in NO_FILES:
-            if is_kind(found.st_mode):
-                raise StoreError(f"{path}: is {words}, which keeps no store; name a file")
         with open(path, "rb") as stream:
-            start = stream.read(100)
+            start = stream.read(len(MAGIC))
     except FileNotFoundError:
-        if path.is_symlink():
+        if not create:
             raise StoreError(
-                f"{path}: is a link to a file that is not there; name a file"
+                f"{path}: there is no such store; make it with ballplate sweep"
             ) from None
         start = b""
-        if create and not path.parent.is_dir():
+        if not path.parent.is_dir():
             words = f"there is no folder {path.parent}; make it, or name another"
-            raise StoreError(f"{path}: {words}") from None
-        if not create:
-            words = "there is no such store; make it with ballplate sweep"
             raise StoreError(f"{path}: {words}") from None
     except OSError as error:
         raise StoreError(
             f"{path}: cannot be opened ({error.strerror}); check its name and permissions"
         ) from None
-    if create and not _is_writable(path.parent):
+    if create and not os.access(
+        path.parent, os.W_OK | os.X_OK, effective_ids=os.access in os.supports_effective_ids
+    ):
         raise StoreError(
             f"{path}: its folder cannot be written; name another with --store, or see to its"
             " permissions"
         )
-    if not start and not create:
-        raise StoreError(f"{path}: is empty; {MEND}")
-    if start and not start.startswith(MAGIC[: len(start)]):
-        what = " but a text file" if _is_text(start) else ", or its beginning is damaged"
-        raise StoreError(f"{path}: is no store of ballplate sweep{what}; {MEND}")
-    if 0 < len(start) < 100:
-        raise StoreError(
-            f"{path}: is cut off after {len(start)} bytes, so that nothing of it can be read;"
-            f" {MEND}"
-        )
+    if start != MAGIC and (start or not create):
+        raise StoreError(f"{path}: is no store of ballplate sweep; {MEND}")
 
 
-def _is_writable(folder: Path) -> bool:
-    is_effective = os.access in os.supports_effective_ids
-    return not folder.is_dir() or os.access(folder, os.W_OK | os.X_OK, effective_ids=is_effective)
+def check_tables(path: Path, connection: sqlite3.Connection) -> None:
+    """Refuse a database with other tables than those of a store, or with views or triggers, which
+    could make reading and writing do anything.
 
-
-def _is_text(start: bytes) -> bool:
-    return re.search(rb"[\x00-\x08\x0e-\x1a]", start) is None
-
-
-def format_of(path: Path, connection: sqlite3.Connection) -> int | None:
-    """The format of a store by its number, after a look at what the database consists of; None of
-    an empty one.
-
-    :raises StoreError: a database that is no store, a store of a later version, or one without
-        parts that it needs.
+    :raises StoreError: it has.
     :raises sqlite3.Error: SQLite cannot read it.
     """
-    parts = connection.execute("SELECT type, name, sql FROM sqlite_master").fetchall()
-    if not parts:
-        return None
-    tables = {name for kind, name, _ in parts if kind == "table"}
-    known = None
-    if "about" in tables:
-        row = connection.execute("SELECT value FROM about WHERE name = 'format'").fetchone()
-        known = (
-            re.fullmatch(r"ballplate sweep store ([1-9][0-9]{0,8})", str(row[0]), re.ASCII)
-            if row
-            else None
-        )
-    if known is None:
-        names = ", ".join(sorted(map(str, tables))[:4])
-        held = f"with the tables {names}" if names else "without tables"
-        raise StoreError(f"{path}: is no store of ballplate sweep but a database {held}; {MEND}")
-    number = int(known[1])
-    if number > NEWEST:
-        text = (
-            f"was made by a later version of ballplate (format {number}, and this version reads up"
-            f" to {NEWEST})"
-        )
-        raise StoreError(f"{path}: {text}; use that version")
-    for kind, name, text in parts:
-        # Views, triggers and virtual tables could make reading and writing do anything.
-        if kind not in ("table", "index") or str(text or "").upper().startswith("CREATE VIRTUAL"):
-            raise StoreError(
-                f"{path}: has a {kind} {name}, which ballplate never makes; do not trust it, and"
-                f" {MEND}"
-            )
-    _check_columns(path, connection, number)
-    return number
+    query = "SELECT sql FROM sqlite_master WHERE type <> 'index' AND name NOT LIKE 'sqlite!_%'"
+    statements = {str(text) for (text,) in connection.execute(f"{query} ESCAPE '!'")}
+    made = ""
+    if any(text.startswith("CREATE TABLE about ") for text in statements):
+        found = connection.execute("SELECT value FROM about WHERE name = 'format'").fetchone()
+        made = str(found[0]) if found else ""
+    if made != FORMAT and made.startswith(FORMAT[:-1]):
+        text = f"was made by another version of ballplate (format {made[len(FORMAT) - 1 :]})"
+        raise StoreError(f"{path}: {text}; use that version, or {ANEW}")
+    if made != FORMAT or statements != {text.strip() for text in TABLES.split(";")[:-1]}:
+        raise StoreError(f"{path}: is no store of ballplate sweep but another database; {MEND}")
 
 
-def _check_columns(path: Path, connection: sqlite3.Connection, number: int) -> None:
-    for table, columns in COLUMNS.items():
-        found = connection.execute(f"PRAGMA table_xinfo({table})").fetchall()
-        if any(hidden for *_, hidden in found):
-            words = f"computes columns of {table}, as ballplate never does"
-            raise StoreError(f"{path}: {words}; do not trust it, and {MEND}")
-        needed = columns | ({"digest"} if number > 1 and table in WITH_DIGEST else set())
-        missing = sorted(needed - {name for _, name, *_ in found})
-        if not found:
-            raise StoreError(
-                f"{path}: lacks the table {table}, which every store has; restore a copy, or {MEND}"
-            )
-        if missing:
-            words = f"lacks {', '.join(missing)} in the table {table}"
-            raise StoreError(f"{path}: {words}, which every store has; restore a copy, or {MEND}")
+def _prepare(path: Path, connection: sqlite3.Connection) -> None:
+    """Make the tables of an empty store, and check those of another one.
 
-
-def unnumbered(connection: sqlite3.Connection) -> str:
-    """That SQLite does not number the texts of a store, by which results refer to them; empty where
-    it does.
+    :raises StoreError: it is none, or damaged.
     """
-    columns = connection.execute("PRAGMA table_info(text)").fetchall()
-    keys = [(name, str(kind).upper()) for _, name, kind, _, _, place in columns if place]
-    return "" if keys == [("id", "INTEGER")] else "its texts are not numbered"
+    has_tables = connection.execute("SELECT count(*) FROM sqlite_master").fetchone()[0]
+    if has_tables:
+        check_tables(path, connection)
+        wrong = damage(connection)
+        if wrong:
+            raise StoreError(
+                f"{path}: is damaged ({wrong}); ballplate export and report give the cells that are"
+                f" whole, and {ANEW}"
+            )
+    connection.execute("PRAGMA journal_mode = WAL")
+    # What is written is on disk when the call returns.
+    connection.execute("PRAGMA synchronous = FULL")
+    if not has_tables:
+        connection.execute("BEGIN IMMEDIATE")
+        for statement in TABLES.split(";"):
+            connection.execute(statement)
+        connection.execute("INSERT INTO about VALUES ('format', ?)", [FORMAT])
+        connection.execute("COMMIT")
 
 
 def damage(connection: sqlite3.Connection) -> str:
-    """What SQLite's integrity check finds wrong with a database, in short; empty where it is
-    sound.
-    """
+    """What SQLite's integrity check finds wrong with a database; empty where it is sound."""
     try:
-        lines = [str(line) for (line,) in connection.execute("PRAGMA integrity_check(3)")]
+        (text,) = connection.execute("PRAGMA integrity_check(1)").fetchone()
     except sqlite3.DatabaseError as error:
         return str(error)
-    except UnicodeDecodeError:
-        return "names that are no text"
-    if lines == ["ok"]:
-        return ""
-    told = "; ".join(" ".join(line.split()) for line in lines)
-    return in_one_line(told.replace("*** in database main *** ", ""))[:200]
+    return "" if text == "ok" else str(text)[:200]

@@ -1,4 +1,4 @@
-"""Rows of a store, each checked; of a damaged file, those that can still be read."""
+"""Rows of a store. Each has a digest: those that are not as they were stored are left out."""
 
 from __future__ import annotations
 
@@ -7,95 +7,26 @@ import json
 import sqlite3
 from collections.abc import Iterator
 from dataclasses import dataclass, field
-from typing import Annotated, Any, Literal
+from functools import lru_cache
+from typing import Any
 
 import numpy as np
 from ballplate.simulator.inputs import in_lines
 from ballplate.simulator.machines import Array, Integers
-from ballplate.uncertainty import RECORDED_IF_TOLD
-from pydantic import (
-    AfterValidator,
-    BaseModel,
-    ConfigDict,
-    Field,
-    FiniteFloat,
-    TypeAdapter,
-    ValidationError,
+
+from .store_file import damage
+
+# Results with the texts that they refer to: what their digests are of, the duration and the digest.
+RESULTS = (
+    "SELECT result.key, block, status, reason, seed, names.value, figures, details, versions.value,"
+    " tally, CAST(seconds AS REAL), digest FROM result"
+    " LEFT JOIN text AS names ON names.id = result.names"
+    " LEFT JOIN text AS versions ON versions.id = result.versions"
 )
 
-from .store_columns import is_reserved
 
-# Columns of a table that are no figures.
-OWN = ("cell", "status", "reason", "data_set_seed", "fingerprint", "duration_s")
-
-# Rows that cannot be read one behind the other, after which no further ones are looked for.
-MOST_MISSES = 2000
-
-OF_RESULT = "block, status, reason, seed, seconds, names, versions, figures, details, tally"
-OTHER_CONTENT = "its content is not what was stored"
-
-
-class UnreadableError(Exception):
-    """A row cannot be read; the text says why."""
-
-
-def _names(found: list[str]) -> tuple[str, ...]:
-    """Names of figures.
-
-    :raises ValueError: some are none, or are there twice.
-    """
-    if len(set(found)) < len(found) or not all(map(_is_figure, found)):
-        raise ValueError
-    return tuple(found)
-
-
-def _is_figure(name: str) -> bool:
-    is_own = name in OWN or name.endswith("_version")
-    told = tuple(f"{symbol}_" for symbol in RECORDED_IF_TOLD)
-    return name.isprintable() and not is_own and (is_reserved(name) or name.startswith(told))
-
-
-Plain = Annotated[str, AfterValidator(in_lines)]
-
-
-class _Kept(BaseModel):
-    model_config = ConfigDict(strict=True, extra="ignore")
-
-
-class _Axis(_Kept):
-    name: Plain
-    column: Plain
-    unit: Literal["m", "rad", "1", ""]
-    labels: Annotated[list[Plain], Field(min_length=1)]
-    values: list[FiniteFloat]
-
-
-class _Definition(_Kept):
-    title: Plain
-    source: str
-    base: str
-    sweep: Any
-    experiment: Any
-    files: dict[str, str]
-    axes: Annotated[list[_Axis], Field(min_length=1)]
-    cells: Annotated[list[list[Annotated[int, Field(ge=0)]]], Field(min_length=1)]
-    trials: int | None
-    seed: int
-    record: list[Plain]
-
-
-class _Details(_Kept):
-    undetermined: list[Plain] = []
-    weak: list[Plain] = []
-    largest_at: dict[Plain, Plain] = {}
-    monte_carlo: Plain = ""
-    not_converged: list[int] = []
-    flags: dict[Plain, list[Plain]] = {}
-
-
-STRICT = ConfigDict(strict=True)
-_VERSIONS: TypeAdapter[Any] = TypeAdapter(dict[Plain, Plain], config=STRICT)
-_NAMES: TypeAdapter[Any] = TypeAdapter(Annotated[list[str], AfterValidator(_names)], config=STRICT)
+class DamagedError(Exception):
+    """A row is not as it was stored; the text says why."""
 
 
 def digest_of(*values: object) -> bytes:
@@ -104,69 +35,35 @@ def digest_of(*values: object) -> bytes:
     >>> digest_of("ab", 1) == digest_of("a", "b1")
     False
     """
-    found = hashlib.blake2b(digest_size=16)
+    digest = hashlib.blake2b(digest_size=16)
     for value in values:
         content = value if isinstance(value, bytes) else str(value).encode("utf-8", "surrogatepass")
-        found.update(f"{type(value).__name__} {len(content)} ".encode())
-        found.update(content)
-    return found.digest()
+        digest.update(f"{type(value).__name__} {len(content)} ".encode())
+        digest.update(content)
+    return digest.digest()
 
 
-def _refuse(name: str) -> None:
-    raise ValueError(f"{name} is no number of JSON")
+def check_digest(digest: object, *values: object) -> None:
+    """Check that values are as they were stored.
 
-
-_DECODER = json.JSONDecoder(parse_constant=_refuse)
-
-
-def json_of(text: object) -> Any:
-    """What a text of JSON says.
-
-    :raises UnreadableError: no text, no JSON, or numbers that are none.
+    :raises DamagedError: they are not.
     """
-    if not isinstance(text, str):
-        raise UnreadableError("no text")
-    try:
-        return _DECODER.decode(text)
-    except (ValueError, RecursionError):
-        raise UnreadableError("no JSON") from None
+    if digest != digest_of(*values):
+        raise DamagedError("its content is not what was stored")
 
 
-def checked_definition(number: object, text: object, digest: object) -> dict[str, Any]:
-    """A sweep's definition, in the form that `bundle.definition` gives it; its words without
-    control characters.
+def plain(value: Any) -> Any:
+    """Data of JSON with their texts in lines without control characters."""
+    if isinstance(value, dict):
+        return {in_lines(name): plain(item) for name, item in value.items()}
+    if isinstance(value, list):
+        return [plain(item) for item in value]
+    return in_lines(value) if isinstance(value, str) else value
 
-    :raises UnreadableError: not in that form, or not as it was stored.
-    """
-    if digest is not None and digest != digest_of(number, text):
-        raise UnreadableError(OTHER_CONTENT)
-    found = json_of(text)
-    try:
-        kept = _Definition.model_validate(found)
-    except (ValidationError, RecursionError) as error:
-        first = (
-            error.errors(include_url=False)[0]
-            if isinstance(error, ValidationError)
-            else {"loc": (), "msg": "?"}
-        )
-        place = ".".join(map(str, first["loc"]))
-        raise UnreadableError(f"{place}: {first['msg']}") from None
-    for axis in kept.axes:
-        if axis.unit and len(axis.values) != len(axis.labels):
-            raise UnreadableError(
-                f"the axis {axis.name} has {len(axis.labels)} labels and {len(axis.values)} values"
-            )
-    columns = [axis.column for axis in kept.axes]
-    if len(set(columns)) < len(columns) or any(map(is_reserved, columns)):
-        raise UnreadableError("the axes have no columns of their own")
-    counts = [len(axis.labels) for axis in kept.axes]
-    for cell in kept.cells:
-        if len(cell) != len(counts) or any(
-            k >= count for k, count in zip(cell, counts, strict=True)
-        ):
-            raise UnreadableError("cells has values that the axes do not have")
-    axes = [axis.model_dump() for axis in kept.axes]
-    return {**found, "title": kept.title, "axes": axes, "record": kept.record}
+
+@lru_cache(maxsize=1000)
+def _of_json(text: str) -> Any:
+    return plain(json.loads(text))
 
 
 @dataclass(frozen=True)
@@ -185,109 +82,28 @@ class StoredRow:
     details: dict[str, Any]
 
 
-@dataclass
-class Texts:
-    """Texts of a store by number, and what was made of them: names of figures, and versions."""
+def whole_row(number: int, values: tuple[Any, ...]) -> StoredRow:
+    """A row of `RESULTS`.
 
-    raw: dict[int, str]
-    made: dict[tuple[int, str], Any] = field(default_factory=dict)
-
-    def names_of(self, number: object) -> tuple[str, ...]:
-        """Names of the figures of a row.
-
-        :raises UnreadableError: no such text, or no names of figures.
-        """
-        found: tuple[str, ...] = self._made(number, "the names of its figures", _NAMES)
-        return found
-
-    def versions_of(self, number: object) -> dict[str, str]:
-        """Versions that a row was computed with.
-
-        :raises UnreadableError: no such text, or no versions.
-        """
-        what = "the versions that it was computed with"
-        found: dict[str, str] = self._made(number, what, _VERSIONS)
-        return found
-
-    def _made(self, number: object, what: str, form: TypeAdapter[Any]) -> Any:
-        if not isinstance(number, int) or number not in self.raw:
-            raise UnreadableError(f"{what} are not there")
-        if (number, what) not in self.made:
-            try:
-                self.made[number, what] = form.validate_python(json_of(self.raw[number]))
-            except (UnreadableError, ValidationError):
-                raise UnreadableError(f"{what} are none") from None
-        return self.made[number, what]
-
-
-def check_key(sweep: int, number: object, key: object, digest: object) -> None:
-    """Check that an entry of a cell is as it was stored.
-
-    :raises UnreadableError: it is not.
+    :raises DamagedError: it is not as it was stored.
     """
-    if not isinstance(number, int) or not isinstance(key, str) or not key.isprintable():
-        raise UnreadableError("its entry is no number and key")
-    if digest is not None and digest != digest_of(sweep, number, key):
-        raise UnreadableError(OTHER_CONTENT)
-
-
-def checked_row(number: int, key: str, raw: tuple[Any, ...], texts: Texts) -> StoredRow:
-    """A row as it was stored: of the columns `OF_RESULT`, and its digest.
-
-    :raises UnreadableError: a value that none can be, or not as it was stored.
-    """
-    block, status, reason, seed, seconds, names, versions, figures, details, tally, digest = raw
-    of_names, of_versions = texts.names_of(names), texts.versions_of(versions)
-    if digest is not None:
-        kept = (
-            key,
-            block,
-            status,
-            reason,
-            seed,
-            texts.raw[names],
-            figures,
-            details,
-            texts.raw[versions],
-            tally,
-        )
-        if digest != digest_of(*kept):
-            raise UnreadableError(OTHER_CONTENT)
-    if (
-        not isinstance(block, int)
-        or block < 0
-        or status not in ("done", "failed")
-        or not isinstance(reason, str)
-    ):
-        raise UnreadableError("its block, status or reason is none")
-    if not isinstance(seed, int) or not isinstance(seconds, float) or not np.isfinite(seconds):
-        raise UnreadableError("its seed or duration is no number")
-    if not isinstance(figures, bytes) or len(figures) != 8 * len(of_names):
-        raise UnreadableError(f"its figures are not {len(of_names)} numbers")
-    if tally is not None and not isinstance(tally, bytes):
-        raise UnreadableError("its sums over data sets are none")
-    try:
-        told = _Details.model_validate(json_of(details)).model_dump(exclude_unset=True)
-    except (UnreadableError, ValidationError):
-        raise UnreadableError("what was told of it cannot be read") from None
-    return StoredRow(
-        number, key, status, in_lines(reason), seed, seconds, of_names, of_versions, figures, told
-    )
+    *kept, seconds, digest = values
+    check_digest(digest, *kept)
+    key, _, status, reason, seed, names, figures, details, versions, _ = kept
+    texts = tuple(_of_json(names)), _of_json(versions)
+    more = plain(json.loads(details))
+    return StoredRow(number, key, status, in_lines(reason), seed, seconds, *texts, figures, more)
 
 
 @dataclass(frozen=True)
 class StoredResults:
-    """StoredResults of a sweep in the order of their cells; those not done yet are left out.
+    """Results of a sweep in the order of their cells; those not done yet are left out.
 
-    `unreadable` says of other cells why they are not among them, and `strays` counts entries that
-    belong to no cell of the sweep. `damage` is what SQLite finds wrong with the store, empty where
-    nothing.
+    `damaged` says of other cells why they are not among them.
     """
 
     rows: list[StoredRow]
-    unreadable: dict[int, str]
-    strays: int = 0
-    damage: str = ""
+    damaged: dict[int, str] = field(default_factory=dict)
 
     @property
     def cells(self) -> Integers:
@@ -303,124 +119,58 @@ class StoredResults:
         """Figures by name, (rows,) each, NaN where a row has no such figure."""
         figures: dict[str, Array] = {}
         # Rows with the same names make a matrix.
-        of_names: dict[int, list[int]] = {}
+        of_names: dict[tuple[str, ...], list[int]] = {}
         for place, row in enumerate(self.rows):
-            of_names.setdefault(id(row.names), []).append(place)
-        for places in of_names.values():
+            of_names.setdefault(row.names, []).append(place)
+        for names, places in of_names.items():
             content = b"".join(self.rows[place].figures for place in places)
             matrix = np.frombuffer(content, "<f8").reshape(len(places), -1)
-            for k, name in enumerate(self.rows[places[0]].names):
+            for k, name in enumerate(names):
                 figures.setdefault(name, np.full(len(self.rows), np.nan))[places] = matrix[:, k]
         return figures
 
 
-def texts_of(connection: sqlite3.Connection) -> Texts:
-    """All texts of a store.
+def read_results(connection: sqlite3.Connection, sweep: int, count: int) -> StoredResults:
+    """The rows of a sweep of so many cells. Each is looked for by itself, so that a damaged place
+    costs no other.
 
-    :raises sqlite3.Error: they cannot be read.
+    :raises sqlite3.OperationalError: the store cannot be read.
     """
-    return Texts(dict(connection.execute("SELECT id, value FROM text").fetchall()))
-
-
-def _salvaged_texts(connection: sqlite3.Connection) -> Texts:
-    found: dict[int, str] = {}
-    # The index holds them a second time.
-    for source in ("text NOT INDEXED", "text INDEXED BY sqlite_autoindex_text_1"):
-        try:
-            for number, value in connection.execute(f"SELECT id, value FROM {source}"):
-                found.setdefault(number, value)
-        except sqlite3.DatabaseError:
-            continue
-    return Texts(found)
-
-
-def read_rows(
-    connection: sqlite3.Connection, sweep: int, count: int, has_digests: bool
-) -> StoredResults:
-    """The rows of the first `count` cells of a sweep, from a database that is sound.
-
-    :raises sqlite3.Error: it is not, or cannot be read.
-    """
-    texts = texts_of(connection)
     rows: list[StoredRow] = []
-    unreadable: dict[int, str] = {}
-    strays = 0
-    of_cell, of_result = ("cell.digest", "result.digest") if has_digests else ("NULL", "NULL")
-    found = connection.execute(
-        f"SELECT number, cell.key, {of_cell}, result.key, {OF_RESULT}, {of_result} FROM cell LEFT"
-        " JOIN result ON result.key = cell.key AND block = 0 WHERE sweep = ? ORDER BY number",
-        [sweep],
-    )
-    for number, key, digest, is_there, *raw in found:
-        if not isinstance(number, int) or not 0 <= number < count:
-            strays += 1
-            continue
-        try:
-            check_key(sweep, number, key, digest)
-            if is_there is not None:
-                rows.append(checked_row(number, key, tuple(raw), texts))
-        except UnreadableError as error:
-            unreadable[number] = str(error)
-    if len(rows) + len(unreadable) < count:
-        # The rows of cells that seem not to be done may be there, under keys or blocks that are no
-        # longer theirs.
-        query = (
-            f"SELECT key, {OF_RESULT}, {of_result} FROM result WHERE block = 0 AND key NOT IN"
-            " (SELECT key FROM cell) OR typeof(block) <> 'integer' OR block < 0"
-        )
-        for key, *raw in connection.execute(query):
-            try:
-                checked_row(0, key, tuple(raw), texts)
-            except UnreadableError:
-                strays += 1
-    return StoredResults(rows, unreadable, strays)
-
-
-def salvaged_rows(
-    connection: sqlite3.Connection, sweep: int, count: int, has_digests: bool
-) -> StoredResults:
-    """The rows of a sweep that can be read in a damaged database, each looked for by itself."""
-    texts = _salvaged_texts(connection)
-    digest = "digest" if has_digests else "NULL"
-    # Of block 0 by key, as far as the pages of their table can be read.
-    by_key = {key: tuple(raw) for key, *raw in _walked(connection, digest) if raw[0] == 0}
-    rows: list[StoredRow] = []
-    unreadable: dict[int, str] = {}
+    damaged: dict[int, str] = {}
+    missing: list[int] = []
     for number in range(count):
         try:
-            query = f"SELECT key, {digest} FROM cell WHERE sweep = ? AND number = ?"
-            cell = connection.execute(query, [sweep, number]).fetchone()
-            if cell is None:
-                unreadable[number] = "no entry of it is found"
-                continue
-            check_key(sweep, number, *cell)
-            raw = by_key.get(cell[0]) or _of_index(connection, cell[0], digest)
-            rows.append(checked_row(number, cell[0], raw, texts))
-        except (sqlite3.DatabaseError, UnreadableError) as error:
-            unreadable[number] = str(error)
-    return StoredResults(rows, unreadable)
+            key = _key(connection, sweep, number)
+            values = connection.execute(f"{RESULTS} WHERE key = ? AND block = 0", [key]).fetchone()
+            if values is None:
+                missing.append(number)
+            else:
+                rows.append(whole_row(number, values))
+        except sqlite3.OperationalError:
+            raise
+        except (sqlite3.DatabaseError, DamagedError) as error:
+            damaged[number] = str(error)
+    # A cell that seems not to be done may have been.
+    wrong = damage(connection) if missing else ""
+    damaged |= dict.fromkeys(missing, wrong) if wrong else {}
+    return StoredResults(rows, damaged)
 
 
-def _of_index(connection: sqlite3.Connection, key: str, digest: str) -> tuple[Any, ...]:
-    query = f"SELECT {OF_RESULT}, {digest} FROM result WHERE key = ? AND block = 0"
-    found = connection.execute(query, [key]).fetchone()
-    if found is None:
-        raise UnreadableError("no result of it is found")
-    return tuple(found)
+def _key(connection: sqlite3.Connection, sweep: int, number: int) -> str | None:
+    query = "SELECT key, digest FROM cell WHERE sweep = ? AND number = ?"
+    values = connection.execute(query, [sweep, number]).fetchone()
+    if values is None:
+        return None
+    check_digest(values[1], sweep, number, values[0])
+    return str(values[0])
 
 
-def _walked(connection: sqlite3.Connection, digest: str) -> Iterator[tuple[Any, ...]]:
-    query = (
-        f"SELECT rowid, key, {OF_RESULT}, {digest} FROM result NOT INDEXED WHERE rowid > ? ORDER BY"
-        " rowid"
-    )
-    place, misses = 0, 0
-    while misses < MOST_MISSES:
-        try:
-            for row in connection.execute(query, [place]):
-                place, misses = row[0], 0
-                yield tuple(row[1:])
-            return
-        except sqlite3.DatabaseError:
-            # Behind the page that cannot be read there may be others.
-            place, misses = place + 1, misses + 1
+def whole_results(connection: sqlite3.Connection) -> Iterator[tuple[str, int, str]]:
+    """Key, block and status of every result that is as it was stored.
+
+    :raises sqlite3.Error: the store cannot be read.
+    """
+    for key, block, status, *others, _, digest in connection.execute(RESULTS):
+        if digest == digest_of(key, block, status, *others):
+            yield key, block, status

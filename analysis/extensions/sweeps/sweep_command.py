@@ -72,7 +72,6 @@ def run(options: Namespace) -> int:
     from .bundle import bundle_of
     from .load import load_sweep
     from .running import writable_store
-    from .store_file import is_same_file
 
     sweep = load_sweep(
         options.file, folders=tuple(Path(os.path.abspath(folder)) for folder in options.folder)
@@ -81,7 +80,7 @@ def run(options: Namespace) -> int:
         return _dry_run(sweep, options)
     bundle = bundle_of(sweep)
     path = options.store or options.file.with_suffix(".sqlite")
-    if any(is_same_file(path, file) for file in (options.file, sweep.base)):
+    if os.path.realpath(path) in map(os.path.realpath, (options.file, sweep.base)):
         raise UsageError(f"--store {path} is the sweep's own file; name another")
     try:
         with writable_store(path) as store:

@@ -213,7 +213,7 @@ def test_what_was_kept_before_the_folder_was_full_is_no_promise(design, monkeypa
     def fail(*_, **__):
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr("ballplate.extensions.studio.recovery.replace_file", fail)
+    monkeypatch.setattr("ballplate.extensions.studio.recovery.write_files", fail)
     session.act({"do": "turn", "position": "x low"})
     assert kept_in(design).exists() and not session.state()["recoverable"]
     assert "could not be kept" in unsaved(session)
@@ -250,7 +250,7 @@ def test_a_folder_that_cannot_be_written_keeps_nothing_and_stops_nobody(design, 
     def fail(*_, **__):
         raise PermissionError(13, "Permission denied")
 
-    monkeypatch.setattr("ballplate.extensions.studio.recovery.replace_file", fail)
+    monkeypatch.setattr("ballplate.extensions.studio.recovery.write_files", fail)
     session = Session(design)
     session.act({"do": "turn", "position": "z low"})
     state = session.state()

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import json
 import os
 import socket
 import sqlite3
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+
+from ballplate.extensions.sweeps.stored import RESULTS, digest_of
 
 Damage = Callable[[Path], object]
 
@@ -28,53 +28,27 @@ def by_sql(*statements: str) -> Damage:
     return change
 
 
-def by_definition(change: Callable[[dict[str, Any]], object]) -> Damage:
-    """Change the definition of a store's sweep."""
-
-    def apply(path: Path) -> None:
-        connection = sqlite3.connect(path, isolation_level=None)
-        connection.execute("PRAGMA journal_mode = DELETE")
-        (text,) = connection.execute("SELECT definition FROM sweep").fetchone()
-        definition = json.loads(text)
-        change(definition)
-        connection.execute("UPDATE sweep SET definition = ?", [json.dumps(definition)])
-        connection.close()
-
-    return apply
+# Rows of tables with digests: what these are of, and how many columns tell one row from another.
+SIGNED = {
+    "sweep": ("SELECT id, definition FROM sweep", ("id",)),
+    "bundle": ("SELECT sweep, path, content FROM bundle", ("sweep", "path")),
+    "cell": ("SELECT sweep, number, key FROM cell", ("sweep", "number")),
+    "result": (RESULTS.replace("CAST(seconds AS REAL), digest", "0"), ("key", "block")),
+}
 
 
-# The tables of the first format.
-FIRST = """
-CREATE TABLE about (name TEXT PRIMARY KEY, value TEXT NOT NULL) WITHOUT ROWID;
-CREATE TABLE sweep (id INTEGER PRIMARY KEY, definition TEXT NOT NULL);
-CREATE TABLE bundle (sweep INTEGER, path TEXT, content BLOB NOT NULL, PRIMARY KEY (sweep, path)) WITHOUT ROWID;
-CREATE TABLE cell (sweep INTEGER, number INTEGER, key TEXT NOT NULL, PRIMARY KEY (sweep, number)) WITHOUT ROWID;
-CREATE TABLE text (id INTEGER PRIMARY KEY, value TEXT NOT NULL UNIQUE);
-CREATE TABLE result (
-    key TEXT, block INTEGER, status TEXT NOT NULL, reason TEXT NOT NULL, seed INTEGER NOT NULL,
-    names INTEGER NOT NULL REFERENCES text, figures BLOB NOT NULL, details TEXT NOT NULL,
-    versions INTEGER NOT NULL REFERENCES text, seconds REAL NOT NULL, tally BLOB,
-    PRIMARY KEY (key, block)
-);
-"""
-
-
-def of_the_first_format(path: Path) -> None:
-    """Make of a store the same as the first format had it, without digests."""
-    newer = path.with_name("newer")
-    settled(path)
-    path.rename(newer)
+def signed(path: Path) -> None:
+    """Give every row of a store the digest of what it says now, as whoever forges one would."""
     connection = sqlite3.connect(path, isolation_level=None)
-    connection.executescript(FIRST)
-    connection.execute("ATTACH ? AS newer", [str(newer)])
-    for table in ("sweep", "bundle", "cell", "text", "result"):
-        names = ", ".join(
-            name for _, name, *_ in connection.execute(f"PRAGMA main.table_info({table})")
-        )
-        connection.execute(f"INSERT INTO {table} ({names}) SELECT {names} FROM newer.{table}")
-    connection.execute("INSERT INTO about VALUES ('format', 'ballplate sweep store 1')")
+    for table, (query, names) in SIGNED.items():
+        where = " AND ".join(f"{name} = ?" for name in names)
+        for row in connection.execute(query).fetchall():
+            values = row[:-1] if table == "result" else row
+            keys = values[: len(names)]
+            connection.execute(
+                f"UPDATE {table} SET digest = ? WHERE {where}", [digest_of(*values), *keys]
+            )
     connection.close()
-    newer.unlink()
 
 
 def settled(path: Path) -> None:
@@ -156,6 +130,16 @@ def loop(path: Path) -> None:
     path.symlink_to(other.name)
 
 
+def loosened(numbers: str) -> tuple[str, ...]:
+    """Statements that make a table of texts without constraints, with other numbers."""
+    return (
+        "CREATE TABLE loose (id, value)",
+        f"INSERT INTO loose SELECT {numbers}, value FROM text",
+        "DROP TABLE text",
+        "ALTER TABLE loose RENAME TO text",
+    )
+
+
 # What is no store, whatever a command wants of it.
 NO_STORES: dict[str, Damage] = {
     "text": replaced(lambda path: path.write_text("nonsense\n" * 1000, encoding="utf-8")),
@@ -182,6 +166,9 @@ NO_STORES: dict[str, Damage] = {
     "no results": by_sql("DROP TABLE result"),
     "no cells": by_sql("DROP TABLE cell"),
     "column missing": by_sql("ALTER TABLE result DROP COLUMN details"),
+    "numbers of texts ill": by_sql(*loosened("CAST(x'ff41fe' AS TEXT)")),
+    "texts not numbered": by_sql(*loosened("id"), "DELETE FROM text WHERE id = 1"),
+    "format 1": by_sql("UPDATE about SET value = 'ballplate sweep store 1'"),
     "view": by_sql(
         "ALTER TABLE cell RENAME TO real_cell",
         "CREATE VIEW cell AS WITH RECURSIVE n(x) AS (SELECT 1 UNION ALL SELECT x + 1 FROM n) SELECT"
@@ -198,16 +185,6 @@ NO_STORES: dict[str, Damage] = {
 }
 
 
-def loosened(numbers: str) -> tuple[str, ...]:
-    """Statements that make a table of texts without constraints, with other numbers."""
-    return (
-        "CREATE TABLE loose (id, value)",
-        f"INSERT INTO loose SELECT {numbers}, value FROM text",
-        "DROP TABLE text",
-        "ALTER TABLE loose RENAME TO text",
-    )
-
-
 # What is a store still, in parts.
 DAMAGED: dict[str, Damage] = {
     **{f"cut to {share}": cut(share) for share in (0.3, 0.5, 0.7, 0.9, 0.99)},
@@ -219,51 +196,31 @@ DAMAGED: dict[str, Damage] = {
     "no keys": by_sql("DELETE FROM cell"),
     "no texts": by_sql("DELETE FROM text"),
     "no files": by_sql("DELETE FROM bundle"),
-    "numbers of texts ill": by_sql(*loosened("CAST(x'ff41fe' AS TEXT)")),
-    "texts not numbered": by_sql(*loosened("id"), "DELETE FROM text WHERE id = 1"),
     "definition no JSON": by_sql("UPDATE sweep SET definition = '{'"),
     "definition of bytes": by_sql("UPDATE sweep SET definition = x'00ff'"),
-    "definition a list": by_sql("UPDATE sweep SET definition = '[]'"),
-    "definition nested": by_sql(f"UPDATE sweep SET definition = '{'[' * 100_000}'"),
-    "definition a number": by_sql(f"UPDATE sweep SET definition = '{'1' * 5000}'"),
-    "number of the sweep": by_sql("UPDATE sweep SET id = 9223372036854775807"),
     "names no JSON": by_sql("UPDATE text SET value = 'x' WHERE id = 1"),
     "names of bytes": by_sql("UPDATE text SET value = x'ff' WHERE id = 1"),
-    "names a number": by_sql("UPDATE text SET value = '3' WHERE id = 1"),
-    "names of numbers": by_sql("UPDATE text SET value = '[1, [2], null]' WHERE id = 1"),
     "names too few": by_sql("UPDATE text SET value = '[\"U4_average_m\"]' WHERE id = 1"),
     "versions a list": by_sql("UPDATE text SET value = '[[]]' WHERE id = 2"),
-    "versions no texts": by_sql("UPDATE text SET value = '{\"ballplate\": 3}' WHERE id = 2"),
     "names unknown": by_sql("UPDATE result SET names = 99 WHERE rowid = 1"),
     "versions unknown": by_sql("UPDATE result SET versions = 'x' WHERE rowid = 1"),
     "figures too short": by_sql("UPDATE result SET figures = x'00' WHERE rowid = 1"),
-    "figures too few": by_sql("UPDATE result SET figures = zeroblob(16) WHERE rowid = 1"),
-    "figures none": by_sql("UPDATE result SET figures = x'' WHERE rowid = 1"),
     "figures a text": by_sql("UPDATE result SET figures = 'text' WHERE rowid = 1"),
-    "figures a number": by_sql("UPDATE result SET figures = 3 WHERE rowid = 1"),
     "figures others": by_sql(
         "UPDATE result SET figures = zeroblob(length(figures)) WHERE rowid = 1"
     ),
     "status unknown": by_sql("UPDATE result SET status = 'DONE' WHERE rowid = 1"),
     "status of bytes": by_sql("UPDATE result SET status = x'fffe' WHERE rowid = 1"),
-    "status a number": by_sql("UPDATE result SET status = 4 WHERE rowid = 1"),
-    "reason of bytes": by_sql("UPDATE result SET reason = x'1b5b33316dff' WHERE rowid = 1"),
     "reason no text": by_sql(
         "UPDATE result SET reason = CAST(x'1b5b33316dff' AS TEXT) WHERE rowid = 1"
     ),
     "reason long": by_sql("UPDATE result SET reason = hex(zeroblob(3000000)) WHERE rowid = 1"),
     "seed a text": by_sql("UPDATE result SET seed = 'x' WHERE rowid = 1"),
-    "seed infinite": by_sql("UPDATE result SET seed = 9e999 WHERE rowid = 1"),
-    "seed negative": by_sql("UPDATE result SET seed = -1 WHERE rowid = 1"),
     "seconds a text": by_sql("UPDATE result SET seconds = 'x' WHERE rowid = 1"),
     "seconds infinite": by_sql("UPDATE result SET seconds = 9e999 WHERE rowid = 1"),
-    "details no JSON": by_sql("UPDATE result SET details = '{' WHERE rowid = 1"),
-    "details a list": by_sql("UPDATE result SET details = '[]' WHERE rowid = 1"),
-    "details nested": by_sql(f"UPDATE result SET details = '{'[' * 100_000}' WHERE rowid = 1"),
     "details of numbers": by_sql(
         'UPDATE result SET details = \'{"weak": 3, "flags": [1]}\' WHERE rowid = 1'
     ),
-    "details of bytes": by_sql("UPDATE result SET details = x'ff' WHERE rowid = 1"),
     "block a text": by_sql("UPDATE result SET block = 'x' WHERE rowid = 1"),
     "tally no tally": by_sql("UPDATE result SET tally = x'00' WHERE rowid = 1"),
     "key of another method": by_sql("UPDATE cell SET key = char(178) || ' x' WHERE number = 0"),
@@ -279,30 +236,4 @@ DAMAGED: dict[str, Damage] = {
         "UPDATE cell SET number = 0 WHERE number = 1",
         "UPDATE cell SET number = 1 WHERE number = 99",
     ),
-    "axes missing": by_definition(lambda found: found.pop("axes")),
-    "axes none": by_definition(lambda found: found.update(axes=[])),
-    "axis of numbers": by_definition(lambda found: found.update(axes=[3])),
-    "unit odd": by_definition(lambda found: found["axes"][0].update(unit="furlong")),
-    "values texts": by_definition(lambda found: found["axes"][0].update(values=["a", "b"])),
-    "values too few": by_definition(lambda found: found["axes"][0].update(values=[1.0])),
-    "values infinite": by_definition(
-        lambda found: found["axes"][1].update(values=[float("inf")] * 2)
-    ),
-    "labels none": by_definition(lambda found: found["axes"][0].update(labels=[])),
-    "column taken": by_definition(lambda found: found["axes"][0].update(column="status")),
-    "columns equal": by_definition(
-        lambda found: found["axes"][0].update(column=found["axes"][1]["column"])
-    ),
-    "cells beyond": by_definition(lambda found: found.update(cells=[[7, 7]] * 4)),
-    "cells negative": by_definition(lambda found: found.update(cells=[[-1, 0]] * 4)),
-    "cells ragged": by_definition(lambda found: found.update(cells=[[0], [0, 1]])),
-    "cells few": by_definition(lambda found: found.update(cells=[[0, 0]])),
-    "cells none": by_definition(lambda found: found.update(cells=[])),
-    "cells huge": by_definition(lambda found: found.update(cells=[[10**30, 0]] * 4)),
-    "record odd": by_definition(lambda found: found.update(record=[3, None])),
-    "trials odd": by_definition(lambda found: found.update(trials="many")),
-    "title a list": by_definition(lambda found: found.update(title=["a"])),
-    "source outside": by_definition(lambda found: found.update(source="../../outside.yaml")),
-    "source a number": by_definition(lambda found: found.update(source=4)),
-    "experiment a list": by_definition(lambda found: found.update(experiment=[1], sweep=3)),
 }

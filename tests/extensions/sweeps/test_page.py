@@ -28,6 +28,7 @@ from ballplate.results.checked_designs import predict
 from ballplate.simulator.computing.steps import unreported
 from ballplate.simulator.experiment.loading import load
 
+from tests.extensions.sweeps.odd_stores import signed
 from tests.extensions.sweeps.stores import Page, axis, done, failed, made_up
 
 
@@ -240,6 +241,7 @@ def test_models_in_python_are_run_only_if_asked(tmp_path: Path) -> None:
     rows = [(1, name, content.encode()) for name, content in contents.items()]
     store.connection.executemany("INSERT INTO bundle (sweep, path, content) VALUES (?, ?, ?)", rows)
     store.close()
+    signed(store.path)
     assert "modules are not allowed here; add --run-modules" in report(store.path)
     assert not mark.exists()
     # In a process of its own, as the module would stay in this one.
@@ -269,6 +271,7 @@ def test_files_outside_the_store_s_folder_are_not_written(tmp_path: Path) -> Non
             store.connection.executemany(
                 "INSERT INTO bundle (sweep, path, content) VALUES (?, ?, ?)", rows
             )
+        signed(store.path)
         with pytest.raises(NoExperimentError, match="leads out of the folder"):
             experiments(store, read_results(store, 1), [0])
         assert not (tmp_path / "out.yaml").exists()
@@ -286,6 +289,7 @@ def test_a_base_other_than_the_one_told_is_not_loaded(tmp_path: Path) -> None:
         store.connection.executemany(
             "INSERT INTO bundle (sweep, path, content) VALUES (?, ?, ?)", rows
         )
+    signed(store.path)
     sys.modules.pop("this", None)
     (found,) = experiments(store, read_results(store, 1), [0])
     assert found.error_model.kind == "kinematic" and "this" not in sys.modules

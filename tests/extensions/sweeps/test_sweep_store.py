@@ -23,6 +23,7 @@ from ballplate.results.checked_designs import predict
 from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.inputs.messages import ExperimentError, Message
 
+from tests.extensions.sweeps.odd_stores import signed
 from tests.extensions.sweeps.support import (
     ROOT,
     assert_same,
@@ -96,10 +97,8 @@ def made_by_the_first_method(path: Path) -> None:
     for key, figures in connection.execute("SELECT key, figures FROM result").fetchall():
         wrong = np.full(len(figures) // 8, 17.0, "<f8").tobytes()
         connection.execute("UPDATE result SET figures = ? WHERE key = ?", [wrong, key])
-    for table in ("cell", "result"):
-        # Of that time there are no digests.
-        connection.execute(f"UPDATE {table} SET digest = NULL")
     connection.close()
+    signed(path)
 
 
 def test_rows_of_an_earlier_method_are_computed_anew_and_told(
@@ -192,9 +191,9 @@ def test_a_changed_base_is_refused_with_what_changed(
     )
     assert sweep(path, "--beside") == 1
     store = open_store(tmp_path / "small.sqlite")
-    assert len(definitions(store)[0]) == 2
+    assert len(definitions(store)) == 2
     assert keys(store, 1)[0] != keys(store, 2)[0]
-    one, two = (results(store, k).figures["U1_average_m"][0] for k in (1, 2))
+    one, two = (results(store, k, 4).figures["U1_average_m"][0] for k in (1, 2))
     assert two > 1.1 * one
     store.close()
 
@@ -259,7 +258,7 @@ def test_the_store_holds_all_files_that_it_needs(tmp_path: Path) -> None:
     assert sweep(path) == 0
     store = open_store(tmp_path / "small.sqlite")
     assert [name for name, _ in files(store, 1)] == ["balls.csv", "quickstart.yaml", "small.yaml"]
-    assert "undetermined" in results(store, 1).rows[0].details
+    assert "undetermined" in results(store, 1, 4).rows[0].details
     store.close()
     (tmp_path / "balls.csv").write_text(
         "ball,x_mm,y_mm\na,0,0\nb,700,0\nc,700,650\nd,0,650\n", encoding="utf-8"
@@ -414,7 +413,7 @@ def test_what_a_users_model_imports_counts(tmp_path: Path) -> None:
     )
     assert run("sweep", path, "--beside", "--workers", 1).returncode == 0
     store = open_store(tmp_path / "small.sqlite")
-    few, more = (results(store, k).figures["parameters"][0] for k in (1, 2))
+    few, more = (results(store, k, 4).figures["parameters"][0] for k in (1, 2))
     store.close()
     assert more > few
 

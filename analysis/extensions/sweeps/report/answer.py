@@ -161,7 +161,7 @@ def _left_out(results: ReportedSweep, done: Integers) -> list[str]:
     missing = (
         (results.count("failed"), "failed"),
         (results.left, "not computed yet"),
-        (len(results.found.unreadable), "not readable"),
+        (len(results.found.damaged), "not readable"),
     )
     parts = [f"{count} {words}" for count, words in missing if count]
     if parts:

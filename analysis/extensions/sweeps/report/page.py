@@ -145,7 +145,7 @@ def _summary(results: ReportedSweep) -> str:
     parts = [f"{results.count('done')} of {len(results.cells)} cells done"]
     parts += [f"{results.count('failed')} failed"] if results.count("failed") else []
     parts += [f"{results.left} left"] if results.left else []
-    unreadable = len(results.found.unreadable)
+    unreadable = len(results.found.damaged)
     parts += [f"{unreadable} could not be read from the damaged store"] if unreadable else []
     return ", ".join(parts) + "."
 
@@ -176,8 +176,8 @@ def _facts(results: ReportedSweep) -> list[tuple[str, str]]:
         facts.append((f"Axis {axis.name}", ", ".join(labels)))
     cells = f"{len(results.cells)}: {results.count('done')} done, "
     cells += f"{results.count('failed')} failed, {results.left} left"
-    if results.found.unreadable:
-        cells += f", {len(results.found.unreadable)} could not be read: {_unreadable(results)}"
+    if results.found.damaged:
+        cells += f", {len(results.found.damaged)} could not be read: {_unreadable(results)}"
     facts += [
         ("Cells", cells),
         ("Recorded", ", ".join(stored["record"])),
@@ -200,8 +200,8 @@ def _facts(results: ReportedSweep) -> list[tuple[str, str]]:
 
 def _unreadable(results: ReportedSweep) -> str:
     """Which cells could not be read, and why the first of them."""
-    cells = sorted(results.found.unreadable)
-    return f"{cell_list(cells)} ({in_one_line(results.found.unreadable[cells[0]])})"
+    cells = sorted(results.found.damaged)
+    return f"{cell_list(cells)} ({in_one_line(results.found.damaged[cells[0]])})"
 
 
 def _plots(

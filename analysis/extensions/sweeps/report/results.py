@@ -15,7 +15,7 @@ from ballplate.uncertainty import RECORDED
 from numpy.typing import NDArray
 
 from ..frame import frame_of
-from ..store import Store, chosen_sweep, definition_of, results
+from ..store import Store, chosen_sweep, results
 from ..store_columns import MORE, symbol_column
 from ..stored import StoredResults as Found
 
@@ -85,7 +85,7 @@ class ReportedSweep:
 
     @property
     def left(self) -> int:
-        return len(self.cells) - len(self.frame) - len(self.found.unreadable)
+        return len(self.cells) - len(self.frame) - len(self.found.damaged)
 
     def label(self, cell: int) -> str:
         """A cell in words."""
@@ -122,8 +122,7 @@ def read_results(store: Store, sweep: int | None) -> ReportedSweep:
 
     :raises StoreError: there is no such sweep, or the store cannot be read.
     """
-    number = chosen_sweep(store, sweep)
-    definition = definition_of(store, number)
+    number, definition = chosen_sweep(store, sweep)
     axes = tuple(_axis(one) for one in definition["axes"])
     cells = np.array(definition["cells"], np.int64).reshape(len(definition["cells"]), len(axes))
     found = results(store, number, len(cells))

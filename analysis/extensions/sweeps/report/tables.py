@@ -159,7 +159,7 @@ def _below(
 
 def _entry(results: ReportedSweep, measure: Measure, cell: int, row: int | None) -> Entry:
     if row is None:
-        text = UNREADABLE if cell in results.found.unreadable else NOT_DONE
+        text = UNREADABLE if cell in results.found.damaged else NOT_DONE
         return Entry(text, None, cell, measure.figure)
     if results.statuses[row] != "done":
         return Entry(results.statuses[row], None, cell, measure.figure)
