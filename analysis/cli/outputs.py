@@ -281,6 +281,9 @@ def write_outputs(
     from ballplate.simulator.inputs.messages import Message
 
     try:
+        if any(map(is_device, writers)):
+            # What was printed before stands before it, where it is standard output.
+            sys.stdout.flush()
         write_files(writers, force, held)
     except UnwrittenError as error:
         path = Path(error.filename)

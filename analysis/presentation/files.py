@@ -6,7 +6,6 @@ import errno
 import os
 import shutil
 import stat
-import sys
 import tempfile
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import AbstractContextManager, ExitStack, contextmanager, nullcontext, suppress
@@ -179,7 +178,5 @@ def _write_device(path: Path, writer: Writer) -> None:
     with tempfile.TemporaryDirectory(prefix="ballplate-") as folder:
         whole = Path(folder, f"whole{path.suffix.lower()}")
         writer(whole)
-        # What was printed before stands before it, where it is standard output.
-        sys.stdout.flush()
         with whole.open("rb") as content, path.open("wb") as stream:
             shutil.copyfileobj(content, stream)
