@@ -167,7 +167,6 @@ _KERNEL = {
     "ballplate.api": (
         "check",
         "compare",
-        "compare_models",
         "experiment",
         "fit",
         "load_map",
