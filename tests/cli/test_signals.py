@@ -55,7 +55,7 @@ ENDING = {
     "sweep by two": (("sweep", "many.yaml", "--workers", 2, "--store", "new.sqlite"), 7.0),
     "report": (("sweep", "--report", "small.sqlite", "-o", "page.html"), 2.0),
     "export": (("sweep", "--export", "small.sqlite", "-o", "table.csv"), 0.8),
-    "reach": (("reach", DESIGNS / "npl/5.3.yaml"), 1.5),
+    "reach": (("reach", DESIGNS / "npl/5.3.yaml", "--variant", "kinematic fit"), 1.5),
     "lengths": (
         (
             "run",
