@@ -107,7 +107,7 @@ def _with_command(words: Sequence[str]) -> list[str]:
     until = others.index("--") if "--" in others else len(others)
     for name in names("commands"):
         first, _, option = name.partition(" ")
-        if first == command and option in others[:until]:
+        if first == command and option and option in others[:until]:
             others.remove(option)
             return [name, *others]
     return list(words)

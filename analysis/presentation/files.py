@@ -12,8 +12,6 @@ from contextlib import AbstractContextManager, ExitStack, contextmanager, nullco
 from functools import partial
 from pathlib import Path
 
-from ballplate.simulator.inputs.arguments import ensure_path
-
 Writer = Callable[[Path], object]
 """Writes a file of the kind that the path's name ends in."""
 
@@ -33,6 +31,9 @@ def write_file(path: str | Path, content: bytes) -> None:
     ...     Path(folder, "page.html").read_bytes()
     b'<p>'
     """
+    # Loads numpy, which the commands do only when interruptions are answered.
+    from ballplate.simulator.inputs.arguments import ensure_path
+
     ensure_path("path", path)
     path = Path(path)
     if not path.parent.is_dir():

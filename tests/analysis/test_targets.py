@@ -134,8 +134,7 @@ def test_goals_make_check_fail(tmp_path: Path, capsys: pytest.CaptureFixture[str
                 "--goal",
                 just,
                 "--goal",
-                "run",
-                "--lengths",
+                "lengths",
                 "--goal",
                 "U2 angles maximum 1 urad",
             ]

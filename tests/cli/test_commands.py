@@ -230,7 +230,8 @@ def test_nothing_is_made_of_a_failed_estimate(
 ) -> None:
     # Readings as wrong as these are refused before.
     monkeypatch.setattr(
-        "ballplate.simulator.readings.reading_files.refuse_gross_errors", lambda *_: None
+        "ballplate.extensions.laboratory.reading_checks.ReadingChecks.refuse_gross_errors",
+        lambda *_: None,
     )
     readings, lines = quickstart_readings(tmp_path)
     readings.write_text(

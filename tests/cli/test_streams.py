@@ -82,7 +82,8 @@ def test_a_current_folder_that_has_been_deleted_is_told(
     gone.rmdir()
     assert main(["init", "new.yaml"]) == 3
     assert capsys.readouterr().err.splitlines() == [
-        "new.yaml: cannot be written (No such file or directory); check the folder"
+        "new.yaml: cannot be written (No such file or directory); check the folder,"
+        " its permissions and its room, and whether another program has the file open"
     ]
     monkeypatch.setattr(schema, "run", lambda _: Path.cwd())
     assert main(["schema"]) == 3

@@ -158,6 +158,10 @@ def assert_covered(found: Shares, count: int) -> None:
 
 def told_on_page(name: str) -> list[float]:
     """The figures of a row of a table of the documentation, after its first cell."""
-    page = (TOP / "docs" / "reference" / "validation.md").read_text(encoding="utf-8")
-    (line,) = [one for one in page.splitlines() if one.startswith(f"| {name} |")]
+    pages = (
+        TOP / "docs" / page
+        for page in ("reference/validation.md", "how-to/influence-quantities.md")
+    )
+    lines = [line for page in pages for line in page.read_text(encoding="utf-8").splitlines()]
+    (line,) = [line for line in lines if line.startswith(f"| {name} |")]
     return [float(cell.split()[0]) for cell in line.split("|")[2:-1]]

@@ -339,9 +339,9 @@ def test_what_is_wrong_is_told_at_its_place(
 def _again(name: str) -> list[dict[str, Any]]:
     text = Path("designs/quickstart.yaml").read_text(encoding="utf-8")
     places: list[dict[str, Any]] = yaml.safe_load(text)["positions"]
-    if name == "the first position once more at the end":
+    if name == "the first position at the end":
         return [*places, places[0] | {"name": "z low again"}]
-    if name == "the corners once more at the end of each position":
+    if name == "the corners at the end of each position":
         groups = [{"balls": "all"}, {"balls": ["r1c1", "r1c3", "r3c1", "r3c3"]}]
         return [
             {key: value for key, value in one.items() if key != "probes"}
@@ -355,8 +355,8 @@ def _again(name: str) -> list[dict[str, Any]]:
     "name",
     [
         "nothing",
-        "the first position once more at the end",
-        "the corners once more at the end of each position",
+        "the first position at the end",
+        "the corners at the end of each position",
     ],
 )
 def test_the_page_states_what_reading_again_buys(name: str, tmp_path: Path) -> None:

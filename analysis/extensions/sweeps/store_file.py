@@ -88,10 +88,11 @@ def connected(path: Path, create: bool) -> sqlite3.Connection:
             connection.execute("SELECT count(*) FROM sqlite_master").fetchone()
         except sqlite3.OperationalError as error:
             log = Path(f"{path}-wal")
-            is_closed = error.sqlite_errorname.startswith(("SQLITE_CANTOPEN", "SQLITE_READONLY"))
-            if not is_closed or (log.exists() and log.stat().st_size > 0):
+            closed = "SQLITE_CANTOPEN", "SQLITE_READONLY", "SQLITE_IOERR"
+            is_in_use = log.exists() and log.stat().st_size > 0
+            if is_in_use or not error.sqlite_errorname.startswith(closed):
                 raise
-            # In a folder that cannot be written, as long as nobody else writes to the store.
+            # In a place that cannot be written, or is full, as long as nobody else writes to it.
             connection.close()
             connection = _opened(f"{address}?immutable=1")
         connection.execute("PRAGMA query_only = ON")

@@ -304,7 +304,7 @@ def test_exchanges_find_an_order_near_the_least(
         args = campaign.experiment, campaign.chosen, campaign.pool.changes
         order = ReadingOrder("least-drift", seed, least_drift(*args, seed))
         sheet = run_sheet(campaign.chosen, campaign.pool.changes, order=order)
-        near = drift_effect(args[0], order.name, sheet, args[2], campaign.drift).of_scale
+        near = drift_effect(args[0], order.name, sheet, args[2], campaign.orders.size).of_scale
         assert least * (1.0 - 1e-6) <= near <= 1.03 * least
 
 
