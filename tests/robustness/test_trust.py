@@ -20,6 +20,7 @@ from ballplate.extensions.studio.jobs import JOBS
 from ballplate.extensions.studio.session import Session
 from ballplate.simulator.inputs.yamltree import parse_tree, to_list, to_python
 
+from tests.extensions.sweeps.odd_stores import signed
 from tests.extensions.sweeps.stores import axis, done, made_up
 
 BASE = to_list(
@@ -279,6 +280,7 @@ def reported(folder: Path, sections: dict[str, Any]) -> None:
     rows = [(1, name, content) for name, content in contents.items()]
     store.connection.executemany("INSERT INTO bundle (sweep, path, content) VALUES (?, ?, ?)", rows)
     store.close()
+    signed(store.path)
     assert main(["sweep", "--report", "own.sqlite", "-o", "own.html"]) == 0
     page = (folder / "own.html").read_text(encoding="utf-8")
     # Readings are for a fit, and nothing of them is read for a drawing.
