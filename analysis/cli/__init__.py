@@ -14,9 +14,11 @@ from typing import TYPE_CHECKING, Any, NoReturn
 
 from ballplate.simulator.inputs.extensions import (
     Command,
+    fault_of,
     module_with,
     names,
     provider,
+    registered,
 )
 from ballplate.simulator.inputs.faces import lazily
 from ballplate.simulator.inputs.unusable import UnusableError
@@ -64,8 +66,6 @@ def commands_of_all() -> tuple[str, ...]:
 
 def _tell_of_extensions() -> None:
     """Say which extensions that are registered are not used."""
-    from ballplate.simulator.inputs.extensions import registered
-
     for complaint in registered().complaints:
         print(f"warning: {complaint}", file=sys.stderr)
 
@@ -229,6 +229,8 @@ def _main(arguments: Sequence[str] | None, interruption: Interruption) -> int:
             interruption.kept = partial(written, files_named(options))
             options.interruption = interruption
             status = _run(options)
+            if registered.cache_info().currsize:
+                _tell_of_extensions()
             sys.stdout.flush()
             return status
         except StandardOutputError as error:
@@ -283,6 +285,9 @@ def _run(options: argparse.Namespace) -> int:
             return BAD_FILE
         if isinstance(error, OSError):
             print(in_one_line(_told(error, options)), file=sys.stderr)
+            return BAD_FILE
+        if (fault := fault_of(error)) is not None:
+            print(in_one_line(fault), file=sys.stderr)
             return BAD_FILE
         raise
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from ..design.lookup import References
-from ..inputs.extensions import is_installed, module_with, owner
+from ..inputs.extensions import is_installed, module_with, owner, registered
 from .structure import KEYS, Sections
 
 
@@ -16,6 +16,8 @@ def resolve_own_sections(sections: Sections, references: References) -> dict[str
     for i, name in enumerate(sections.get("extensions") or ()):
         if not is_installed(name):
             text = f'the extension "{name}", which this file needs, is not installed; install it'
+            # One that is installed and cannot be loaded has no name.
+            text = "; ".join((text, *registered().complaints))
             references.problems.add(("extensions", i), text)
     found = {}
     for steps, settings in sections.values.items():

@@ -282,6 +282,20 @@ def provided(kind: str, name: str, attribute: str) -> Any | None:
     return found
 
 
+def fault_of(error: Exception) -> str | None:
+    """Where code of an extension that is not shipped raised an error, and which; None of others."""
+    packages = {extension.package: extension.name for extension in registered().extensions}
+    fault, trace = None, error.__traceback__
+    while trace is not None:
+        module = f"{trace.tb_frame.f_globals.get('__name__')}."
+        for package, name in packages.items():
+            if module.startswith(f"{package}."):
+                where = f"{trace.tb_frame.f_code.co_filename}:{trace.tb_lineno}"
+                fault = f"{where}: extension {name}: {_in_words(error)}; mend or uninstall it"
+        trace = trace.tb_next
+    return fault
+
+
 def owner(class_: type) -> str | None:
     """The name of the extension that a class is of; None of one of the kernel."""
     module = f"{class_.__module__}."

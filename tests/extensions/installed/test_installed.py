@@ -258,3 +258,44 @@ def test_a_kind_that_cannot_be_used_is_told(module: str, words: str, tmp_path: P
     script = 'print(json.dumps({"c": said("check", folder / "laser.yaml")}))'
     status, _, err = said_with(installed, script, files(work))["c"]
     assert status == 3 and f"extension our_laboratory: {words}" in err, err
+
+
+def test_code_of_an_extension_that_fails_is_named(tmp_path: Path) -> None:
+    """By file and line and its extension, and not as a fault of ballplate."""
+    installed = tmp_path / "installed"
+    installed.mkdir()
+    install(installed)
+    laser = installed / "our_laboratory" / "laser.py"
+    code = laser.read_text(encoding="utf-8")
+    head = "    def rows("
+    assert code.count(head) == 1
+    before, after = code.split(head)
+    body = after.index(":\n", after.index("->")) + 2
+    laser.write_text(f"{before}{head}{after[:body]}        1 / 0\n{after[body:]}", encoding="utf-8")
+    work = tmp_path / "work"
+    work.mkdir()
+    script = 'print(json.dumps({"c": said("check", folder / "laser.yaml")}))'
+    status, _, err = said_with(installed, script, files(work))["c"]
+    line = code[: code.index(head)].count("\n") + after[:body].count("\n") + 1
+    assert status == 3, err
+    assert f"laser.py:{line}: extension our_laboratory: ZeroDivisionError: division by zero" in err
+    assert "internal error" not in err
+
+
+def test_a_package_that_cannot_be_loaded_is_named(tmp_path: Path) -> None:
+    """Where a file needs it, and as a warning where its quantities lack in a table."""
+    installed = tmp_path / "installed"
+    installed.mkdir()
+    install(installed)
+    path = installed / "our_laboratory" / "__init__.py"
+    path.write_text("import nowhere_at_all\n" + path.read_text(encoding="utf-8"), encoding="utf-8")
+    work = tmp_path / "work"
+    work.mkdir()
+    script = """
+from ballplate.designs import shipped
+designs = {"check": folder / "laser.yaml", "run": shipped("quickstart.yaml")}
+print(json.dumps({command: said(command, design) for command, design in designs.items()}))"""
+    found = said_with(installed, script, files(work))
+    words = "is not used: ModuleNotFoundError: No module named 'nowhere_at_all'"
+    assert found["check"][0] == 3 and words in found["check"][2]
+    assert "warning: entry point" in found["run"][2] and words in found["run"][2]
