@@ -336,7 +336,7 @@ def test_an_extension_of_a_laboratory_is_found(
     """Its command, its function, its option of a command, and its line in the help."""
     from ballplate.cli import main
 
-    command = 'Command("counting", "print the number of positions of a design")'
+    command = 'Command("counting", "print the number of positions of a design, 100 % of them")'
     installed(
         f'Extension("counting", "laboratory_package", functions={{"count": "counting"}},'
         f' commands={{"count": {command}, "run --count": {command}}})'
@@ -349,7 +349,9 @@ def test_an_extension_of_a_laboratory_is_found(
     assert "count" in dir(bp)
     with pytest.raises(SystemExit):
         main(["--help"])
-    assert "print the number of positions of a design" in capsys.readouterr().out
+    assert "print the number of positions of a design, 100 % of them" in " ".join(
+        capsys.readouterr().out.split()
+    )
 
 
 @pytest.mark.parametrize(

@@ -151,7 +151,7 @@ def parser(chosen: Sequence[str] | None = None, with_options: bool = True) -> _P
             print(f"{top.prog}: command {name}: {error}", file=sys.stderr)
             continue
         assert listed is not None
-        listing: dict[str, Any] = {} if " " in name else {"help": listed.help}
+        listing: dict[str, Any] = {} if " " in name else {"help": _plain(listed.help)}
         command = commands.add_parser(name, **listing)
         if listing:
             # What is printed for it, of which argparse knows no group.
@@ -166,6 +166,11 @@ def parser(chosen: Sequence[str] | None = None, with_options: bool = True) -> _P
     return top
 
 
+def _plain(text: str) -> str:
+    """A line of help that argparse prints as it is."""
+    return text.replace("%", "%%")
+
+
 def _add_other_commands(command: _Parser, name: str) -> None:
     """List the options that make another command of one."""
     others = [other for other in names("commands") if other.startswith(f"{name} ")]
@@ -173,7 +178,7 @@ def _add_other_commands(command: _Parser, name: str) -> None:
     for other in others:
         if listed := _command(other):
             group.add_argument(
-                other.removeprefix(f"{name} "), action=_InFull, nargs=0, help=listed.help
+                other.removeprefix(f"{name} "), action=_InFull, nargs=0, help=_plain(listed.help)
             )
 
 

@@ -17,6 +17,7 @@ from ..inputs.extensions import names, provided
 from ..inputs.messages import Steps
 from ..inputs.problems import Problems
 from ..inputs.settings import Settings, describe, hint, nearest
+from ..inputs.unusable import UnusableError
 from ..inputs.validation import explain_in, type_adapter
 from ..inputs.wording import LACKING
 from ..inputs.yamltree import Mapping, Node, Scalar, Sequence, to_python
@@ -48,7 +49,7 @@ OTHER_FILES = {
         " experiment"
     ),
     "map": (
-        "this is a map that a fit left behind; use it with ballplate correct, map, curves or diff,"
+        "this is a map that a fit left behind; use it with ballplate correct, map or diff,"
         " or name it as a prior or true machine with kind: map in an experiment"
     ),
 }
@@ -103,6 +104,8 @@ def validate_sections(root: Node, problems: Problems, planning: bool = False) ->
             continue
         settings = None if key in KEYS else provided("sections", key, "SETTINGS")
         if settings is not None:
+            if not (isinstance(settings, type) and issubclass(settings, Settings)):
+                raise UnusableError(f"SETTINGS of the section {key} is no Settings")
             values |= _validate([type_adapter(settings)], node, (key,), problems)
             continue
         text = f"unknown key; {_known_key(key, absent)}"

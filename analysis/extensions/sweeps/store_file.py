@@ -192,8 +192,8 @@ def _prepare(path: Path, connection: sqlite3.Connection) -> None:
         wrong = damage(connection)
         if wrong:
             raise StoreError(
-                f"{path}: is damaged ({wrong}); ballplate export and report give the cells that are"
-                f" whole, and {ANEW}"
+                f"{path}: is damaged ({wrong}); ballplate sweep --export and --report give the"
+                f" whole cells, and {ANEW}"
             )
     connection.execute("PRAGMA journal_mode = WAL")
     # What is written is on disk when the call returns.

@@ -299,3 +299,15 @@ print(json.dumps({command: said(command, design) for command, design in designs.
     words = "is not used: ModuleNotFoundError: No module named 'nowhere_at_all'"
     assert found["check"][0] == 3 and words in found["check"][2]
     assert "warning: entry point" in found["run"][2] and words in found["run"][2]
+
+
+def test_a_key_whose_settings_are_none_is_told(tmp_path: Path) -> None:
+    installed = tmp_path / "installed"
+    installed.mkdir()
+    install(installed)
+    (installed / "our_laboratory" / "climate.py").write_text("SETTINGS = 1\n", encoding="utf-8")
+    work = tmp_path / "work"
+    work.mkdir()
+    script = 'print(json.dumps({"c": said("check", folder / "laser.yaml")}))'
+    status, _, err = said_with(installed, script, files(work))["c"]
+    assert status == 3 and "SETTINGS of the section climate is no Settings" in err, err
