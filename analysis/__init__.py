@@ -162,57 +162,13 @@ __all__ = [
     "write_map",
 ]
 
-# Names of the kernel, by the module that has them.
-_KERNEL = {
-    "ballplate.api": (
-        "check",
-        "compare",
-        "experiment",
-        "fit",
-        "load_map",
-        "plan",
-        "quickstart",
-        "run",
-        "simulate",
-        "write_map",
-    ),
-    "ballplate.arguments": ("load", "load_all"),
-    "ballplate.estimators.estimator_choice": ("ESTIMATORS",),
-    "ballplate.results.groupings": ("GROUPINGS",),
-    "ballplate.planning.criteria": ("Criterion",),
-    "ballplate.presentation.files": ("write_file",),
-    "ballplate.presentation.result": ("Result",),
-    "ballplate.presentation.table": ("Table",),
-    "ballplate.results.fits": ("Fit",),
-    "ballplate.results.prediction": ("Prediction",),
-    "ballplate.uncertainty.kernel_quantities": ("QuantityKind",),
-    "ballplate.uncertainty.quantities": ("QUANTITIES",),
-    "ballplate.simulator.computing.processes": ("in_processes",),
-    "ballplate.simulator.design.arrays": ("Design", "Observations"),
-    "ballplate.simulator.design.influences.protocol": ("Influence",),
-    "ballplate.simulator.estimation.functions": (
-        "BallPlaces",
-        "Coordinates",
-        "Distances",
-        "MeasuredPoints",
-        "Parameters",
-        "linear_functions",
-    ),
-    "ballplate.simulator.estimation.linearisation": (
-        "LinearFunctions",
-        "Linearisation",
-        "linearise",
-    ),
-    "ballplate.simulator.experiment.layout": ("lay_out",),
-    "ballplate.simulator.experiment.model": ("Candidate", "Experiment"),
-    "ballplate.simulator.inputs.extensions": ("Command", "Extension", "MissingExtensionError"),
-    "ballplate.simulator.inputs.messages": ("ExperimentError", "Message"),
-    "ballplate.simulator.inputs.quantities": ("Target", "parse_length"),
-    "ballplate.simulator.inputs.trust": ("Trust",),
-    "ballplate.simulator.machines.protocol": ("ErrorModel",),
-    "ballplate.simulator.maps.fitted_map": ("FittedMap",),
-}
-_PLACES = {name: module for module, names in _KERNEL.items() for name in names}
+
+def _modules() -> dict[str, str]:
+    """Names of the kernel, with the modules that have them."""
+    from ballplate.simulator.inputs.faces import public_names
+
+    modules = public_names(__file__).items()
+    return {name: module for name, module in modules if ".extensions." not in module}
 
 
 def __getattr__(name: str) -> Any:
@@ -222,10 +178,10 @@ def __getattr__(name: str) -> Any:
         return version("ballplate")
     if name.startswith("_"):
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    if name in _PLACES:
+    if (module := _modules().get(name)) is not None:
         from importlib import import_module
 
-        value = getattr(import_module(_PLACES[name]), name)
+        value = getattr(import_module(module), name)
     else:
         from ballplate.simulator.inputs.extensions import (
             MissingExtensionError,
@@ -251,4 +207,4 @@ def __getattr__(name: str) -> Any:
 def __dir__() -> list[str]:
     from ballplate.simulator.inputs.extensions import installed_functions
 
-    return sorted({*_PLACES, *installed_functions(), "__version__"})
+    return sorted({*_modules(), *installed_functions(), "__version__"})

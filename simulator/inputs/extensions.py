@@ -222,23 +222,20 @@ def shipped() -> tuple[Extension, ...]:
     return tuple(import_module(ENTRY_POINT).SHIPPED)
 
 
+def _shipped_and_registered() -> tuple[Extension, ...]:
+    return (*shipped(), *registered().extensions)
+
+
 def names(kind: str, with_registered: bool = False) -> tuple[str, ...]:
     """Names that extensions provide of a kind, in the order of the table."""
-    extensions = (*shipped(), *(registered().extensions if with_registered else ()))
+    extensions = _shipped_and_registered() if with_registered else shipped()
     return tuple(name for one in extensions for name in getattr(one, kind))
 
 
 def installed_functions() -> tuple[str, ...]:
     """Functions of extensions that are there, shipped or installed besides."""
-    there = (*filter(_is_there, shipped()), *registered().extensions)
+    there = (*(one for one in shipped() if one.is_installed), *registered().extensions)
     return tuple(name for one in there for name in one.functions)
-
-
-def _is_there(extension: Extension) -> bool:
-    try:
-        return find_spec(extension.package) is not None
-    except ModuleNotFoundError:
-        return False
 
 
 def provider(kind: str, name: str) -> Extension | None:
@@ -301,15 +298,13 @@ def owner(class_: type) -> str | None:
     module = f"{class_.__module__}."
     if module.startswith("ballplate.") and not module.startswith(f"{ENTRY_POINT}."):
         return None
-    extensions = (*shipped(), *registered().extensions)
+    extensions = _shipped_and_registered()
     return next((one.name for one in extensions if module.startswith(f"{one.package}.")), None)
 
 
 def is_installed(name: str) -> bool:
     """Whether an extension is, by its name."""
-    return any(one.name == name for one in shipped()) or any(
-        one.name == name for one in registered().extensions
-    )
+    return any(one.name == name for one in _shipped_and_registered())
 
 
 def service(name: str) -> Any:
