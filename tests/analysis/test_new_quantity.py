@@ -13,6 +13,7 @@ import yaml
 from ballplate import experiment
 from ballplate.simulator.experiment.layout import lay_out
 
+from tests.analysis import wording
 from tests.reference import dense
 from tests.reference.installed_extension import install, said_with
 from tests.reference.small_quickstart import small_sections
@@ -114,7 +115,7 @@ def test_run_has_it_as_a_dense_computation(both: tuple[dict[str, Any], dict[str,
     assert found["maximum"] == pytest.approx(expected.max(), rel=1e-9)
     assert found["average"] == pytest.approx(expected.mean(), rel=1e-9)
     row = next(line for line in both[0]["table"] if line.startswith("U7"))
-    assert "lengths of the body diagonals" in row and f"{1e6 * expected.max():.4g}" in row
+    assert wording.LENGTHS_OF_THE_BODY_DIAGONALS in row and f"{1e6 * expected.max():.4g}" in row
 
 
 def test_monte_carlo_follows_it(both: tuple[dict[str, Any], dict[str, Any]]) -> None:

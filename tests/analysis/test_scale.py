@@ -32,6 +32,7 @@ from ballplate.uncertainty.scale import (
     with_offsets,
 )
 
+from tests.analysis import wording
 from tests.reference import dense
 from tests.reference.designs import altered, grid, plate_design, six_positions
 
@@ -191,7 +192,7 @@ def test_priors_and_stated_offsets_are_told(tmp_path: Path) -> None:
         stated = stated.replace(line, f"  {name}: {{offset: {offset}, standard_uncertainty: 1 um}}")
     found = check(experiment_of(tmp_path, stated), with_scale=True).scale
     assert found is not None and not found.rests_on_offsets
-    assert [one.words for one in found.carriers] == ["probe offsets with a standard uncertainty"]
+    assert [one.words for one in found.carriers] == [wording.PROBE_OFFSETS_WITH_A_STANDARD]
     prior = (
         stated + "\npriors:\n  - {parameter: EXX t^1, value: 0 um, standard_uncertainty: 0.1 um}\n"
     )
@@ -246,10 +247,7 @@ def test_a_certificate_is_suggested_and_does_what_is_told(
     file = tmp_path / "design.yaml"
     assert main(["check", str(file), "--suggest"]) == 0
     lines = capsys.readouterr().out.splitlines()
-    assert any(
-        line.startswith("warning: the scale rests on probe offsets that are held exact")
-        for line in lines
-    )
+    assert any(line.startswith(wording.THE_SCALE_RESTS_ON_PROBE_OFFSETS) for line in lines)
     (edit,) = [
         line for line in lines if line.startswith("scale, in the file: add to calibration: ")
     ]

@@ -25,6 +25,8 @@ from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.experiment.model import Experiment
 
+from tests.analysis import wording
+
 QUICKSTART = Path("designs/quickstart.yaml").read_text(encoding="utf-8")
 TASKS = """\
     - {name: short, from: [100 mm, 200 mm, 0 mm], to: [600 mm, 200 mm, 50 mm], target_uncertainty: 0.3 um}
@@ -167,7 +169,7 @@ def test_goals_make_check_fail(tmp_path: Path, capsys: pytest.CaptureFixture[str
     assert main(["check", file, "--goal", not_quite, "--format", "junit"]) == 1
     failure = ElementTree.fromstring(capsys.readouterr().out).find(".//failure")
     assert failure is not None and failure.get("type") == "goal"
-    assert failure.get("message", "").startswith("goal not met: average U6")
+    assert failure.get("message", "").startswith(wording.GOAL_NOT_MET)
 
 
 def test_a_share_of_the_lengths_is_enough_where_that_is_asked_for(tmp_path: Path) -> None:
@@ -188,7 +190,7 @@ def test_goals_that_are_none_and_goals_that_cannot_be_judged(
     assert main(["check", file, "--share", "95%"]) == 2
     capsys.readouterr()
     assert main(["check", file, "--goal", "lengths"]) == 1
-    assert "the file states no target_uncertainty" in capsys.readouterr().out
+    assert wording.THE_FILE_STATES_NO_TARGET_UNCERTAINTY in capsys.readouterr().out
 
 
 def test_weak_directions_fail_where_they_shall_not_be(tmp_path: Path) -> None:

@@ -24,6 +24,7 @@ from ballplate.uncertainty.pairs import pairs_of
 from ballplate.uncertainty.summaries import uncertainties
 from ballplate.uncertainty.tasks import task_uncertainties
 
+from tests.analysis import wording
 from tests.analysis.test_invariants import judged, small_design
 from tests.reference.designs import altered
 
@@ -162,7 +163,7 @@ def test_named_distances_need_no_targets_and_are_in_proportion_to_sigma(tmp_path
     given = replace(task_distances(at.design), targets=())
     tile = pairs_of(displacements(at, given.places), given.pairs)
     one, three = (task_uncertainties(given, tile, sigma) for sigma in (1.0, 3.0))
-    assert [task.name for task in one] == ["bore distance", "from side to side", "height"]
+    assert [task.name for task in one] == ["bore distance", wording.FROM_SIDE_TO_SIDE, "height"]
     for first, second in zip(one, three, strict=True):
         assert first.target is None and first.is_within is None
         assert second.standard_uncertainty == pytest.approx(3.0 * first.standard_uncertainty)

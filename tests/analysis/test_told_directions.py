@@ -25,6 +25,8 @@ from ballplate.simulator.estimation.linearisation import Linearisation, linearis
 from ballplate.simulator.experiment.layout import lay_out
 from numpy.typing import NDArray
 
+from tests.analysis import wording
+
 Real = NDArray[np.float64]
 
 # A small plate in a large volume, a bar of unknown length, and a probe of which little is known.
@@ -171,7 +173,7 @@ def test_of_many_parts_the_first_are_told_and_the_others_counted(count: int) -> 
         (str(k), str(k + 1)) for k in range(min(count, 6))
     ]
     assert re.findall(r"and (\d+) more", moved) == [str(count - 6)] * (count > 6)
-    assert words.endswith(": change together without changing any observation")
+    assert words.endswith(wording.CHANGE_TOGETHER_WITHOUT_CHANGING_ANY_OBSERVATION)
 
 
 @pytest.mark.parametrize(

@@ -10,6 +10,8 @@ import pytest
 from ballplate.extensions.repair.proposed_bars import bar_directions
 from ballplate.rank.verdicts import deformation, shape
 
+from tests.analysis import wording
+
 GRID = np.array([[0.1 * x, 0.15 * y, 0.0] for x in range(4) for y in range(3)])
 # Equal moments, so that a shear is half a turn and half a symmetric strain.
 SQUARE = np.array([[0.1 * x, 0.1 * y, 0.0] for x in range(3) for y in range(3)])
@@ -43,13 +45,13 @@ def test_linear_deformations(
 
 def test_bends_and_uneven_distortions() -> None:
     x, y = GRID[:, :1], GRID[:, 1:2]
-    assert deformation(GRID, (x - 0.15) ** 2 * Z) == "bends out of its plane"
+    assert deformation(GRID, (x - 0.15) ** 2 * Z) == wording.BENDS_OUT_OF_ITS_PLANE
     assert deformation(GRID, (x - 0.15) ** 2 * X) == "distorts unevenly"
     # In a plane, and of a body, nothing is out of the plane.
     assert deformation(GRID[:, :2], (x - 0.15) ** 2 * X[:2]) == "distorts unevenly"
     assert deformation(BODY, (BODY[:, :1] - 0.1) ** 2 * Z) == "distorts unevenly"
     twisted = np.outer(x * 0 + 1, X) * (x - 0.15) + 3.0 * (x - 0.15) * (y - 0.15) * Z
-    assert deformation(GRID, twisted) == "stretches along its x, bends out of its plane"
+    assert deformation(GRID, twisted) == wording.STRETCHES_ALONG_ITS_BENDS
 
 
 def of_unit_length(field: np.ndarray) -> np.ndarray:
@@ -87,7 +89,7 @@ def test_equal_stretches_are_those_within_two_hundredths(other: float, words: st
     assert deformation(GRID, GRID * [1.0, other, 0.0]) == words
     assert deformation(GRID[:, :2], GRID[:, :2] * [1.0, other]) == words
     # Of a body whose third axis keeps its length it is no change as a whole.
-    assert deformation(BODY, BODY * [1.0, other, 0.0]).startswith("stretches along its x and ")
+    assert deformation(BODY, BODY * [1.0, other, 0.0]).startswith(wording.STRETCHES_ALONG_ITS)
 
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])

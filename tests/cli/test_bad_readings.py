@@ -11,6 +11,8 @@ import numpy as np
 import pytest
 from ballplate.cli import main
 
+from tests.cli import wording
+
 QUICKSTART = "designs/quickstart.yaml"
 Lines = list[str]
 
@@ -49,8 +51,7 @@ def with_cell(lines: Lines, line: int, column: int, change: Callable[[str], str]
 
 def test_swapped_balls(good: Lines, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert refusals(exchanged(good, 17, 18), tmp_path, capsys) == [
-        "17:1: ball r4c2 in position z low is where ball r4c1 should be; "
-        "swap the names of the balls in lines 17 and 18"
+        wording.BALL_IN_POSITION_LOW_IS_WHERE_BALL
     ]
 
 
@@ -63,11 +64,11 @@ def test_all_mistakes_are_named_at_once(
     lines = with_cell(lines, 130, 4, lambda y: str(float(y) + 10))
     found = refusals(lines, tmp_path, capsys)
     assert [line.split(":")[0] for line in found] == ["5", "20", "60", "90", "130"]
-    assert "swap the names of the balls in lines 5 and 9" in found[0]
-    assert "ball r1c1 in position z low is where ball r4c4 should be; correct its name" in found[1]
-    assert "swap the names of the balls in lines 60 and 71" in found[2]
-    assert "fits the probe left, not right; correct the name of the probe" in found[3]
-    assert "is 10 mm from where it should be" in found[4] and "y +10 mm" in found[4]
+    assert wording.SWAP_THE_NAMES_OF_THE_BALLS_IN_LINES in found[0]
+    assert wording.BALL_IN_POSITION_LOW_IS_WHERE in found[1]
+    assert wording.SWAP_THE_NAMES_OF_THE_BALLS in found[2]
+    assert wording.FITS_THE_PROBE_LEFT in found[3]
+    assert wording.IS_MM_FROM_WHERE_IT_SHOULD in found[4] and "y +10 mm" in found[4]
 
 
 @pytest.mark.parametrize("amount", [5.0, 20.0, 300.0])
@@ -76,7 +77,8 @@ def test_one_wrong_reading(
 ) -> None:
     (line,) = refusals(with_cell(good, 40, 5, lambda z: str(float(z) + amount)), tmp_path, capsys)
     assert (
-        line.startswith("40:1: ball r3c4 in position z high is ") and "correct or remove it" in line
+        line.startswith("40:1: ball r3c4 in position z high is ")
+        and wording.CORRECT_OR_REMOVE in line
     )
 
 
@@ -111,7 +113,7 @@ def test_a_position_read_in_mirrored_order(
         for line in good
     ]
     (line,) = refusals(lines, tmp_path, capsys)
-    assert ": position y low: the readings fit the plate turned over; correct the names" in line
+    assert wording.POSITION_LOW_THE_READINGS_FIT in line
 
 
 def test_readings_that_are_all_the_same(
@@ -135,7 +137,8 @@ def test_names_in_no_order_at_all(
     ]
     (line,) = refusals([*lines, *good[26:]], tmp_path, capsys)
     assert (
-        line.startswith("2:1: position z low: only ") and "correct the names of the balls" in line
+        line.startswith("2:1: position z low: only ")
+        and wording.CORRECT_THE_NAMES_OF_THE_BALLS in line
     )
 
 
@@ -160,17 +163,14 @@ def test_two_readings_that_disagree(tmp_path: Path, capsys: pytest.CaptureFixtur
     (line,) = refusals(
         with_cell(lines, 9, 3, lambda x: str(float(x) + 20)), tmp_path, capsys, str(design)
     )
-    assert line.startswith("9:1: ball 3 in position turned is ")
+    assert line.startswith(wording.BALL_IN_POSITION_TURNED)
     # With a drawing that is as far off nothing tells which of the two is right.
     rough = TWO_POSITIONS.replace("40 mm, 290 mm", "40 mm, 306 mm").replace("20 mm]", "10 mm]")
     design.write_text(rough, encoding="utf-8")
     (line,) = refusals(
         with_cell(lines, 9, 3, lambda x: str(float(x) + 20)), tmp_path, capsys, str(design)
     )
-    assert (
-        line.startswith("4:1: ball 3 in position first is ")
-        and "in position turned, line 9; correct or" in line
-    )
+    assert line.startswith(wording.BALL_IN_POSITION_FIRST) and wording.IN_POSITION_TURNED in line
 
 
 @pytest.mark.parametrize("seed", range(4))
@@ -270,7 +270,4 @@ def test_tables_that_are_none(
 def test_a_line_copied_is_refused(
     good: Lines, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    assert refusals([*good, good[3]], tmp_path, capsys) == [
-        '252:1: ball "r1c3" is repeated in position "z low" with probe "down" (first in line 4); '
-        "remove the line, or state repeats: 2 for that position in the experiment"
-    ]
+    assert refusals([*good, good[3]], tmp_path, capsys) == [wording.BALL_IS_REPEATED_IN_POSITION]

@@ -14,6 +14,8 @@ from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.loading import load
 from scipy.optimize import least_squares
 
+from tests.cli import wording
+
 FOLDER = Path("designs/hurt_foss")
 BARS, GAUGE = str(FOLDER / "bar-bell.yaml"), str(FOLDER / "bryan-gauge.yaml")
 KNOWN = [GAUGE, str(FOLDER / "bryan-gauge-readings.csv"), "--variant", "radius known"]
@@ -29,19 +31,13 @@ def json_of(capsys: pytest.CaptureFixture[str], *arguments: str, status: int = 0
 def test_check_tells_why(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["check", BARS, GAUGE]) == 0
     out = capsys.readouterr().out
-    assert (
-        "reason: every bar lies parallel to the xy plane: nothing determines the scale of Z nor its"
-        " squareness" in out
-    )
-    assert (
-        "reason: no length is known (gauge: radius): the overall scale of the machine is"
-        " undetermined" in out
-    )
-    assert "gauge: radius (0.3 µm): change together without changing any observation" in out
+    assert wording.EVERY_BAR_LIES_PARALLEL_TO_THE_XY in out
+    assert wording.NO_LENGTH_IS_KNOWN in out
+    assert wording.RADIUS_CHANGE_TOGETHER_WITHOUT_CHANGING_ANY in out
     (flat,) = [
         one for one in json_of(capsys, "check", BARS) if one["experiment"] == "bar-bell[flat]"
     ]
-    assert flat["reasons"][0].startswith("every bar lies parallel to the xy plane")
+    assert flat["reasons"][0].startswith(wording.EVERY_BAR_LIES_PARALLEL)
 
 
 def test_the_two_fits_of_bars_are_one(capsys: pytest.CaptureFixture[str]) -> None:
@@ -91,7 +87,7 @@ def test_what_to_do_is_told_with_its_direction(capsys: pytest.CaptureFixture[str
 def test_two_steps_lose_the_squareness_of_z_and_say_so(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["fit", *KNOWN, "--estimator", "sphere-then-metric", "--json"]) == 0
     out, err = capsys.readouterr()
-    assert "warning: the pivot is the centre of a sphere, as if the machine had no errors" in err
+    assert wording.THE_PIVOT_IS_THE_CENTRE in err
     two = json.loads(out)["adjustments"]
     joint = json_of(capsys, "fit", *KNOWN, "--estimator", "length-equations")["adjustments"]
     assert abs(two["angle yz"]["value"]) < 0.4 * abs(joint["angle yz"]["value"])
@@ -210,13 +206,9 @@ def test_estimators_of_distances_refuse_gauges(
 ) -> None:
     assert main(command) == 3
     out, err = capsys.readouterr()
-    assert (
-        not out
-        and "artefacts: estimators of distances alone cannot follow a Bryan gauge's pivot; use --estimator"
-        in err
-    )
+    assert not out and wording.ESTIMATORS_OF_DISTANCES_ALONE_CANNOT_FOLLOW in err
     assert main(["fit", *BAR_READINGS[:3], "length unknown", "--estimator", "distances"]) == 3
-    assert "cannot follow an unknown length (bar: length)" in capsys.readouterr().err
+    assert wording.CANNOT_FOLLOW_AN_UNKNOWN_LENGTH in capsys.readouterr().err
 
 
 def test_compare_tells_what_two_steps_lose(capsys: pytest.CaptureFixture[str]) -> None:
@@ -233,11 +225,11 @@ def test_compare_tells_what_two_steps_lose(capsys: pytest.CaptureFixture[str]) -
         main(["compare", GAUGE, "--variant", "radius unknown", "--estimator", "length-equations"])
         == 3
     )
-    assert "the design leaves errors undetermined" in capsys.readouterr().err
+    assert wording.THE_DESIGN_LEAVES_ERRORS_UNDETERMINED in capsys.readouterr().err
     assert main(["compare", "designs/quickstart.yaml", "--estimator", "length-equations"]) == 3
-    assert "has no ball bar or Bryan gauge" in capsys.readouterr().err
+    assert wording.HAS_NO_BALL_BAR_OR_BRYAN_GAUGE in capsys.readouterr().err
     assert main(["compare", BARS, "--variant", "length known", "--trials", "1"]) == 0
-    assert "estimator distances (12 lengths of standards) against" in capsys.readouterr().out
+    assert wording.ESTIMATOR_DISTANCES_LENGTHS_OF_STANDARDS_AGAINST in capsys.readouterr().out
 
 
 def test_length_equations_refuse_plates_alone_and_planes(
@@ -248,9 +240,9 @@ def test_length_equations_refuse_plates_alone_and_planes(
     assert (
         main(["fit", "designs/quickstart.yaml", readings, "--estimator", "length-equations"]) == 3
     )
-    assert "has no ball bar or Bryan gauge whose lengths are read" in capsys.readouterr().err
+    assert wording.HAS_NO_BALL_BAR_OR_BRYAN in capsys.readouterr().err
     assert main(["fit", *BAR_READINGS, "--estimator", "reversal"]) == 3
-    assert "the reversal needs two dimensions, not three" in capsys.readouterr().err
+    assert wording.THE_REVERSAL_NEEDS_TWO_DIMENSIONS in capsys.readouterr().err
     plane = ["designs/hocken_borchardt/dummy.yaml", "designs/hocken_borchardt/dummy-readings.csv"]
     assert main(["fit", *plane, "--variant", "with scale", "--estimator", "length-equations"]) == 3
     assert "has two dimensions" in capsys.readouterr().err
@@ -268,7 +260,9 @@ def test_length_equations_tell_what_they_pass_over(
     assert main(arguments) == 0
     err = capsys.readouterr().err
     assert (
-        "ignores priors" in err and "whatever the file's error model" in err and "plates" not in err
+        "ignores priors" in err
+        and wording.WHATEVER_THE_FILES_ERROR_MODEL in err
+        and "plates" not in err
     )
 
 
@@ -288,10 +282,7 @@ def test_a_bar_that_is_a_plate_is_no_length_standard(
     )
     err = capsys.readouterr().err
     line = text[: text.index("bar: {kind")].count("\n") + 1
-    assert (
-        f"b.yaml:{line}:" in err
-        and "artefacts.bar: is a plate, but length-equations needs length standards" in err
-    )
+    assert f"b.yaml:{line}:" in err and wording.IS_A_PLATE_BUT_LENGTH_EQUATIONS in err
 
 
 def test_a_wrong_reading_of_a_gauge_stands_first_among_residuals(
@@ -424,59 +415,22 @@ priors:
     told = [line.removeprefix(f"{path}:") for line in capsys.readouterr().err.splitlines()]
     told = [line for line in told if "is never placed" not in line]
     assert [line.split(" (")[0] for line in told] == [
-        '6:37: artefacts.unit.radius: "300" has no unit; write for example "300 mm" or "300 um"',
-        (
-            "6:54: artefacts.unit.directions: needs either azimuths and elevations, or random;"
-            " write {random: 60, lowest: 20 deg}"
-        ),
-        (
-            "7:9: artefacts.role: a Bryan gauge only carries its radius and is no plate; remove its"
-            " role"
-        ),
-        (
-            '8:57: artefacts.both.directions: "azimuths" has no meaning with random directions;'
-            " remove it"
-        ),
+        wording.HAS_NO_UNIT,
+        (wording.NEEDS_EITHER_AZIMUTHS_AND_ELEVATIONS),
+        (wording.A_BRYAN_GAUGE_ONLY_CARRIES),
+        (wording.HAS_NO_MEANING_WITH_RANDOM_DIRECTIONS),
         "9:73: artefacts.one.directions[1]: has 1 entry; 2 are needed",
-        (
-            '10:57: artefacts.same.directions: balls "1" and "2" are at the same place; correct one'
-            " of them"
-        ),
-        (
-            "11:57: artefacts.high.directions: an elevation is outside -90 deg to 90 deg; give one"
-            " of that range"
-        ),
-        "12:57: artefacts.many.directions: 5040 directions are too many; at most 5000 are possible",
-        (
-            "14:57: artefacts.zone.directions: the least elevation must be below the largest;"
-            " exchange or correct them"
-        ),
-        (
-            '18:5: positions[0]: reading ball "2" with probe "magnet" puts the scales at y = 900'
-            " mm, 100 mm above the measuring volume, and 1 more reading; move the artefact, or read"
-            " it otherwise"
-        ),
-        (
-            '21:12: calibration[0].kind: "over" is a Bryan gauge and has a radius only; use kind:'
-            " radius"
-        ),
-        (
-            '22:12: calibration[1].kind: only a Bryan gauge has a radius, and "bar" is not one; use'
-            " kind: distances"
-        ),
-        (
-            "23:71: calibration[2].value: 600 mm is far from the 500 mm of the artefact's drawing;"
-            " correct one of the two"
-        ),
-        (
-            '25:5: calibration[4]: the radius of "over" is already in calibration[3]; remove'
-            " one of the two"
-        ),
+        (wording.BALLS_AND_ARE_AT_THE_SAME),
+        (wording.AN_ELEVATION_IS_OUTSIDE_DEG),
+        wording.DIRECTIONS_ARE_TOO_MANY,
+        (wording.THE_LEAST_ELEVATION_MUST_BE_BELOW),
+        (wording.READING_BALL_WITH_PROBE_PUTS),
+        (wording.IS_A_BRYAN_GAUGE_AND_HAS),
+        (wording.ONLY_A_BRYAN_GAUGE_HAS),
+        (wording.MM_IS_FAR_FROM_THE_MM),
+        (wording.THE_RADIUS_OF_IS_ALREADY),
         '26:5: calibration[5].standard_uncertainty: missing; add "standard_uncertainty"',
-        (
-            '28:17: priors[0].parameter: unknown parameter "a: rotation z"; did you mean "a:'
-            ' origin z"?'
-        ),
+        (wording.UNKNOWN_PARAMETER_DID_YOU_MEAN),
     ]
 
 

@@ -21,6 +21,8 @@ from ballplate.planning.checked_files import CheckedFile, check_files
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.inputs.messages import Message
 
+from tests.cli import wording
+
 QUICKSTART = Path("designs/quickstart.yaml")
 SYMMETRICAL = Path("designs/npl/6.1.1.yaml")
 COMMAND = re.compile(r"::error file=(.*?)(?:,line=(\d+),col=(\d+))?,title=(.*?)::(.*)")
@@ -272,9 +274,7 @@ def test_suggestions_in_every_format(
 
     assert run("check", "--format", "github", "--suggest", *chosen) == 1
     as_expected, *certificate, error = capsys.readouterr().out.splitlines()
-    assert (
-        "warning: the scale rests on probe offsets" in as_expected and "repair" not in as_expected
-    )
+    assert wording.THE_SCALE_RESTS_ON_PROBE_OFFSETS in as_expected and "repair" not in as_expected
     assert [line.split(": ", 3)[3] for line in certificate] == of_scale
     assert "%0Arepair 1: turn position " in error
     assert run("check", "--format", "junit", "--suggest", *chosen) == 1
@@ -361,7 +361,7 @@ def test_the_action_checks(tmp_path: Path) -> None:
     assert found.returncode == 1 and "goal met: average U6 at most 1 µm" in found.stdout
     assert (
         found.stdout.startswith("::error file=designs/one.yaml")
-        and "goal not met: average U6" in found.stdout
+        and wording.GOAL_NOT_MET in found.stdout
     )
     (tmp_path / "designs/one.yaml").write_text("title: nothing else\n", encoding="utf-8")
     found = shell(check["run"], tmp_path, FILES="designs/o*.yaml\ndesigns/more/of them.yaml\n")

@@ -17,6 +17,8 @@ from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.machines.truth import true_parameters
 
+from tests.cli import wording
+
 QUICKSTART = "designs/quickstart.yaml"
 SYMBOLS = ("U1", "U2", "U3", "U4", "U5", "U6")
 
@@ -41,8 +43,8 @@ def test_check_not_as_expected(capsys: pytest.CaptureFixture[str], tmp_path: Pat
     (tmp_path / "plate.yaml").write_text(text, encoding="utf-8")
     assert run("check", tmp_path / "plate.yaml", "--variant", "B") == 1
     out, _ = capsys.readouterr()
-    assert "rank deficiency 2, expected full rank" in out
-    assert "undetermined 2: " in out and "EXX (positioning error of X, quadratic)" in out
+    assert wording.RANK_DEFICIENCY_EXPECTED_FULL_RANK in out
+    assert "undetermined 2: " in out and wording.EXX_POSITIONING_ERROR in out
 
 
 def test_check_json_of_several(capsys: pytest.CaptureFixture[str]) -> None:
@@ -165,8 +167,8 @@ def test_fit_names_missing_and_unplanned_readings(
     capsys.readouterr()
     assert run("fit", QUICKSTART, readings) == 0
     _, err = capsys.readouterr()
-    assert "planned but not read (1): z low: ball r1c1 with down" in err
-    assert "read but not planned (1): z low: ball r1c2 with right" in err
+    assert wording.PLANNED_BUT_NOT_READ_LOW in err
+    assert wording.READ_BUT_NOT_PLANNED_LOW in err
 
 
 def test_fit_of_wrong_readings(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
@@ -179,8 +181,8 @@ def test_fit_of_wrong_readings(capsys: pytest.CaptureFixture[str], tmp_path: Pat
     out, err = capsys.readouterr()
     assert out == ""
     assert f'{readings}:3:22: "x" is not a number' in err
-    assert 'unknown position "z lo"; did you mean "z low"?' in err
-    assert 'unknown ball "r9c9"' in err and 'unknown probe "downn"; did you mean "down"?' in err
+    assert wording.UNKNOWN_POSITION_DID_YOU_MEAN in err
+    assert 'unknown ball "r9c9"' in err and wording.UNKNOWN_PROBE_DID_YOU_MEAN in err
 
 
 def test_fit_needs_every_ball(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
@@ -189,7 +191,7 @@ def test_fit_needs_every_ball(capsys: pytest.CaptureFixture[str], tmp_path: Path
         "position,ball,probe,x_mm,y_mm,z_mm\nz low,r1c1,down,1,2,3\n", encoding="utf-8"
     )
     assert run("fit", QUICKSTART, readings) == 3
-    assert 'no reading of the balls "r1c2", "r1c3"' in capsys.readouterr().err
+    assert wording.NO_READING_OF_THE_BALLS in capsys.readouterr().err
 
 
 def quickstart_readings(folder: Path, *options: str) -> tuple[Path, list[str]]:
@@ -204,7 +206,7 @@ def test_fit_of_readings_in_another_unit(
     readings, lines = quickstart_readings(tmp_path)
     readings.write_text("\n".join([lines[0].replace("_mm", "_m"), *lines[1:]]), encoding="utf-8")
     assert run("fit", QUICKSTART, readings) == 3
-    assert "far outside the volume; check the unit" in capsys.readouterr().err
+    assert wording.FAR_OUTSIDE_THE_VOLUME in capsys.readouterr().err
 
 
 def test_a_wrong_reading_is_warned_of_and_named(
@@ -242,7 +244,7 @@ def test_nothing_is_made_of_a_failed_estimate(
     out, err = capsys.readouterr()
     found = json.loads(out)
     assert found["status"] == "diverged" and found["quantities"] == {} and found["estimates"] == {}
-    assert "the estimate has diverged; no results are reported" in err
+    assert wording.THE_ESTIMATE_HAS_DIVERGED in err
     assert run("fit", QUICKSTART, readings) == 1
     assert "U1" not in capsys.readouterr().out
 
@@ -280,7 +282,7 @@ def test_a_full_disk_is_told() -> None:
         )
     assert found.returncode == 3
     assert (
-        found.stderr.startswith("standard output: cannot be written")
+        found.stderr.startswith(wording.STANDARD_OUTPUT_CANNOT_BE_WRITTEN)
         and "Traceback" not in found.stderr
     )
 
@@ -300,8 +302,8 @@ def test_bad_files_give_messages_and_nothing_else(
         assert run(command, broken, tmp_path / "missing.yaml") == 3
         out, err = capsys.readouterr()
         assert out == ""
-        assert 'machine.repeatability: "0.2" has no unit; ' in err
-        assert 'did you mean "down"?' in err and 'did you mean "position"?' in err
+        assert wording.HAS_NO_UNIT_2 in err
+        assert wording.DID_YOU_MEAN_2 in err and wording.DID_YOU_MEAN in err
         assert "missing.yaml" in err and "Traceback" not in err
         lines = err.splitlines()
         # One each, and one for each position whose probe is mistyped.
@@ -323,15 +325,15 @@ def test_true_machine_that_the_model_cannot_be(
     assert run("check", broken) == 3
     lines = capsys.readouterr().err.splitlines()
     assert len(lines) == 2
-    assert "true_machine.values[EXX t^9]: the error model has no parameter" in lines[0]
-    assert "an angle is expected" in lines[1]
+    assert wording.TRUE_MACHINE_VALUES_EXX_THE_ERROR in lines[0]
+    assert wording.AN_ANGLE_IS_EXPECTED in lines[1]
 
 
 def test_a_file_with_variants_needs_a_choice_to_fit(
     capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:
     assert run("simulate", "designs/npl/6.1.1.yaml", "-o", tmp_path / "r.csv") == 3
-    assert "choose one with --variant: A, B, C, D" in capsys.readouterr().err
+    assert wording.CHOOSE_ONE_WITH_VARIANT in capsys.readouterr().err
     assert run("check", "designs/npl/6.1.1.yaml", "--variant", "E") == 3
     assert 'no variant "E"' in capsys.readouterr().err
 
@@ -375,7 +377,7 @@ def test_init_writes_a_machine(capsys: pytest.CaptureFixture[str], tmp_path: Pat
     )
     assert run("map", path) == 3
     (message,) = capsys.readouterr().err.strip().split("\n")
-    assert "only the arm of MH1, MH2 droops" in message
+    assert wording.ONLY_THE_ARM_OF_DROOPS in message
     path.write_text(path.read_text(encoding="utf-8").replace("droop: {", "# {"), encoding="utf-8")
     assert run("map", path) == 0
     assert "table of 3 points at y = 300 mm, z = 400 mm, minimum zone" in capsys.readouterr().out

@@ -12,6 +12,8 @@ import pytest
 from ballplate.cli import main
 from scipy.stats import t
 
+from tests.cli import wording
+
 FOLDER = Path("designs/hurt_foss")
 STATED = {"bar-bell": "length: 500 mm", "bryan-gauge": "radius: 300 mm"}
 TOLD = {
@@ -90,7 +92,7 @@ def test_one_wrong_reading_is_no_wrong_length(
     out, err = capsys.readouterr()
     assert (
         "along x" in out.split("largest residuals")[1].splitlines()[1]
-        and "of the stated ones" not in err
+        and wording.OF_THE_STATED_ONES not in err
     )
 
 
@@ -102,9 +104,7 @@ def test_few_degrees_of_freedom_are_told_and_widen(
     arguments += ["--variant", "length known", "--estimator", estimator, "--json"]
     assert main(arguments) == 0
     out, err = capsys.readouterr()
-    assert (
-        "from 6 degrees of freedom is itself uncertain by 29 %; " in err and "--sigma given" in err
-    )
+    assert wording.FROM_DEGREES_OF_FREEDOM_IS_ITSELF in err and "--sigma given" in err
     for one in json.loads(out)["adjustments"].values():
         assert one["expanded_uncertainty"] == pytest.approx(
             t.ppf(0.975, 6) * one["standard_uncertainty"]

@@ -22,6 +22,7 @@ from ballplate.extensions.sweeps import execute
 from ballplate.simulator.computing import processes
 from ballplate.simulator.computing.processes import in_processes
 
+from tests.cli import wording
 from tests.extensions.sweeps.support import ROOT, hearing_interruptions, small_sweep, stored
 
 
@@ -55,12 +56,10 @@ def test_one_that_was_swallowed_ends_a_sweep(
     monkeypatch.setattr(execute, "add_rows", interrupted_once)
     assert main(["sweep", str(path), "--workers", "1"]) == 130
     out, err = capsys.readouterr()
-    assert (
-        out == "" and err.startswith("interrupted; finished cells are in") and err.count("\n") == 1
-    )
+    assert out == "" and err.startswith(wording.INTERRUPTED_FINISHED_CELLS) and err.count("\n") == 1
     assert stored(store) == 2
     assert main(["sweep", str(path), "--workers", "1"]) == 1
-    assert "6 cells, 4 done, 2 failed (2 of them before)" in capsys.readouterr().out
+    assert wording.CELLS_DONE_FAILED_OF_THEM_BEFORE in capsys.readouterr().out
 
 
 def test_one_that_was_swallowed_ends_monte_carlo(
@@ -77,9 +76,7 @@ def test_one_that_was_swallowed_ends_monte_carlo(
     monkeypatch.setattr(trials, "accuracy_of", interrupted)
     quickstart = str(ROOT / "designs" / "quickstart.yaml")
     assert main(["run", quickstart, "--trials", "1000000", "--workers", "1"]) == 130
-    assert (
-        "interrupted: the figures are those of the data sets done so far" in capsys.readouterr().err
-    )
+    assert wording.THE_FIGURES_ARE_THOSE in capsys.readouterr().err
 
 
 def test_they_are_remembered() -> None:

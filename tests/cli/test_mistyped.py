@@ -10,6 +10,8 @@ import ballplate as bp
 import pytest
 from ballplate.cli import main, parser
 
+from tests.cli import wording
+
 
 def commands() -> dict[str, argparse.ArgumentParser]:
     (found,) = (
@@ -83,9 +85,7 @@ def test_every_option_mistyped(capsys: pytest.CaptureFixture[str]) -> None:
 
 
 def test_a_value_with_an_option_that_is_unknown(capsys: pytest.CaptureFixture[str]) -> None:
-    assert complaint(capsys, "run", "x.yaml", "--trails=5").endswith(
-        '--trails=5; did you mean "--trials"?'
-    )
+    assert complaint(capsys, "run", "x.yaml", "--trails=5").endswith(wording.DID_YOU_MEAN_3)
     assert complaint(capsys, "run", "x.yaml", "--zzzzzzz").endswith(
         "unrecognized arguments: --zzzzzzz"
     )
@@ -93,7 +93,7 @@ def test_a_value_with_an_option_that_is_unknown(capsys: pytest.CaptureFixture[st
 
 def test_a_mistyped_choice(capsys: pytest.CaptureFixture[str]) -> None:
     told = complaint(capsys, "check", "x.yaml", "--format", "juint")
-    assert told.endswith("argument --format: invalid choice: 'juint'; did you mean \"junit\"?")
+    assert told.endswith(wording.ARGUMENT_FORMAT_INVALID_CHOICE)
 
 
 def test_files_in_each_others_place_are_told(

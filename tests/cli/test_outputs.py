@@ -28,6 +28,7 @@ import pytest
 from ballplate.cli import _module_of, main, outputs, parser
 from ballplate.cli.outputs import OutputAction, text_writer, write_outputs
 
+from tests.cli import wording
 from tests.cli.cuts import remains
 from tests.extensions.repair.test_check_fix import SHIFTED as OPEN
 from tests.extensions.sweeps.stores import axis, done, made_up
@@ -762,7 +763,7 @@ def test_what_was_there_is_whole_when_writing_fails(
         out, err = capsys.readouterr()
         told = [one for one in err.splitlines() if "cannot be written" in one]
         if status == 3:
-            assert len(told) == 1 and told[0].endswith("the file there is as it was")
+            assert len(told) == 1 and told[0].endswith(wording.THE_FILE_THERE)
             assert any(told[0].startswith(f"{path}: ") for path in written.values())
             # What was computed is told nevertheless.
             assert bool(out) == walk.prints
@@ -1021,7 +1022,7 @@ def test_standard_output_by_its_name(files: Path) -> None:
     found = subprocess.run(command, stdout=subprocess.PIPE, encoding="utf-8")
     assert found.returncode in (0, 1)
     assert found.stdout.startswith("x_mm,y_mm,")
-    assert "design: a plate in two positions" in found.stdout.splitlines()
+    assert wording.A_PLATE_IN_TWO in found.stdout.splitlines()
 
 
 def test_an_open_file_is_an_input_too(files: Path, capsys: pytest.CaptureFixture[str]) -> None:

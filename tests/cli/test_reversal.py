@@ -12,6 +12,8 @@ import pytest
 from ballplate.cli import main
 from ballplate.estimators.reversal_fits import _mean_readings
 
+from tests.cli import wording
+
 FOLDER = Path("designs/hocken_borchardt")
 ANGLES = str(FOLDER / "angles.yaml")
 DUMMY = [str(FOLDER / "dummy.yaml"), str(FOLDER / "dummy-readings.csv"), "--variant", "with scale"]
@@ -35,10 +37,10 @@ def test_tables(capsys: pytest.CaptureFixture[str]) -> None:
     assert err == ""
     assert ["alpha", "4.8079", "0.0255", "4.8062", "0.0252", "µrad"] in lines
     assert ["2", "318.1723719", "0", "318.1723704", "0", "0.0103", "0"] in lines
-    assert '"turned" is turned by 89.992480 degrees, clockwise, from "first"' in out
-    assert "(origin: ball 1, x axis through ball 2)" in out
+    assert wording.IS_TURNED_BY_DEGREES in out
+    assert wording.ORIGIN_BALL_AXIS_THROUGH_BALL in out
     out, err = told(capsys, "fit", *DUMMY, *REVERSAL, "--no-offsets", "--scale", "none")
-    assert "three parameters, no offsets, scale difference: none (fitted, but not applied)" in out
+    assert wording.THREE_PARAMETERS_NO_OFFSETS in out
     assert "offset x" not in out and "fit without --no-offsets" in err
 
 
@@ -213,8 +215,8 @@ def test_rank_at_any_angles(capsys: pytest.CaptureFixture[str]) -> None:
     }
     for name in ("half a turn", "shifted only"):
         words = " ".join(found[f"angles[{name}]"]["undetermined"])
-        assert "alpha (departure of the axes from squareness)" in words
-        assert "gamma (difference of the scales of x and y)" in words
+        assert wording.ALPHA_DEPARTURE_OF_THE_AXES in words
+        assert wording.GAMMA_DIFFERENCE_OF_THE_SCALES in words
         assert found[f"angles[{name}]"]["quantities"]["U3"]["undetermined"] == 2
     quarter, small = (
         found[f"angles[{name}]"]["quantities"]["U3 angles"]["maximum"]
@@ -250,7 +252,7 @@ def test_balls_read_in_one_position_are_left_out(tmp_path: Path) -> None:
     np.testing.assert_allclose([e.value for e in one.estimates], values, rtol=1e-6, atol=1e-12)
     np.testing.assert_allclose([e.standard_uncertainty for e in one.estimates], u, rtol=1e-6)
     assert np.isnan(one.coordinates).any(axis=1).sum() == 2
-    assert "leaves out what is not read in both positions: r2c2, r3c1" in one.cautions[0]
+    assert wording.LEAVES_OUT_WHAT_IS_NOT_READ in one.cautions[0]
 
 
 def test_the_reversals_uncertainties_are_those_of_multiple_redundancy() -> None:
@@ -296,10 +298,7 @@ def test_no_reversal(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None
         status=3,
     )
     assert out == ""
-    assert (
-        'a turn of 180 degrees lies between "straight" and "turned by 180"; turn the plate by'
-        " about 90" in err
-    )
+    assert wording.A_TURN_OF_DEGREES_LIES_BETWEEN in err
     path.write_text(
         "title: t\n"
         "machine: {volume: [1 m, 1 m, 1 m], repeatability: 0.2 um}\n"
@@ -318,9 +317,9 @@ def test_no_reversal(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None
     assert out == "" and [
         line.removeprefix(f"{path}:").split(", not")[0] for line in err.splitlines()
     ] == [
-        ('3:21: error_model.kind: the reversal needs a machine of kind "metric" in two dimensions'),
-        "5:1: artefacts: the reversal takes one artefact",
-        "8:1: positions: the reversal takes two positions, a quarter turn apart",
+        wording.THE_REVERSAL_NEEDS_A_MACHINE,
+        wording.THE_REVERSAL_TAKES_ONE_ARTEFACT,
+        wording.THE_REVERSAL_TAKES_TWO_POSITIONS,
     ]
 
 
@@ -358,10 +357,7 @@ def test_several_probes_and_priors(tmp_path: Path, capsys: pytest.CaptureFixture
     )
     assert data(capsys, "fit", str(path), str(readings), *REVERSAL)["scale"] == "x"
     _, err = told(capsys, "fit", str(path), str(readings), *REVERSAL, "--scale", "none", status=3)
-    assert (
-        "priors: priors refer to the file's error model; write scale: none there instead of"
-        " --scale" in err
-    )
+    assert wording.PRIORS_REFER_TO_THE_FILES_ERROR in err
 
 
 def test_options_of_the_reversal_alone(capsys: pytest.CaptureFixture[str]) -> None:
@@ -372,10 +368,7 @@ def test_options_of_the_reversal_alone(capsys: pytest.CaptureFixture[str]) -> No
             in err
         )
     _, err = told(capsys, "fit", *DUMMY, *REVERSAL, "--monomials", status=2)
-    assert (
-        "--monomials goes with --estimator full, distances, cresto or kruth only; leave it out"
-        in err
-    )
+    assert wording.MONOMIALS_GOES_WITH_ESTIMATOR_FULL in err
     for option in (["--scale", "x"], ["--no-offsets"]):
         _, err = told(capsys, "fit", *DUMMY, *option, status=2)
         assert f"{option[0]} goes with --estimator reversal only; leave it out" in err

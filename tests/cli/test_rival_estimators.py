@@ -26,6 +26,8 @@ from ballplate.simulator.machines.protocol import Integers
 from ballplate.simulator.machines.truth import true_machine
 from ballplate.uncertainty.summaries import uncertainties
 
+from tests.cli import wording
+
 QUICKSTART = "designs/quickstart.yaml"
 COMPARED = ["compare", "designs/npl/6.2.7.yaml", "--variant", "5 x 5", "--trials", "4"]
 
@@ -60,7 +62,9 @@ def test_fit(estimator: str, capsys: pytest.CaptureFixture[str], tmp_path: Path)
     )
     out = capsys.readouterr().out
     assert (
-        "300 pairs of balls" in out and "EXX t^4" in out and max(map(len, out.splitlines())) <= 180
+        wording.PAIRS_OF_BALLS_2 in out
+        and "EXX t^4" in out
+        and max(map(len, out.splitlines())) <= 180
     )
 
 
@@ -68,12 +72,12 @@ def test_compare(capsys: pytest.CaptureFixture[str]) -> None:
     assert main([*COMPARED, "--published-rms", "0.34713 um"]) == 0
     out, err = capsys.readouterr()
     assert (
-        "62 pairs of balls" in out
+        wording.PAIRS_OF_BALLS in out
         and "root mean square" in out
         and "published" in out
         and "0.3471" in out
     )
-    assert err == "" or "data sets of 6.2.7[5 x 5]" in err
+    assert err == "" or wording.DATA_SETS_OF in err
     assert main([*COMPARED, "--json", "--published-maximum", "1.3355 um"]) == 0
     found = json.loads(capsys.readouterr().out)
     assert (
@@ -108,7 +112,7 @@ def test_wrong_usage(capsys: pytest.CaptureFixture[str]) -> None:
         "braced",
     ]
     assert main(square) == 3
-    assert '"braced" is not defined for this artefact' in capsys.readouterr().err
+    assert wording.IS_NOT_DEFINED_FOR_THIS_ARTEFACT in capsys.readouterr().err
 
 
 def test_repeats_of_a_length_standard_are_not_mistaken_for_other_readings(
@@ -246,7 +250,7 @@ def test_errors_against_the_true_machine_are_those_of_the_distances(
         np.testing.assert_allclose([one.scatter, one.chance], [scatter, scatter / 2.0])
         np.testing.assert_allclose(one.rms, np.sqrt((errors**2).mean()))
     assert result.to_dict()["against_truth"]["full"]["rms"] == result.of_truth["full"].rms
-    assert "distances against the true machine's" in "\n".join(result.lines())
+    assert wording.DISTANCES_AGAINST_THE_TRUE_MACHINES in "\n".join(result.lines())
 
 
 def test_where_distances_are_undetermined_there_is_no_truth_to_miss() -> None:

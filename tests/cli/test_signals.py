@@ -16,6 +16,7 @@ from pathlib import Path
 
 import pytest
 
+from tests.cli import wording
 from tests.extensions.sweeps.support import (
     ROOT,
     command,
@@ -221,9 +222,9 @@ def interrupted(
         there = {name for name in OUTPUTS if (folder / name).exists()}
         _, _, told = last.partition("written: ")
         assert there == set(told.split(", ")) - {""}, err
-        assert there or "no file was written" in last or "are lost" in last, err
+        assert there or wording.NO_FILE_WAS_WRITTEN in last or "are lost" in last, err
     elif (folder / "new.sqlite").exists() and stored(folder / "new.sqlite"):
-        assert "finished cells are in new.sqlite" in last
+        assert wording.FINISHED_CELLS_ARE_IN_NEW_SQLITE in last
     return True
 
 

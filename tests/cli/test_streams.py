@@ -14,6 +14,7 @@ from pathlib import Path
 import pytest
 from ballplate.cli import main, schema
 
+from tests.cli import wording
 from tests.extensions.sweeps.support import ROOT, small_sweep
 
 COMMAND = f'"{sys.executable}" -m ballplate'
@@ -46,7 +47,7 @@ def test_a_store_is_not_blamed_for_standard_output(tmp_path: Path) -> None:
     found = found_by(["bash", "-c", f'{COMMAND} sweep "{file}" --workers 1 >/dev/full'], tmp_path)
     assert found.returncode == 3
     told = [line for line in found.stderr.splitlines() if "cannot be written" in line]
-    assert told == ["standard output: cannot be written (No space left on device); give it room"]
+    assert told == [wording.STANDARD_OUTPUT_CANNOT_BE_WRITTEN_NO_SPACE]
     connection = sqlite3.connect(tmp_path / "small.sqlite")
     assert connection.execute("SELECT count(*) FROM result").fetchone()[0] >= 2
     connection.close()
@@ -81,10 +82,7 @@ def test_a_current_folder_that_has_been_deleted_is_told(
     monkeypatch.chdir(gone)
     gone.rmdir()
     assert main(["init", "new.yaml"]) == 3
-    assert capsys.readouterr().err.splitlines() == [
-        "new.yaml: cannot be written (No such file or directory); check the folder,"
-        " its permissions and its room, and whether another program has the file open"
-    ]
+    assert capsys.readouterr().err.splitlines() == [wording.CANNOT_BE_WRITTEN]
     monkeypatch.setattr(schema, "run", lambda _: Path.cwd())
     assert main(["schema"]) == 3
     told = "ballplate schema: the current folder no longer exists; change to another\n"

@@ -18,6 +18,7 @@ from ballplate.cli import main
 from ballplate.cli.progress_bars import progress
 from ballplate.simulator.computing.steps import ProgressStep
 
+from tests.cli import wording
 from tests.extensions.sweeps.support import hearing_interruptions
 
 QUICKSTART = "designs/quickstart.yaml"
@@ -30,8 +31,8 @@ def run(*arguments: str | Path) -> int:
 def test_trials_stand_beside_the_tables(capsys: pytest.CaptureFixture[str]) -> None:
     assert run("run", QUICKSTART, "--trials", "100", "--workers", "1") == 0
     out, err = capsys.readouterr()
-    assert "U6  distances between corrected points" in out
-    assert "Monte Carlo: 100 data sets of the true machine, seed 1" in out
+    assert wording.DISTANCES_BETWEEN_CORRECTED_POINTS in out
+    assert wording.MONTE_CARLO_DATA_SETS_OF_THE_TRUE in out
     assert "S^2 is" in out and "Too optimistic" not in out
     assert err == ""
 
@@ -65,7 +66,7 @@ def test_a_run_until_it_is_accurate(capsys: pytest.CaptureFixture[str]) -> None:
 
 def test_of_a_deficient_design_there_are_figures_too(capsys: pytest.CaptureFixture[str]) -> None:
     assert run("run", "designs/npl/6.1.1.yaml", "--variant", "B", "--trials", "10") == 0
-    assert "Monte Carlo: 10 data sets of the true machine" in capsys.readouterr().out
+    assert wording.MONTE_CARLO_DATA_SETS in capsys.readouterr().out
 
 
 def with_wild_machine(path: Path, errors: str) -> int:
@@ -154,10 +155,7 @@ def test_an_interruption_reports_what_is_done(workers: str) -> None:
     assert process.returncode == 130
     found = json.loads(out)["monte_carlo"]
     assert found["interrupted"] and found["trials"] >= 512
-    assert (
-        "interrupted: the figures are those of the data sets done so far" in err
-        and "Traceback" not in err
-    )
+    assert wording.THE_FIGURES_ARE_THOSE in err and "Traceback" not in err
 
 
 class Terminal:
@@ -220,7 +218,7 @@ def test_each_step_has_a_bar_of_its_own(monkeypatch: pytest.MonkeyPatch) -> None
         shown.show(ProgressStep("starts of the search", 0, 25))
         assert threading.active_count() == threads
     told = [line.strip() for line in terminal.lines if line.strip()]
-    assert "0/3 candidates" in told[0] and "0/25 starts of the search" in told[-1]
+    assert "0/3 candidates" in told[0] and wording.STARTS_OF_THE_SEARCH in told[-1]
 
 
 def test_lines_without_a_terminal_come_now_and_then(

@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 from ballplate.cli import main
 
+from tests.cli import wording
 from tests.cli.test_check_formats import described, shell
 
 QUICKSTART = Path(__file__).parents[2] / "designs" / "quickstart.yaml"
@@ -55,7 +56,7 @@ def test_modules_are_refused_before_they_are_run(
     assert main(["check", "--no-modules", str(path)]) == 3
     told = capsys.readouterr().err
     assert told.startswith(f"{path}:")
-    assert "modules are not allowed here; leave --no-modules out" in told
+    assert wording.MODULES_ARE_NOT_ALLOWED_HERE_LEAVE in told
     assert not Path("intruder").exists()
 
 
@@ -75,7 +76,7 @@ def test_the_hook_and_the_action_refuse_modules(tmp_path: Path) -> None:
     action = described("action.yml")
     run = action["runs"]["steps"][-1]["run"]
     found = shell(run, tmp_path, FILES="*.yaml", MODULES=action["inputs"]["modules"]["default"])
-    assert found.returncode == 3 and "modules are not allowed here" in found.stdout
+    assert found.returncode == 3 and wording.MODULES_ARE_NOT_ALLOWED_HERE in found.stdout
     assert not (tmp_path / "intruder").exists()
     assert shell(run, tmp_path, FILES="*.yaml", MODULES="true").returncode == 3
     assert (tmp_path / "intruder").exists()

@@ -15,6 +15,7 @@ from ballplate.results.prediction import Prediction
 from ballplate.simulator.experiment.machine_file import load_machine
 from ballplate.simulator.machines.description import true_volumetric
 
+from tests.estimation import wording
 from tests.reference.model_options import (
     Column,
     Found,
@@ -421,7 +422,7 @@ def test_a_level_is_for_planes(tmp_path: Path) -> None:
     truth = {"kind": "machine", "file": "machine.yaml", "level": "100 mm"}
     given = spatial({"kind": "kinematic"}) | {"true_machine": truth}
     given["machine"] = {"volume": ["1 m", "0.9 m", "1.1 m"], "repeatability": "0.5 um"}
-    with pytest.raises(bp.ExperimentError, match="level: is for two dimensions; remove it"):
+    with pytest.raises(bp.ExperimentError, match=wording.IS_FOR_TWO_DIMENSIONS):
         bp.experiment(given, folder=tmp_path)
 
 

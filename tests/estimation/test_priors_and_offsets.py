@@ -27,6 +27,8 @@ from ballplate.simulator.readings.generate import exact_readings, noisy_certific
 from ballplate.simulator.readings.reading_files import read_readings, write_readings
 from scipy.spatial.transform import Rotation
 
+from tests.estimation import wording
+
 TEXT = Path("designs/quickstart.yaml").read_text(encoding="utf-8")
 PRIORS = """\
 priors:
@@ -244,7 +246,7 @@ def test_messages(written: Callable[[str], Path], prior: str, message: str) -> N
 
 def test_a_held_pose_has_no_prior(written: Callable[[str], Path]) -> None:
     text = TEXT + "priors:\n  - {parameter: 'z low: origin x', standard_uncertainty: 1 um}\n"
-    with pytest.raises(ExperimentError, match=r'"z low: origin x" is held, to fix the frame'):
+    with pytest.raises(ExperimentError, match=wording.IS_HELD_TO_FIX_THE_FRAME):
         lay_out(load(written(text))[0])
 
 

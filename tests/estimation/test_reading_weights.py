@@ -18,6 +18,8 @@ from ballplate.simulator.inputs.messages import ExperimentError
 from ballplate.simulator.readings.generate import exact_readings, noisy_readings
 from ballplate.simulator.readings.reading_files import read_readings, write_readings
 
+from tests.estimation import wording
+
 TEXT = Path("designs/quickstart.yaml").read_text(encoding="utf-8")
 SYMBOLS = ("U1", "U2", "U3", "U4", "U5", "U6")
 CALIBRATION = "standard_uncertainty: 0.2 um   #"
@@ -117,9 +119,7 @@ def test_a_column_of_the_csv(tmp_path: Path) -> None:
     unharmed = fit(experiment, read_readings(with_column(values), design), "given")
     np.testing.assert_allclose(unharmed.solution.state.a, plain.solution.state.a, rtol=0, atol=2e-6)
     values[30] = "0"
-    with pytest.raises(
-        ExperimentError, match=r"r.csv:32:1: a standard uncertainty must be above zero"
-    ):
+    with pytest.raises(ExperimentError, match=wording.A_STANDARD_UNCERTAINTY_MUST_BE_ABOVE):
         read_readings(with_column(values), design)
 
 

@@ -13,6 +13,8 @@ import yaml
 from ballplate.simulator.inputs.messages import ExperimentError
 from numpy.typing import NDArray
 
+from tests.experiment import wording
+
 QUICKSTART = Path("designs/quickstart.yaml")
 CORNERS = ["r1c1", "r1c5", "r5c1", "r5c5"]
 NINE = [f"r{i}c{j}" for i in (1, 3, 5) for j in (1, 3, 5)]
@@ -61,7 +63,7 @@ def test_no_distances_of_a_plate_are_refused_however_it_is_bent(
     wrong = distances(NINE, places(NINE) + off)
     wrong["r1c1", "r5c5"] += 5e-9
     (told,) = complaints(tmp_path, item(wrong))
-    assert "contradict one another: r1c1–r5c5" in told
+    assert wording.CONTRADICT_ONE_ANOTHER in told
 
 
 def square_of_volume(at: dict[tuple[str, str], float]) -> float:
@@ -98,14 +100,14 @@ def test_three_distances_in_a_line_are_refused_where_no_triangle_has_them(
     assert (not told) == is_possible
     if not is_possible:
         # A third each, at the least sum of squares; the distance elsewhere is not blamed.
-        assert "r1c1–r1c5 750.0001 mm in calibration[1]" in told[0] and "0.0333 µm" in told[0]
+        assert wording.MM_IN in told[0] and "0.0333 µm" in told[0]
         assert "r5c1" not in told[0]
 
 
 def test_one_distance_in_two_items_is_refused_where_they_differ(tmp_path: Path) -> None:
     first, second = {("r1c1", "r1c3"): 0.375}, {("r1c3", "r1c1"): 0.375001}
     (told,) = complaints(tmp_path, item(first), item(second))
-    assert "r1c1–r1c3 375 mm in calibration[0], r1c3–r1c1 375.001 mm in calibration[1]" in told
+    assert wording.MM_IN_MM in told
     assert not complaints(tmp_path, item(first), item(second, "0.001 um"))
     assert not complaints(tmp_path, item(first), item({("r1c3", "r1c1"): 0.375}))
 

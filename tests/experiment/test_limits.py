@@ -22,6 +22,8 @@ from ballplate.simulator.inputs.messages import MOST_MESSAGES, ExperimentError
 from ballplate.simulator.inputs.yamltree import parse_tree, read_text
 from ballplate.simulator.readings.generate import true_artefacts
 
+from tests.experiment import wording
+
 GOOD = """\
 title: good
 machine: {volume: [1 m, 1 m, 1 m], repeatability: 0.2 um}
@@ -150,9 +152,7 @@ def test_gauges_of_too_many_lengths(tmp_path: Path, count: int, repeats: int) ->
         "name: low,", "name: low, artefact: plate,"
     )
     text = text.replace("distances, pairs", "distances, artefact: plate, pairs")
-    assert refusals(tmp_path, text) == [
-        "8:1: positions: Bryan gauges are read 25000 times; at most 20000 lengths are possible"
-    ]
+    assert refusals(tmp_path, text) == [wording.BRYAN_GAUGES_ARE_READ_TIMES]
 
 
 def with_standard(balls: str) -> str:
@@ -170,10 +170,7 @@ def with_standard(balls: str) -> str:
 
 
 def test_a_length_standard_of_too_many_lengths(tmp_path: Path) -> None:
-    assert refusals(tmp_path, with_standard("[20, 20]")) == [
-        '12:45: calibration[0].pairs: 79800 distances of "bar", read 1 times, are too many; at most'
-        " 20000 lengths are possible"
-    ]
+    assert refusals(tmp_path, with_standard("[20, 20]")) == [wording.DISTANCES_OF_READ_TIMES]
 
 
 def test_a_length_standard_of_too_many_lengths_between_the_same_balls(
@@ -181,10 +178,7 @@ def test_a_length_standard_of_too_many_lengths_between_the_same_balls(
 ) -> None:
     """Three thousand are possible; as many between balls of their own are no difficulty."""
     text = with_standard("[10, 8]")
-    assert refusals(tmp_path, text) == [
-        '12:45: calibration[0].pairs: 3160 distances of "bar" have balls in common; at most 3000'
-        " such are possible: calibrate fewer of them"
-    ]
+    assert refusals(tmp_path, text) == [wording.DISTANCES_OF_HAVE_BALLS_IN_COMMON]
     (tmp_path / "e.yaml").write_text(text.replace("[10, 8]", "[11, 7]"))
     assert len(load(tmp_path / "e.yaml")[0].calibration[0].values) == 2926
     monkeypatch.setattr("ballplate.simulator.experiment.checks.MOST_JOINT_LENGTHS", 2)
@@ -194,7 +188,7 @@ def test_a_length_standard_of_too_many_lengths_between_the_same_balls(
     )
     assert len(load(tmp_path / "e.yaml")[0].calibration[0].values) == 3
     joint = text.replace("pairs: all", "pairs: [[r1c1, r1c2], [r1c2, r2c2], [r3c1, r3c2]]")
-    assert "have balls in common; at most 2 such" in refusals(tmp_path, joint)[0]
+    assert wording.HAVE_BALLS_IN_COMMON in refusals(tmp_path, joint)[0]
 
 
 def test_more_points_than_there_is_memory_for_with_so_many_errors(tmp_path: Path) -> None:
@@ -218,16 +212,14 @@ def test_more_points_than_there_is_memory_for_with_so_many_errors(tmp_path: Path
 @pytest.mark.parametrize("size", ["1e7 m", "1e300 m", "1e-19 m", "1e-300 um"])
 def test_lengths_that_nothing_has(tmp_path: Path, size: str) -> None:
     (line,) = refusals(tmp_path, replaced("0.2 um}\nerror", f"{size}}}\nerror"))
-    assert line.endswith(
-        "is beyond what can be computed with; write 0, or a length of 1e-18 m to 1e+06 m"
-    )
+    assert line.endswith(wording.IS_BEYOND_WHAT_CAN_BE_COMPUTED)
 
 
 def test_the_slope_of_an_uncertainty_that_nothing_has(tmp_path: Path) -> None:
     (line,) = refusals(tmp_path, f"{GOOD}target_uncertainty: 0.2 um + L/1e-3\n")
-    assert '"0.2 um + L/1e-3" grows by 1000 m per metre of length' in line
+    assert wording.GROWS_BY_PER_METRE_OF_LENGTH in line
     (line,) = refusals(tmp_path, f"{GOOD}target_uncertainty: 0.2 um + L/1e19\n")
-    assert line.endswith("grows too slowly; leave out what it grows by, or give 1e-18 m/m or more")
+    assert line.endswith(wording.GROWS_TOO_SLOWLY)
 
 
 def test_no_more_than_a_thousand_errors(tmp_path: Path) -> None:
@@ -235,9 +227,7 @@ def test_no_more_than_a_thousand_errors(tmp_path: Path) -> None:
     assert len(lines) <= 2 * MOST_MESSAGES
     balls = f"corner: {{x: 0 mm, y: 0 mm}}, balls: [{', '.join(f'b{k}' for k in range(60_000))}]}}"
     lines = refusals(tmp_path, replaced("corner: {x: 0 mm, y: 0 mm}}", balls))
-    assert len(lines) == MOST_MESSAGES + 1 and lines[-1].endswith(
-        ": more than 1000 errors; mend these first"
-    )
+    assert len(lines) == MOST_MESSAGES + 1 and lines[-1].endswith(wording.MORE_THAN_ERRORS_MEND)
     lines = refusals(tmp_path, "a: [" + "~, " * 60_000 + "]")
     assert len(lines) == MOST_MESSAGES + 1
     lines = refusals(tmp_path, "a: [" + "*a, " * 60_000 + "]")
@@ -249,9 +239,7 @@ def test_a_table_of_no_more_than_a_thousand_errors(tmp_path: Path) -> None:
     text = replaced(
         "{kind: grid, balls: [3, 3], size: [500 mm, 500 mm]}", "{kind: balls, file: balls.csv}"
     )
-    assert refusals(tmp_path, text)[-1].endswith(
-        "balls.csv:502:1: more than 1000 errors; mend these first"
-    )
+    assert refusals(tmp_path, text)[-1].endswith(wording.MORE_THAN_ERRORS)
 
 
 def test_tables_of_many_columns(tmp_path: Path) -> None:
@@ -289,7 +277,7 @@ def test_aliases_count_for_depth() -> None:
     lines = ["a0: &a0 [1]"] + [f"a{k + 1}: &a{k + 1} {'[' * 40}*a{k}{']' * 40}" for k in range(40)]
     with pytest.raises(ExperimentError) as caught:
         parse_tree("\n".join(lines), "f")
-    assert str(caught.value) == "f:3:49: nested more than 50 deep by this alias; write less of it"
+    assert str(caught.value) == wording.NESTED_MORE_THAN_DEEP
 
 
 def _device(path: Path) -> None:

@@ -9,6 +9,8 @@ from ballplate.simulator.inputs.messages import ExperimentError, Message
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+from tests.experiment import wording
+
 GOOD = """\
 title: good
 machine:
@@ -399,29 +401,20 @@ def test_tables_are_reported_at_their_own_lines(tmp_path: Path) -> None:
     (tmp_path / "d.csv").write_text("ball_1,ball_2,distance_mm\nr1c1,r1c3,five\nr1c1,r9c9,-1\n")
     text = GOOD.replace(SIDES, f"{SIDES}, values: d.csv").replace("title: good", "title: 1")
     assert refusals(tmp_path, text) == [
-        (
-            "e.yaml:1:8: title: expected a text, found the number 1; put it in quotes (one-line"
-            " description of the experiment)"
-        ),
-        'd.csv:2:11: "five" is not a number; write for example "500.0003"',
+        (wording.EXPECTED_A_TEXT_FOUND_THE_NUMBER),
+        wording.IS_NOT_A,
     ]
     (tmp_path / "d.csv").write_text(
         "ball_1,ball_2,distance_mm\nr1c1,r1c3,500\nr1c1,r9c9,-1\nr1c3,r1c1,5\n"
     )
     assert refusals(tmp_path, text)[1:] == [
-        "d.csv:3:1: calibration[0].values: a distance must be above zero; correct it",
+        wording.A_DISTANCE_MUST_BE_ABOVE,
         (
             'd.csv:3:1: calibration[0].values: unknown ball "r9c9"; known: r1c1, r1c2, r1c3, r2c1,'
             " r2c2, r2c3, r3c1, r3c2 and 1 more"
         ),
-        (
-            "d.csv:4:1: calibration[0].values: 5 mm is far from the 500 mm of the artefact's"
-            " drawing; correct one of the two"
-        ),
-        (
-            'd.csv:4:1: calibration[0].values: the distance of "r1c3" and "r1c1" is given twice;'
-            " remove one of the two"
-        ),
+        (wording.MM_IS_FAR_FROM_THE_MM),
+        (wording.THE_DISTANCE_OF_AND_IS_GIVEN),
     ]
 
 
@@ -432,24 +425,20 @@ def test_a_certificate_lacks_balls(tmp_path: Path) -> None:
         "kind: coordinates, artefact: plate, balls: corners, standard_uncertainty: 1 um, values:"
         " c.csv"
     )
-    assert refusals(tmp_path, GOOD.replace(old, new)) == [
-        "e.yaml:14:94: calibration[0].values: no co-ordinates for r3c1, r3c3; add them, or leave"
-        " them out of balls"
-    ]
+    assert refusals(tmp_path, GOOD.replace(old, new)) == [wording.NO_CO_ORDINATES_FOR_ADD_THEM]
 
 
 def test_points_of_a_table_outside_the_volume(tmp_path: Path) -> None:
     (tmp_path / "p.csv").write_text("x_mm,y_mm,z_mm\n1,1,1\n1,-1,1\n1,1,2000\n")
     assert refusals(tmp_path, GOOD.replace("[[0 mm, 0 mm, 0 mm]]", "{file: p.csv}")) == [
-        "p.csv:3:1: evaluation.points.file: y = -1 mm is 1 mm below the measuring volume, "
-        "as 1 further points are; move the point inside"
+        wording.MM_IS_MM_BELOW_THE_MEASURING
     ]
 
 
 @pytest.mark.parametrize("text", ["5", "- a\n- b\n", "text"])
 def test_files_that_are_no_mapping(tmp_path: Path, text: str) -> None:
     (line,) = refusals(tmp_path, text)
-    assert line.startswith("e.yaml:1:1: expected a mapping that begins with title: …, found ")
+    assert line.startswith(wording.EXPECTED_A_MAPPING_THAT_BEGINS)
 
 
 def test_messages_are_data() -> None:

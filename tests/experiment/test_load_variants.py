@@ -7,6 +7,8 @@ from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.inputs.messages import ExperimentError
 
+from tests.experiment import wording
+
 BASE = """\
 title: base
 machine: {volume: [1 m, 1 m, 1 m], repeatability: 1 um}
@@ -45,12 +47,8 @@ variants:
 """
     )
     lines = refusals(tmp_path, text)
-    assert lines[0].startswith(
-        "e.yaml:12:5: variants.A[positions[0].level]: is part of the same place as"
-    )
-    assert lines[1].startswith(
-        "e.yaml:15:5: variants.B[positions[0].level]: is part of the same place as"
-    )
+    assert lines[0].startswith(wording.IS_PART_OF_THE_SAME_2)
+    assert lines[1].startswith(wording.IS_PART_OF_THE_SAME_PLACE)
 
 
 @pytest.mark.parametrize("value", ["true", '"7"', "7.0", "1e0"])
@@ -104,22 +102,15 @@ def test_the_base_need_not_be_complete(tmp_path: Path) -> None:
 def test_messages_stand_at_the_line_of_the_variant(tmp_path: Path) -> None:
     text = BASE + "variants:\n  A: {}\n  B:\n    positions[low].level: 5\n    seed: x\n"
     assert refusals(tmp_path, text) == [
-        (
-            'e.yaml:12:27: positions[0].level: "5" has no unit; write for example "5 mm" or "5 um"'
-            " (in variant B)"
-        ),
-        (
-            'e.yaml:13:11: seed: expected a whole number, found the text "x" (seed of simulated '
-            "readings; default 1) "
-            "(in variant B)"
-        ),
+        (wording.HAS_NO_UNIT),
+        (wording.EXPECTED_A_WHOLE),
     ]
 
 
 def test_a_message_about_the_base_comes_once(tmp_path: Path) -> None:
     text = BASE.replace("1 um", "1 mu") + "variants: {A: {}, B: {}}\n"
     (line,) = refusals(tmp_path, text)
-    assert line.startswith('e.yaml:2:51: machine.repeatability: "1 mu" has the unknown unit "mu"')
+    assert line.startswith(wording.HAS_THE_UNKNOWN_UNIT)
     assert "variant" not in line
 
 
@@ -147,9 +138,5 @@ def test_paths_that_lead_nowhere(tmp_path: Path, path: str, text: str) -> None:
 
 
 def test_variants_that_are_none(tmp_path: Path) -> None:
-    assert refusals(tmp_path, BASE + "variants: 5\n") == [
-        "e.yaml:9:11: variants: expected a mapping, name: {path: new value}, found the number 5"
-    ]
-    assert refusals(tmp_path, BASE + "variants: {A: 5}\n") == [
-        "e.yaml:9:15: variants.A: expected a mapping, path: new value, found the number 5"
-    ]
+    assert refusals(tmp_path, BASE + "variants: 5\n") == [wording.EXPECTED_A_MAPPING_NAME]
+    assert refusals(tmp_path, BASE + "variants: {A: 5}\n") == [wording.EXPECTED_A_MAPPING]

@@ -21,6 +21,8 @@ from ballplate.simulator.machines.description import (
     random_part,
 )
 
+from tests.experiment import wording
+
 MACHINE = """\
 title: moving horizontal arm
 arrangement: MH2
@@ -386,16 +388,16 @@ def test_reversed_ends_are_told_with_everything_else(tmp_path: Path) -> None:
 def test_a_table_that_is_too_long(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("ballplate.simulator.experiment.curve_files.MOST_POINTS", 2)
     (line,) = told(written(tmp_path))
-    assert line.startswith("eyx.csv:5:1: 3 points are too many; at most 2 are possible")
+    assert line.startswith(wording.POINTS_ARE_TOO_MANY)
 
 
 def test_a_table_from_zero_on_an_axis_that_begins_elsewhere(tmp_path: Path) -> None:
     lines = told(written(tmp_path, table="position_mm,EYX_um\n0,0\n50,1\n1900,0\n"))
     assert [line.partition(",")[0] for line in lines] == [
-        "eyx.csv:2:1: the table begins at 0 mm",
-        "eyx.csv:4:1: the table ends at 1900 mm",
+        wording.THE_TABLE_BEGINS_AT_MM,
+        wording.THE_TABLE_ENDS_AT_MM,
     ]
-    assert all("take 100 mm from every position" in line for line in lines)
+    assert all(wording.TAKE_MM_FROM_EVERY_POSITION in line for line in lines)
 
 
 EXPERIMENT = """\
@@ -497,6 +499,6 @@ def test_a_machine_that_states_nothing_to_be_estimated(tmp_path: Path) -> None:
     )
     with pytest.raises(
         ExperimentError,
-        match=r"e.yaml:3:36: error_model.file: m.yaml states no error that could be",
+        match=wording.YAML_STATES_NO_ERROR_THAT_COULD,
     ):
         load(experiment(tmp_path))

@@ -20,6 +20,8 @@ from ballplate.simulator.inputs.quantities import length_text, parse_length
 from hypothesis import given
 from hypothesis import strategies as st
 
+from tests.experiment import wording
+
 FOLDER = Path("designs/planning")
 
 GOOD = """\
@@ -202,11 +204,7 @@ def test_two_dimensions(tmp_path: Path) -> None:
         and experiment.pool.candidates[0].plane == ""
     )
     (line,) = messages(tmp_path, PLANE)
-    assert (
-        line
-        == "1:1: positions: missing; add positions, or choose some from the pool with: ballplate"
-        " plan FILE"
-    )
+    assert line == wording.MISSING_ADD_POSITIONS
 
 
 @pytest.mark.parametrize("name", ["plate-pool", "campaign"])
@@ -319,7 +317,7 @@ def test_a_group_keeps_what_every_probe_can_read_from_inside_the_volume(tmp_path
                 try:
                     load(path)
                 except ExperimentError as error:
-                    assert "puts the scales at" in str(error)
+                    assert wording.PUTS_THE_SCALES in str(error)
                 else:
                     expected.add((plane, length_text(level), tuple(probes), str(corner)))
     drawn_already = ("z", "0 mm", ("down",), str({"x": "0 mm", "y": "0 mm"}))
@@ -364,13 +362,9 @@ def test_without_planning_what_only_the_pool_places_is_left_out(tmp_path: Path) 
 def test_candidates_may_read_what_no_position_reads(tmp_path: Path) -> None:
     text = replaced("y: 0 mm}, probes: [down]}", "y: 0 mm}, probes: [down], balls: [r1c1]}")
     assert experiment_of(tmp_path, text).pool is not None
-    assert messages(tmp_path, text)[0].startswith(
-        "6:3: artefacts.plate: no position reads balls r1c2"
-    )
+    assert messages(tmp_path, text)[0].startswith(wording.NO_POSITION_READS_BALLS)
     text = replaced(SOME_PROBES, f"{SOME_PROBES}\n      balls: [r1c1, r2c2]", text)
-    assert messages(tmp_path, text, planning=True)[0].startswith(
-        "6:3: artefacts.plate: no position reads balls r1c2"
-    )
+    assert messages(tmp_path, text, planning=True)[0].startswith(wording.NO_POSITION_READS_BALLS)
 
 
 def test_priors_may_be_about_candidates(tmp_path: Path) -> None:
@@ -488,21 +482,17 @@ def test_mistakes(old: str, new: str, lines: list[str], tmp_path: Path) -> None:
 def test_a_pool_that_is_empty(tmp_path: Path) -> None:
     text = replaced("x: [250 mm, 400 mm], y: 500 mm", "x: [250 mm, 0 mm], y: 0 mm", PLANE)
     (line,) = messages(tmp_path, replaced(", [r1c2]", "", text), planning=True)
-    assert (
-        line == "6:3: pool.candidates: no candidate is left: 8 outside the volume; widen the pool"
-    )
+    assert line == wording.NO_CANDIDATE_IS_LEFT
     text = PLANE[: PLANE.index("  candidates:")] + "  times: {set_up: 1 min}\n"
     (line,) = messages(tmp_path, text, planning=True)
-    assert line == "5:1: pool.candidates: there is no candidate; add some, or positions"
+    assert line == wording.THERE_IS_NO_CANDIDATE
 
 
 def test_readings_of_a_pool_are_bounded(tmp_path: Path) -> None:
     text = replaced("balls: [3, 3]", "balls: [200, 200]")
     text = replaced("levels: [0 mm, 600 mm]", "levels: {from: 0 mm, to: 0.9 m, count: 40}", text)
     (line,) = messages(tmp_path, text)
-    assert line.startswith(
-        "16:7: pool.candidates[0]: there are 6440000 readings up to here, repeats counted; at most"
-    )
+    assert line.startswith(wording.THERE_ARE_READINGS_UP_TO_HERE)
 
 
 def test_a_group_without_probes_is_told_what_is_missing(tmp_path: Path) -> None:

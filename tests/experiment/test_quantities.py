@@ -31,6 +31,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pydantic import TypeAdapter
 
+from tests.experiment import wording
+
 
 @pytest.mark.parametrize(
     ("text", "metres"),
@@ -71,9 +73,7 @@ def test_any_length_is_rounded_once(number: object, unit: str) -> None:
         return
     metres = Fraction(str(number)) * LENGTH_UNITS[unit]
     if metres and not SMALLEST <= abs(metres) <= LARGEST:
-        with pytest.raises(
-            QuantityError, match="beyond what can be computed with; write 0, or a length of"
-        ):
+        with pytest.raises(QuantityError, match=wording.BEYOND_WHAT_CAN_BE_COMPUTED):
             parse_length(f"{number} {unit}")
         return
     assert parse_length(f"{number} {unit}") == float(metres)
@@ -123,7 +123,7 @@ def test_the_forms_of_a_growing_length_are_the_same(
     by_hand = 1e-9 * nanometres + 1e-3 / divisor * length
     constant = f"{nanometres / 1000}"
     if divisor <= 10:
-        with pytest.raises(QuantityError, match="per metre of length; give less than 100 um/m"):
+        with pytest.raises(QuantityError, match=wording.PER_METRE_OF_LENGTH):
             parse_length_function(f"({constant} + L/{divisor}) um with L in mm")
         return
     slope = repr(1e3 / divisor)
@@ -242,7 +242,7 @@ def test_messages_of_length_functions(value: object, message: str) -> None:
 
 
 def test_ratio_needs_a_unit() -> None:
-    with pytest.raises(QuantityError, match='"5e-6" has no unit; write for example "5e-6 ppm"'):
+    with pytest.raises(QuantityError, match=wording.HAS_NO_UNIT_WRITE):
         parse_ratio("5e-6")
 
 

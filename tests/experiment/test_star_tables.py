@@ -14,6 +14,8 @@ from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.experiment.star_tables import doubt_of_table
 from scipy.spatial.transform import Rotation
 
+from tests.experiment import wording
+
 NAMES = ("down", "right", "left", "back", "front")
 TIPS = np.array(
     [[0.0, 0.0, -0.05], [0.05, 0.0, 0.0], [-0.05, 0.0, 0.0], [0.0, 0.05, 0.0], [0.0, -0.05, 0.0]]
@@ -67,9 +69,9 @@ def test_a_tip_that_is_longer_is_named_with_what_another_library_finds() -> None
     turn, _ = Rotation.align_vectors(TIPS, table)
     worst = np.linalg.norm(TIPS - turn.apply(table), axis=1).max()
     found = doubted(table)
-    assert f"up to {1e3 * worst:.1f} mm" in found and 'most of all "down";' in found
+    assert f"up to {1e3 * worst:.1f} mm" in found and wording.MOST_OF_ALL in found
     moved = doubted(table, place=False)
-    assert 'most of all "down";' in moved
+    assert wording.MOST_OF_ALL in moved
 
 
 def test_offsets_that_are_wrong_by_millimetres_are_usual() -> None:

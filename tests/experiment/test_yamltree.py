@@ -16,6 +16,8 @@ from ballplate.simulator.inputs.yamltree import (
 from hypothesis import given
 from hypothesis import strategies as st
 
+from tests.experiment import wording
+
 
 def refusals(text: str) -> list[str]:
     with pytest.raises(ExperimentError) as caught:
@@ -188,9 +190,7 @@ def test_alias_bomb() -> None:
     lines = ["a0: &a0 [x, x, x, x, x, x, x, x, x, x]"]
     lines += [f"a{i + 1}: &a{i + 1} [{', '.join([f'*a{i}'] * 10)}]" for i in range(40)]
     (refusal,) = refusals("\n".join(lines))
-    assert refusal.endswith(
-        "more than 500000 values, aliases counted in full; put long lists in a CSV file"
-    )
+    assert refusal.endswith(wording.MORE_THAN_VALUES)
 
 
 def test_files_that_cannot_be_read(tmp_path: Path) -> None:

@@ -8,6 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pydantic import TypeAdapter
 
+from tests.geometry import wording
+
 adapter: TypeAdapter[AnyArtefactSettings] = TypeAdapter(AnyArtefactSettings)
 
 
@@ -80,11 +82,9 @@ def test_listed_balls() -> None:
 
 def test_sets_that_are_not_defined() -> None:
     balls = layout(kind="balls", coordinates=(("0 mm", "0 mm"), ("1 mm", "0 mm")))
-    with pytest.raises(
-        ValueError, match='"neighbours" is not defined .* choose from: all, or list pairs'
-    ):
+    with pytest.raises(ValueError, match=wording.IS_NOT_DEFINED_CHOOSE):
         pairs(balls, "neighbours")
-    with pytest.raises(ValueError, match='"corners" is not defined .* list the balls'):
+    with pytest.raises(ValueError, match=wording.IS_NOT_DEFINED_LIST_THE_BALLS):
         corners(balls)
 
 

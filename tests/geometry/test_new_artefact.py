@@ -15,6 +15,7 @@ from ballplate import experiment
 from ballplate.simulator.experiment.layout import lay_out
 from scipy.optimize import least_squares
 
+from tests.geometry import wording
 from tests.reference import dense
 from tests.reference.installed_extension import install, said_with
 
@@ -158,7 +159,7 @@ def test_a_fit_minimises_the_sum_of_squares(told: dict[str, Any], problem: dense
 def test_estimators_of_distances_take_its_pairs(told: dict[str, Any]) -> None:
     assert told["pairs"]["pairs"] == told["by command"]["pairs"] == len(DIAMETERS)
     known = "choose from: neighbours, diameters, all"
-    assert 'artefacts.plate: "corners" is not defined' in told["wrong pairs"]
+    assert wording.IS_NOT_DEFINED_2 in told["wrong pairs"]
     assert known in told["wrong pairs"]
 
 
@@ -170,12 +171,9 @@ def test_messages_and_the_schema_know_it(told: dict[str, Any]) -> None:
     # The description of the key is the kernel's; a wrong kind is answered with all kinds.
     assert "bryan_gauge" in told["missing"]
     # With seven balls there are no diameters.
-    assert 'calibration[0].pairs: "diameters" is not defined' in told["wrong set"]
+    assert wording.IS_NOT_DEFINED in told["wrong set"]
     assert "choose from: neighbours, all" in told["wrong set"]
 
 
 def test_a_layout_that_contradicts_itself_is_refused_by_its_kind(told: dict[str, Any]) -> None:
-    assert (
-        'artefacts.plate: kind "twins" has a wrong layout: several balls are named a;'
-        in told["twins"]
-    )
+    assert wording.KIND_HAS_A_WRONG in told["twins"]

@@ -18,6 +18,8 @@ from ballplate.simulator.geometry.positions import (
 from hypothesis import given
 from hypothesis import strategies as st
 
+from tests.geometry import wording
+
 PLATE = GridSettings.model_validate(
     {"kind": "grid", "balls": (3, 2), "size": ("600 mm", "200 mm")}
 ).layout()
@@ -62,7 +64,7 @@ def test_two_dimensions() -> None:
     np.testing.assert_allclose(ball_coordinates(pose, PLATE)[0], [0.7, 0.4])
     free = nominal_pose(FreePlacement((0.5, 0.0), (math.pi / 2,)), PLATE, 2)
     np.testing.assert_allclose(ball_coordinates(free, PLATE)[-1], [0.3, 0.6])
-    with pytest.raises(ValueError, match="no plane but z"):
+    with pytest.raises(ValueError, match=wording.NO_PLANE_BUT):
         nominal_pose(PlanePlacement("x", 0.0, "corner", (0.1, 0.2)), PLATE, 2)
 
 

@@ -29,6 +29,8 @@ from ballplate.simulator.geometry.motions import (
 from ballplate.simulator.geometry.rotations import rotation_matrix
 from scipy.spatial.transform import Rotation
 
+from tests.geometry import wording
+
 
 def grid(*counts: int) -> np.ndarray:
     return np.array([*product(*map(range, counts))], float)
@@ -109,9 +111,9 @@ def test_axes_of_a_plate_without_settings(
 
 def test_a_datum_names_as_many_balls_as_there_are_dimensions() -> None:
     layout = BallLayout(("a", "b", "c", "d"), in_space(grid(2, 2)))
-    with pytest.raises(ValueError, match="name 3 different balls, .* one in the xy plane, or all"):
+    with pytest.raises(ValueError, match=wording.NAME_DIFFERENT_BALLS_ONE):
         chosen_datum(layout, 3, ("a", "b"))
-    with pytest.raises(ValueError, match="name 2 different balls, .*, one on an axis, or all"):
+    with pytest.raises(ValueError, match=wording.NAME_DIFFERENT_BALLS):
         chosen_datum(layout, 2, ("a", "b", "c"))
 
 
@@ -210,7 +212,7 @@ def test_a_thousandth_of_how_far_it_is_along_keeps_a_ball_from_being_in_line(
     plane = chosen_datum(layout, 3, ()).plane
     if off < 1e-3:
         assert plane is None
-        with pytest.raises(ValueError, match="a, b, c are in line; name three balls"):
+        with pytest.raises(ValueError, match=wording.A_ARE_IN):
             chosen_datum(layout, 3, ("a", "b", "c"))
     else:
         assert plane is not None and chosen_datum(layout, 3, ("a", "b", "c")).plane == 2
@@ -218,15 +220,15 @@ def test_a_thousandth_of_how_far_it_is_along_keeps_a_ball_from_being_in_line(
 
 def test_what_defines_no_datum_is_told() -> None:
     column = BallLayout(("a", "b"), np.array([[0.0, 0, 0], [0, 0, 1]]))
-    with pytest.raises(ValueError, match="its balls are drawn above one another"):
+    with pytest.raises(ValueError, match=wording.ITS_BALLS_ARE_DRAWN_ABOVE_ONE):
         chosen_datum(column, 3, (), PlateAxes(0, 0, 0))
-    with pytest.raises(ValueError, match="a and b are drawn above one another; name others"):
+    with pytest.raises(ValueError, match=wording.A_AND_ARE_DRAWN_ABOVE_ONE):
         chosen_datum(column, 2, ("a", "b"))
     with pytest.raises(ValueError, match='no ball "z"'):
         chosen_datum(column, 2, ("a", "z"))
     with pytest.raises(ValueError, match="name 2 different balls"):
         chosen_datum(column, 2, ("a", "a"))
-    with pytest.raises(ValueError, match="a single ball has no axes"):
+    with pytest.raises(ValueError, match=wording.A_SINGLE_BALL_HAS):
         chosen_datum(BallLayout(("a",), np.zeros((1, 3))), 3, ())
 
 

@@ -9,6 +9,8 @@ from ballplate.simulator.inputs.quantities import parse_angle
 from hypothesis import given
 from hypothesis import strategies as st
 
+from tests.geometry import wording
+
 angles = st.floats(-10.0, 10.0)
 
 
@@ -44,5 +46,5 @@ def test_a_tiny_angle_is_not_rounded_away() -> None:
 
 
 def test_two_angles_are_no_rotation() -> None:
-    with pytest.raises(ValueError, match="one angle or three, not 2"):
+    with pytest.raises(ValueError, match=wording.ONE_ANGLE_OR_THREE):
         rotation_matrix([0.0, 0.0])

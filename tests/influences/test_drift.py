@@ -22,6 +22,7 @@ from ballplate.simulator.readings.reading_files import read_readings, write_read
 from ballplate.simulator.readings.simulated import simulated_readings
 from ballplate.uncertainty.quantities import QUANTITIES
 
+from tests.influences import wording
 from tests.influences.campaigns import (
     Real,
     dense_spread,
@@ -89,9 +90,9 @@ def test_the_parameters_are_those_stated(tmp_path: Path) -> None:
         ("drift along x", "m/h", 1e-6, 5e-7),
         ("drift along y", "m/h", 0.0, 0.0),
         ("drift along z", "m/h", pytest.approx(-1.8e-7), np.inf),
-        ("drift of scale x", "1/h", 0.0, np.inf),
-        ("drift of scale y", "1/h", 2e-7, np.inf),
-        ("drift of scale z", "1/h", 0.0, 1e-6),
+        (wording.DRIFT_OF_SCALE_3, "1/h", 0.0, np.inf),
+        (wording.DRIFT_OF_SCALE_2, "1/h", 2e-7, np.inf),
+        (wording.DRIFT_OF_SCALE, "1/h", 0.0, 1e-6),
     ]
     assert len(design.influence_parameters) == 5
 
@@ -182,7 +183,7 @@ def test_the_verdict_tells_what_cannot_be_told_apart(
     told = "; ".join(map(str, found.null))
     for axis in "xyz":
         assert (f"drift along {axis}" in told) == (deficiency > 0)
-    assert ("drift of the scales" in told) == (deficiency > 3)
+    assert (wording.DRIFT_OF_THE_SCALES in told) == (deficiency > 3)
 
 
 def test_one_plate_in_one_position_does_not_tell_its_drift(tmp_path: Path) -> None:
@@ -247,7 +248,7 @@ def test_ball_centres_are_found_where_readings_drift(drawn: Experiment, tmp_path
     centres = simulated.x + simulated.design.probes.offsets[simulated.readings.probe]
     with (tmp_path / "centres.csv").open("w", encoding="utf-8", newline="") as stream:
         write_readings(stream, simulated.design, simulated.readings, centres)
-    with pytest.raises(ExperimentError, match="as ball centres, but only to 50 mm"):
+    with pytest.raises(ExperimentError, match=wording.AS_BALL_CENTRES):
         read_readings(tmp_path / "centres.csv", lay_out(drawn))
 
 

@@ -9,6 +9,7 @@ import ballplate as bp
 import pytest
 from ballplate.simulator.experiment.model import Experiment
 
+from tests.influences import wording
 from tests.influences.campaigns import file_with
 
 PLAUSIBLE: dict[str, Any] = {
@@ -69,7 +70,7 @@ def test_temperatures_of_readings_are_doubted_with_their_line(tmp_path: Path) ->
     table.loc[[4, 9], "temperature_artefact_degC"] = 215.0
     table.to_csv(path, index=False)
     (found,) = [one for one in bp.fit(experiment, path).warnings if "degC" in one]
-    assert "temperature_artefact: 2 of the temperatures" in found
+    assert wording.OF_THE_TEMPERATURES in found
     assert "the first 215 degC (line 6)" in found
 
 

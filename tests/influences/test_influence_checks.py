@@ -21,6 +21,8 @@ from ballplate.simulator.design.influences.protocol import (
 from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.inputs.messages import ExperimentError
 
+from tests.influences import wording
+
 
 @dataclass(frozen=True)
 class Long(Influence):
@@ -137,7 +139,7 @@ def test_a_setting_of_one_of_two_parameters_tells_of_its_derivative() -> None:
         def influence(self, design: DesignParts) -> Twofold:
             return Twofold(2e-5, self.value, (1.0, 3.0))
 
-    with pytest.raises(ExperimentError, match='the derivative of shifts by "more" is'):
+    with pytest.raises(ExperimentError, match=wording.THE_DERIVATIVE_OF_SHIFTS):
         lay_out(replace(bp.quickstart(), influences=(Odd(),)))
 
 
@@ -146,5 +148,5 @@ def test_each_kind_is_there_once() -> None:
         kind: Literal["sag"]
 
     once_each(INFLUENCES)
-    with pytest.raises(ExperimentError, match='Again has the kind "sag", as SagSettings has'):
+    with pytest.raises(ExperimentError, match=wording.AGAIN_HAS_THE_KIND):
         once_each((*INFLUENCES, Again))

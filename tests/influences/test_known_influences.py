@@ -12,6 +12,7 @@ from ballplate.presentation.formatting import amount_of, number
 from ballplate.results.checked_designs import check, predict
 from ballplate.simulator.experiment.layout import lay_out
 
+from tests.influences import wording
 from tests.influences.campaigns import Real, dense_spread, file_with
 
 PROBING = {"kind": "probing", "standard_uncertainty": "0.4 um", "between_probes": "0.2 um"}
@@ -109,4 +110,4 @@ def test_plates_whose_balls_have_the_same_names_have_displacements_of_their_own(
     assert same["U5"]["average"] == pytest.approx(other["U5"]["average"], rel=1e-9)
     names = [one.name for one in of_names[0].influences]
     assert len(set(names)) == 2 * 4 * 3
-    assert "displacement of ball two/r1c1: x" in names
+    assert wording.DISPLACEMENT_OF_BALL in names

@@ -13,6 +13,7 @@ import yaml
 from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.loading import load
 
+from tests.influences import wording
 from tests.reference import dense
 from tests.reference.installed_extension import install, said_with
 from tests.reference.small_quickstart import small_sections
@@ -108,7 +109,7 @@ def test_uncertainties_are_those_of_the_dense_computation(
     expected = np.sqrt(found.covariance[-1, -1])
     assert own[2] == pytest.approx(expected, rel=1e-3)
     assert abs(own[1] - told["truth"][0]) < 4.5 * expected
-    assert any(line.startswith("ratio of the styli") for line in told["table"])
+    assert any(line.startswith(wording.RATIO_OF_THE_STYLI) for line in told["table"])
 
 
 def test_the_truth_is_drawn_from_the_statement(told: dict[str, Any]) -> None:
@@ -119,7 +120,7 @@ def test_the_truth_is_drawn_from_the_statement(told: dict[str, Any]) -> None:
 def test_an_unknown_ratio_is_in_the_rank(told: dict[str, Any], problem: dense.Problem) -> None:
     deficiency = spread(problem, 0.0).deficiency
     assert told["free"][0]["rank_deficiency"] == deficiency
-    assert any("ratio of the styli" in one for one in told["free"][1]) == (deficiency > 0)
+    assert any(wording.RATIO_OF_THE_STYLI in one for one in told["free"][1]) == (deficiency > 0)
 
 
 def test_replicates_scatter_by_the_uncertainty(told: dict[str, Any]) -> None:
@@ -133,4 +134,4 @@ def test_what_is_wrong_is_told_at_its_place(told: dict[str, Any]) -> None:
 
 
 def test_reliability_knows_what_is_stated(told: dict[str, Any]) -> None:
-    assert "prior of ratio of the styli" in str(told["reliability"])
+    assert wording.PRIOR_OF_RATIO_OF_THE_STYLI in str(told["reliability"])

@@ -31,6 +31,7 @@ from ballplate.uncertainty.quantities import QUANTITIES
 from numpy.typing import NDArray
 from scipy.stats import chi2
 
+from tests.influences import wording
 from tests.reference import dense
 from tests.reference.small_quickstart import OF_ENTRIES, small_sections
 
@@ -362,7 +363,7 @@ def test_components_that_hardly_show_are_not_estimated(small: bp.Experiment) -> 
     found = bp.fit(experiment, bp.simulate(experiment)).components("calibration")
     (one,) = [each for each in found.groups if each.name == "probing errors of probes"]
     assert one.redundancy < 1.0 and not one.is_estimated
-    assert one.verdict == "cannot be estimated: too little redundancy"
+    assert one.verdict == wording.CANNOT_BE_ESTIMATED
 
 
 def test_a_plan_knows_what_they_leave(tmp_path: Path, disturbance: Disturbance) -> None:
@@ -393,13 +394,13 @@ def test_poses_of_a_pool_do_not_count(
     design, of_balls = lay_out(every), 3 * 9
     limit = "ballplate.simulator.experiment.influences.MOST_SHARED"
     monkeypatch.setattr(limit, design.parameter_count - of_balls - 1)
-    with pytest.raises(ExperimentError, match="leave positions or candidates out"):
+    with pytest.raises(ExperimentError, match=wording.LEAVE_POSITIONS_OR_CANDIDATES_OUT):
         lay_out(every)
     pool = draw(every, every.positions)
     assert pool.design.parameter_count == design.parameter_count
     # What all share are the errors of the machine.
     monkeypatch.setattr(limit, pool.shared - 1)
-    with pytest.raises(ExperimentError, match="leave positions or candidates out"):
+    with pytest.raises(ExperimentError, match=wording.LEAVE_POSITIONS_OR_CANDIDATES_OUT):
         draw(every, every.positions)
 
 
@@ -447,7 +448,7 @@ def test_wrong_statements_are_refused(
 
 def test_a_probe_without_an_offset_needs_a_direction(small: bp.Experiment) -> None:
     none = small.with_({"probes.down": ["0 mm"] * 3})
-    with pytest.raises(ExperimentError, match="a probe without an offset has no direction"):
+    with pytest.raises(ExperimentError, match=wording.A_PROBE_WITHOUT_AN_OFFSET_HAS):
         lay_out(none.with_(influences=[PROBING]))
     stated = {"directions": {"down": [0, 0, -2]}}
     design = lay_out(none.with_(influences=[PROBING | stated]))

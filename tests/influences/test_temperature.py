@@ -29,6 +29,7 @@ from ballplate.simulator.readings.simulated import simulated_readings
 from ballplate.uncertainty.quantities import QUANTITIES
 from numpy.typing import NDArray
 
+from tests.influences import wording
 from tests.influences.campaigns import (
     file_with,
     plain,
@@ -75,10 +76,10 @@ def test_the_parameters_are_those_stated(drawn: Experiment) -> None:
     places = ["z low", "z high", "x low", "x high", "y low", "y high"]
     assert found == [
         ("expansion of plate", "1/K", 11.5e-6, 0.6e-6),
-        ("sensor error of plate", "K", 0.0, SENSOR),
+        (wording.SENSOR_ERROR_OF_PLATE, "K", 0.0, SENSOR),
         *((f"temperature error of plate in {place}", "K", 0.0, EACH) for place in places),
-        ("expansion of the scales", "1/K", 8e-6, 0.3e-6),
-        ("sensor error of the scales", "K", 0.0, SENSOR),
+        (wording.EXPANSION_OF_THE_SCALES, "1/K", 8e-6, 0.3e-6),
+        (wording.SENSOR_ERROR_OF_THE_SCALES, "K", 0.0, SENSOR),
         *((f"temperature error of the scales in {place}", "K", 0.0, EACH) for place in places),
     ]
     assert lay_out(drawn).parameter_count == len(linearise(lay_out(drawn)).layout) + 27
@@ -239,7 +240,7 @@ def test_the_verdict_tells_what_cannot_be_told_apart(
     count = of.parameters + 2
     assert dense.spread(dense.jacobian(rows, count)).deficiency == deficiency
     told = "; ".join(map(str, found.null))
-    assert ("expansion of the scales" in told) == (deficiency > 0)
+    assert (wording.EXPANSION_OF_THE_SCALES in told) == (deficiency > 0)
     assert ("expansion of plate" in told) == (deficiency > 1)
 
 
@@ -357,7 +358,7 @@ def test_other_estimators_refuse(drawn: Experiment) -> None:
     simulated = simulated_readings(drawn)
     observed = observe(simulated.design, simulated.readings, simulated.x)
     for estimator in ("distances", "reversal", "length-equations"):
-        with pytest.raises(ExperimentError, match="does not know influence quantities"):
+        with pytest.raises(ExperimentError, match=wording.DOES_NOT_KNOW_INFLUENCE_QUANTITIES):
             fit_readings(drawn, observed, estimator)
 
 

@@ -18,6 +18,8 @@ from hypothesis import strategies as st
 from scipy.interpolate import BSpline
 from scipy.linalg import null_space
 
+from tests.machines import wording
+
 FAMILIES: dict[str, Basis] = {
     "Chebyshev": Polynomial(6),
     "monomial": Monomial(6),
@@ -162,7 +164,7 @@ def test_constrained_ends_hold_for_every_function_and_for_no_fewer(basis: Spline
 
 @pytest.mark.parametrize("knots", [(0.5, 0.3), (0.5, 1.2), (-0.1, 0.5), (0.0,), (1.0,)])
 def test_knots_out_of_order_or_range_are_refused(knots: tuple[float, ...]) -> None:
-    with pytest.raises(ValueError, match="out of order or range"):
+    with pytest.raises(ValueError, match=wording.OUT_OF_ORDER_OR_RANGE):
         Spline(4, knots)
 
 

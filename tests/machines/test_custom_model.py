@@ -17,6 +17,8 @@ from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.inputs.messages import ExperimentError
 from ballplate.simulator.machines import custom
 
+from tests.machines import wording
+
 # A machine of straight axes in space: three scales and three angles.
 GOOD = """
 import numpy as np
@@ -105,9 +107,7 @@ def test_an_installed_entry_point(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
     file.write_text(EXPERIMENT.replace("MODEL", "straight"), encoding="utf-8")
     assert check(load(file)[0]).verdict.deficiency == 0
     file.write_text(EXPERIMENT.replace("MODEL", "straigth"), encoding="utf-8")
-    assert 'no entry point "straigth"' in refusal(file) and 'did you mean "straight"?' in refusal(
-        file
-    )
+    assert wording.NO_ENTRY_POINT in refusal(file) and wording.DID_YOU_MEAN in refusal(file)
 
 
 @pytest.mark.parametrize(
@@ -179,7 +179,7 @@ def test_missing_modules_are_named(tmp_path: Path) -> None:
     line = refusal(file)
     assert f"no module nobody_has_this.at_all is installed nor in {tmp_path}" in line
     file.write_text(EXPERIMENT.replace("MODEL", "nobody"), encoding="utf-8")
-    assert "for an object of a module write module:name" in refusal(file)
+    assert wording.FOR_AN_OBJECT_OF_A_MODULE in refusal(file)
 
 
 @pytest.mark.parametrize("former", ["simulator.machines.protocol", "analysis.study"])
@@ -202,9 +202,9 @@ def test_a_package_that_is_a_former_one_is_told(
     monkeypatch.setattr(custom, "FORMER_PACKAGES", ("package_of_old",))
     source = GOOD.replace("import numpy as np", "import numpy as np\nimport package_of_old.model")
     line = refusal(written(tmp_path, source)[0])
-    assert "imports package_of_old, which is no longer a package of its own" in line
+    assert wording.IMPORTS_PACKAGE_OF_OLD in line
     line = refusal(written(tmp_path, source.replace("_of_old", "_of_nobody"))[0])
-    assert "cannot be imported: ModuleNotFoundError" in line and "no longer" not in line
+    assert wording.CANNOT_BE_IMPORTED in line and "no longer" not in line
 
 
 def test_the_file_of_a_module_is_found_without_running_it(tmp_path: Path) -> None:
@@ -250,4 +250,4 @@ def test_priors_about_a_model_of_ones_own(tmp_path: Path) -> None:
         file.read_text(encoding="utf-8").replace("squareness xz, s", "squarness xz, s"),
         encoding="utf-8",
     )
-    assert 'unknown parameter "squarness xz"; did you mean "squareness xz"?' in refusal(file)
+    assert wording.UNKNOWN_PARAMETER_DID_YOU_MEAN in refusal(file)

@@ -14,6 +14,7 @@ import yaml
 from ballplate.cli import main
 from ballplate.simulator.maps.fitted_map import FittedMap
 
+from tests.maps import wording
 from tests.maps.kinds import experiment_of, fit_of, module_of, write_files
 
 
@@ -311,7 +312,7 @@ def test_what_is_no_map_is_told(
 
 def test_arrays_by_another_ending_and_pickles_are_refused(folder: Path, tmp_path: Path) -> None:
     (tmp_path / "map.yaml").write_bytes((folder / "map.npz").read_bytes())
-    with pytest.raises(bp.ExperimentError, match=r"give it the ending .npz"):
+    with pytest.raises(bp.ExperimentError, match=wording.GIVE_IT_THE_ENDING_NPZ):
         bp.load_map(tmp_path / "map.yaml")
     with np.load(folder / "map.npz") as whole:
         parts = dict(whole)
@@ -350,7 +351,7 @@ def test_what_a_model_rests_on_may_not_change(folder: Path, tmp_path: Path) -> N
         with pytest.raises(bp.ExperimentError) as refusal:
             bp.load_map(own / "map.yaml")
         assert f"files[{name}]" in str(refusal.value) or f"files.{name}" in str(refusal.value)
-        assert "has changed since the map was written" in str(refusal.value)
+        assert wording.HAS_CHANGED_SINCE_THE_MAP_WAS in str(refusal.value)
         (own / name).unlink()
         with pytest.raises(bp.ExperimentError):
             bp.load_map(own / "map.yaml")
@@ -380,7 +381,7 @@ def test_fit_writes_a_map_of_the_full_estimator_only(
     assert main(fit) == 3
     assert "exists already" in capsys.readouterr().err
     assert main([*fit, "--force", "--estimator", "distances"]) == 2
-    assert "map of the full estimator" in capsys.readouterr().err
+    assert wording.MAP_OF_THE_FULL_ESTIMATOR in capsys.readouterr().err
     assert main(["fit", design, str(readings), "--date", "2026-11-22"]) == 2
     for wrong in (["-o", "map.txt"], ["-o", str(out), "--date", "yesterday"]):
         with pytest.raises(SystemExit):

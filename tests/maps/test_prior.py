@@ -27,6 +27,7 @@ from ballplate.simulator.maps.map_prior import (
 )
 from scipy import stats
 
+from tests.maps import wording
 from tests.maps.kinds import FREE, IN_PLANE, IN_SPACE, MODELS, model_of, write_files
 from tests.reference.small_quickstart import small_quickstart
 
@@ -225,7 +226,7 @@ def test_a_map_with_another_sigma_keeps_its_own(tmp_path: Path) -> None:
     ratio = (first.sigma / alone.sigma) ** 2
     p = 2.0 * stats.f.sf(ratio, first.degrees_of_freedom, alone.degrees_of_freedom)
     assert fit.to_dict()["campaigns"]["maps"][0]["p_value"] == pytest.approx(p)
-    assert "they differ" in told and "against a level of 0.25: the map is scaled with that" in told
+    assert "they differ" in told and wording.AGAINST_A_LEVEL_OF_THE_MAP in told
 
 
 @pytest.mark.parametrize("kind", ["plane", "spatial metric"])
@@ -296,7 +297,7 @@ def test_an_older_map_says_what_it_lacks(sigma: str, tmp_path: Path) -> None:
     assert lack not in "".join(new.lines()) and lack in "".join(old.lines())
     # It follows from an estimated sigma; otherwise nothing can be tested.
     assert (old.sigma == pytest.approx(new.sigma, rel=1e-12)) == (sigma == "estimated")
-    assert ("its residuals are unknown" in "".join(old.lines())) == (sigma == "given")
+    assert (wording.ITS_RESIDUALS_ARE_UNKNOWN in "".join(old.lines())) == (sigma == "given")
 
 
 def test_predictions_say_how_a_map_is_scaled(tmp_path: Path) -> None:
@@ -453,9 +454,9 @@ def test_a_map_without_scatter_is_no_prior(tmp_path: Path) -> None:
     exact = campaigns.experiment("A", campaigns.first, sigma="estimated")
     fitted = bp.fit(exact, bp.simulate(exact, exact=True)).to_map()
     bp.write_map(fitted, tmp_path / "first.yaml")
-    with pytest.raises(bp.ExperimentError, match="states no uncertainty, as that of readings"):
+    with pytest.raises(bp.ExperimentError, match=wording.STATES_NO_UNCERTAINTY):
         campaigns.fit_of_second({})
-    assert "agree with its model but for rounding" in bp.correct(fitted, [[0.1, 0.1, 0.1]]).notes[0]
+    assert wording.AGREE_WITH_ITS_MODEL_BUT in bp.correct(fitted, [[0.1, 0.1, 0.1]]).notes[0]
 
 
 def test_combinations_are_lengths_by_name(tmp_path: Path) -> None:
@@ -468,7 +469,7 @@ def test_combinations_are_lengths_by_name(tmp_path: Path) -> None:
     assert {priors.unit(design, k) for k in range(len(priors))} == {"m"}
     names = {priors.name(design, k) for k in range(len(priors))}
     assert len(names) == 6
-    assert all(one.startswith("prior of first.yaml, combination ") for one in names)
+    assert all(one.startswith(wording.PRIOR_OF_FIRST_YAML) for one in names)
 
 
 def test_files_nobody_has_looked_at_run_no_map_of_a_model_in_python(tmp_path: Path) -> None:
@@ -482,7 +483,7 @@ def test_files_nobody_has_looked_at_run_no_map_of_a_model_in_python(tmp_path: Pa
         }
         (tmp_path / "file.yaml").write_text(json.dumps(sections), encoding="utf-8")
         assert load(tmp_path / "file.yaml")
-        with pytest.raises(bp.ExperimentError, match="own.*: is code in Python"):
+        with pytest.raises(bp.ExperimentError, match=wording.OWN_IS_CODE_IN_PYTHON):
             load(tmp_path / "file.yaml", trust=UNKNOWN)
 
 
@@ -515,7 +516,7 @@ def test_readings_that_count_twice_are_told(tmp_path: Path) -> None:
     assert "(z low, z high, x low, x high, y low, y high)" in told(first.sample(frac=1.0))[0]
     both = second.copy()
     both.loc[both["position"] == "x high"] = first.loc[first["position"] == "x high"]
-    assert "fitted here too (x high): they count twice" in told(both)[0]
+    assert wording.FITTED_HERE_TOO in told(both)[0]
     # They do: twice the information leaves 0.7 of the uncertainty, but for what certificates do.
     rows = [one.quantities["U6"].average / one.sigma for one in (fit, bp.fit(known, first))]  # type: ignore[attr-defined]
     assert rows[1] == pytest.approx(rows[0] / np.sqrt(2.0), rel=0.05)

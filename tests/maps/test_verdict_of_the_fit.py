@@ -20,6 +20,7 @@ import yaml
 from ballplate.cli import main
 from ballplate.simulator.maps.fit_verdict import LIMIT, LackOfFit
 
+from tests.maps import wording
 from tests.reference.small_quickstart import SMALL, small_quickstart
 
 # By how much one probe's readings are wrong, in metres, and what that is.
@@ -180,7 +181,7 @@ def test_every_command_repeats_it(
     told = capsys.readouterr()
     lines = [one for one in told.out.splitlines() if one.startswith("lack of fit of")]
     assert re.search(rf": {VERDICTS[name]}( \(|$)", lines[0])
-    assert ("in the fit of" in told.err) == (name in ("significant", "beyond"))
+    assert (wording.IN_THE_FIT in told.err) == (name in ("significant", "beyond"))
     if name == "beyond":
         assert main([*given, "--json"]) in (0, 1)
         assert VERDICTS[name] in json.dumps(json.loads(capsys.readouterr().out))
@@ -200,7 +201,7 @@ def test_diff_repeats_that_of_a_map_that_is_prior_knowledge(maps: dict[str, Path
     stated = {"kind": "map", "file": str(maps["beyond"])}
     fits = [bp.fit(small_quickstart(**change), readings) for change in ({}, {"priors": [stated]})]
     found = bp.diff(*fits)
-    assert sum("in the fit of the map" in str(one) for one in found.notes) == 1
+    assert sum(wording.IN_THE_FIT_OF_THE_MAP in str(one) for one in found.notes) == 1
 
 
 @pytest.mark.parametrize("kind", ["conversion", "adjustment", "arrays"])
@@ -264,4 +265,4 @@ def test_the_exit_status_of_fit(
         told = capsys.readouterr().err
         assert status == (name == "beyond") and Path(f"{name}.yaml").exists()
         assert ("S^2 is" in told) == (name != "clean")
-        assert ("lack of fit is beyond the limit" in told) == (name == "beyond")
+        assert (wording.LACK_OF_FIT_IS_BEYOND in told) == (name == "beyond")

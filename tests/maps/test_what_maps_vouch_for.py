@@ -11,6 +11,8 @@ import numpy as np
 import pytest
 from ballplate.designs import shipped
 
+from tests.maps import wording
+
 POINTS = np.array([[0.0, 0.0, 0.0], [0.5, 0.5, 0.5]])
 POORER = "{kind: kinematic, position_coefficients: 2, rotation_coefficients: 2}"
 RICHER = "{kind: kinematic, position_coefficients: 7, rotation_coefficients: 7}"
@@ -28,7 +30,7 @@ def test_a_poorer_model_says_by_how_much_it_differs(fitted, tmp_path: Path) -> N
     assert read.conversion_residual == pytest.approx(converted.residual[0])
     assert converted.residual[0] > 5e-6
     told = bp.correct(read, POINTS).warnings
-    assert any("which U does not contain" in one for one in told)
+    assert any(wording.WHICH_DOES_NOT_CONTAIN in one for one in told)
     # Converted again it still says so, once.
     again = bp.convert(read, POORER).map
     assert [one.kind for one in again.left_out].count("conversion") == 1
@@ -41,7 +43,7 @@ def test_a_richer_model_is_no_prior(fitted, tmp_path: Path) -> None:
         "error_model.rotation_coefficients": 7,
         "priors": [{"kind": "map", "file": str(tmp_path / "richer.yaml")}],
     }
-    with pytest.raises(bp.ExperimentError, match="was converted from another error model"):
+    with pytest.raises(bp.ExperimentError, match=wording.WAS_CONVERTED_FROM_ANOTHER_ERROR_MODEL):
         bp.quickstart().with_(changes)
 
 

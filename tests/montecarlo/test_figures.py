@@ -38,6 +38,7 @@ from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.uncertainty.summaries import uncertainties
 
+from tests.montecarlo import wording
 from tests.reference.small_quickstart import small_quickstart
 
 
@@ -264,7 +265,7 @@ def test_too_poor_a_model_is_too_optimistic() -> None:
     assert "U3" not in done.outcome.comparisons
     assert done.optimism.power > 0.999
     lines = "\n".join(trials_lines(done))
-    assert "Too optimistic? The fitted model cannot follow the true machine exactly." in lines
+    assert wording.TOO_OPTIMISTIC_THE_FITTED_MODEL_CANNOT in lines
     assert trials_data(done)["too_optimistic"]["misfit_noticed"] == done.optimism.power
     # A misfit that does no harm.
     for ratio, harm in (
@@ -275,9 +276,9 @@ def test_too_poor_a_model_is_too_optimistic() -> None:
         one = replace(done.outcome.comparisons["U4"], actual=ratio)
         harmless = replace(done, outcome=replace(done.outcome, comparisons={"U4": one}))
         lines = "\n".join(trials_lines(harmless))
-        assert "The fitted model cannot follow the true machine exactly." in lines
+        assert wording.THE_FITTED_MODEL_CANNOT_FOLLOW in lines
         assert ("Too optimistic?" in lines) is harm
-        assert ("none is above 1 by more than 4 standard errors" in lines) is not harm
+        assert (wording.NONE_IS_ABOVE_BY_MORE in lines) is not harm
 
 
 @pytest.mark.parametrize("variant", ["kinematic fit", "empirical fit"])
@@ -344,7 +345,7 @@ def dense_columns(design: Design) -> np.ndarray:
 
 def test_a_model_that_holds_the_true_one_is_not_blamed() -> None:
     done = trials(shipped("npl/5.2.yaml", "kinematic fit"), 64)
-    assert "the fitted one follows exactly" in "\n".join(trials_lines(done))
+    assert wording.THE_FITTED_ONE_FOLLOWS_EXACTLY in "\n".join(trials_lines(done))
     assert done.outcome is not None and done.outcome.comparisons["U6"].flags == ()
 
 

@@ -22,6 +22,7 @@ from ballplate.simulator.readings.simulated import simulated_readings
 from numpy.typing import NDArray
 from scipy import stats
 
+from tests.montecarlo import wording
 from tests.reference import dense
 from tests.reference.small_quickstart import OF_ENTRIES
 
@@ -187,5 +188,5 @@ def test_wrong_noise_is_refused(noise: Any, text: str, small: bp.Experiment) -> 
 
 def test_correlation_is_told_not_to_be_in_uncertainties(small: bp.Experiment) -> None:
     (doubt,) = small.with_(noise={"correlation": 0.2}).doubts
-    assert "U1 to U6 take the noise of all readings as independent" in doubt
+    assert wording.TO_TAKE_THE_NOISE_OF_ALL in doubt
     assert not small.with_(noise="uniform").doubts

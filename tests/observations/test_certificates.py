@@ -15,6 +15,7 @@ from ballplate.simulator.design.observations.distances import DistanceCalibratio
 from ballplate.simulator.experiment.named_files import named_by
 from ballplate.simulator.inputs.messages import ExperimentError
 
+from tests.observations import wording
 from tests.observations.test_joint_values import BALLS, Real, covariance_file, written
 from tests.reference import certificates as dcc
 
@@ -210,9 +211,9 @@ def test_a_result_is_chosen_by_name_id_or_kind(tmp_path: Path) -> None:
         one = found(tmp_path, text, result=name)
         np.testing.assert_allclose(one.values, VALUES + 1e-3 * offset, rtol=1e-14)
     words = refusal(tmp_path, text)
-    assert '2 results have these values: "Before" (id b, refType x_before), "After"' in words
-    assert "say which with result:" in words
-    assert 'no result is called "Later"; it has "Before"' in refusal(tmp_path, text, result="Later")
+    assert wording.RESULTS_HAVE_THESE_VALUES in words
+    assert wording.SAY_WHICH_WITH_RESULT in words
+    assert wording.NO_RESULT_IS_CALLED in refusal(tmp_path, text, result="Later")
 
 
 def refusal(folder: Path, text: str, **more: Any) -> str:
@@ -486,7 +487,7 @@ def test_a_length_standard_has_no_covariance(tmp_path: Path) -> None:
         "size": ["600 mm", "600 mm"],
         "role": "length_standard",
     }
-    with pytest.raises(ExperimentError, match="lengths are read as independent"):
+    with pytest.raises(ExperimentError, match=wording.LENGTHS_ARE_READ_AS_INDEPENDENT):
         written(tmp_path, item(covariance="m.csv"), artefacts={"plate": plate})
 
 

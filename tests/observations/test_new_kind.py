@@ -18,6 +18,7 @@ from ballplate.simulator.experiment.layout import lay_out
 from scipy.optimize import least_squares
 from scipy.stats import norm
 
+from tests.observations import wording
 from tests.reference import dense
 from tests.reference.installed_extension import install, said_with
 
@@ -411,7 +412,7 @@ def test_what_cannot_be_observed_is_refused(told: dict[str, Any], name: str, wor
 
 def test_a_length_standard_has_only_distances(told: dict[str, Any]) -> None:
     (line,) = told["refusals"]["length standard"].splitlines()
-    assert "calibration[2].kind: a length standard carries distances only" in line
+    assert wording.A_LENGTH_STANDARD_CARRIES_DISTANCES in line
 
 
 def test_messages_and_the_schema_know_it(told: dict[str, Any]) -> None:

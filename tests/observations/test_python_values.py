@@ -19,6 +19,7 @@ from ballplate.simulator.inputs.messages import ExperimentError
 from ballplate.simulator.inputs.trust import UNKNOWN
 from scipy.stats import norm
 
+from tests.observations import wording
 from tests.observations.test_joint_values import agree, problem, stacked, written
 from tests.reference import dense
 
@@ -95,7 +96,7 @@ def test_every_command_knows_it(folder: Path) -> None:
 def test_modules_are_refused_where_they_are_not_allowed(folder: Path) -> None:
     written(folder, SIDES, ITEM)
     (folder / "diagonals.py").write_text("raise SystemExit('was run')", encoding="utf-8")
-    with pytest.raises(ExperimentError, match="object: is code in Python"):
+    with pytest.raises(ExperimentError, match=wording.IS_CODE_IN_PYTHON):
         load(folder / "e.yaml", trust=UNKNOWN)
 
 
@@ -137,7 +138,7 @@ def build(names, balls):
 def test_what_depends_on_the_frame_is_refused(folder: Path) -> None:
     (folder / "diagonals.py").write_text(FRAME, encoding="utf-8")
     item = {key: value for key, value in ITEM.items() if key != "options"}
-    with pytest.raises(ExperimentError, match="depends on where the frame"):
+    with pytest.raises(ExperimentError, match=wording.DEPENDS_ON_WHERE_THE_FRAME):
         written(folder, SIDES, item)
 
 

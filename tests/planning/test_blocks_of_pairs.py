@@ -17,6 +17,8 @@ from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.inputs.messages import ExperimentError
 from ballplate.simulator.machines.protocol import Array
 
+from tests.planning import wording
+
 from .small_pool import TEXT
 
 SIZE = 9
@@ -147,14 +149,12 @@ def test_more_candidates_than_there_is_memory_for(
     candidates = experiment.pool.candidates
     monkeypatch.setattr(information, "MOST_BYTES", 0)
     with pytest.raises(
-        ExperimentError, match=r"pool: 13 candidates with [0-9]+ parameters each take"
+        ExperimentError, match=wording.CANDIDATES_WITH_PARAMETERS_EACH_TAKE
     ) as caught:
         information.pool_information(experiment, candidates, False)
     size = int(str(caught.value).split(" candidates with ")[1].split()[0])
     monkeypatch.setattr(information, "MOST_BYTES", 13 * 8 * size**2 - 1)
-    with pytest.raises(
-        ExperimentError, match=r"; offer at most 12, positions of the experiment and certificates"
-    ):
+    with pytest.raises(ExperimentError, match=wording.OFFER_AT_MOST_POSITIONS):
         information.pool_information(experiment, candidates, False)
     monkeypatch.setattr(information, "MOST_BYTES", 13 * 8 * size**2)
     assert len(information.pool_information(experiment, candidates, False).matrices) == 13

@@ -27,6 +27,8 @@ from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.experiment.pool import with_chosen
 from ballplate.simulator.inputs.messages import ExperimentError
 
+from tests.planning import wording
+
 from .small_pool import TEXT
 
 # Six positions of the pool as somebody drew them.
@@ -126,9 +128,7 @@ def test_readings_of_a_position_that_is_no_candidate_are_refused(
     assert experiment.pool is not None
     path = tmp_path / "other.csv"
     path.write_text("position,ball,probe,x_mm,y_mm,z_mm\nlo,r1c1,down,1,2,3\nlo,r1c2,down,1,2,3\n")
-    with pytest.raises(
-        ExperimentError, match='other.csv:2:1: no position "lo".*did you mean "low"'
-    ):
+    with pytest.raises(ExperimentError, match=wording.NO_POSITION_DID_YOU_MEAN):
         done_candidates(path, experiment)
 
 
@@ -212,7 +212,7 @@ def test_too_little_is_told_with_what_stays_open(
 ) -> None:
     assert main(["plan", str(drawn), "--positions", "1", "--workers", "1"]) == 1
     told = capsys.readouterr().out
-    assert "no choice was found that determines everything" in told
+    assert wording.NO_CHOICE_WAS_FOUND_THAT_DETERMINES in told
     assert "undetermined 1:" in told
 
 
@@ -277,7 +277,7 @@ def test_nothing_affordable_is_told(tmp_path: Path, capsys: pytest.CaptureFixtur
     path = tmp_path / "pool.yaml"
     path.write_text(TEXT)
     assert main(["plan", str(path), "--hours", "0.1", "--workers", "1"]) == 3
-    assert "no position can be read with 0.1 h; allow more" in capsys.readouterr().err
+    assert wording.NO_POSITION_CAN_BE_READ in capsys.readouterr().err
 
 
 def test_the_pool_is_not_overwritten_by_the_choice(
@@ -286,7 +286,7 @@ def test_the_pool_is_not_overwritten_by_the_choice(
     path = tmp_path / "pool.yaml"
     path.write_text(TEXT)
     assert main(["plan", str(path), "--positions", "4", "-o", str(path), "--force"]) == 2
-    assert "which is read; name another file" in capsys.readouterr().err
+    assert wording.WHICH_IS_READ in capsys.readouterr().err
     assert path.read_text() == TEXT
 
 
@@ -311,14 +311,18 @@ def test_a_choice_better_than_its_bound_is_an_internal_error(
     command = ["plan", str(drawn), "--positions", "5", "--curve", "--workers", "1", "--quiet"]
     assert main(command) == 70
     out, err = capsys.readouterr()
-    assert out == "" and err.startswith("internal error: U6") and "the bound of any choice" in err
+    assert (
+        out == ""
+        and err.startswith("internal error: U6")
+        and wording.THE_BOUND_OF_ANY_CHOICE in err
+    )
     assert len(err.splitlines()) == 1
 
 
 def test_what_is_better_than_its_bound_by_rounding_alone_passes() -> None:
     one = Bound(1e-6, np.zeros(3))
     one.check("U6", 1e-6 * (1 - 5e-10))
-    with pytest.raises(InternalError, match="U6 of the choice, 9.9.*e-07, is below 1e-06"):
+    with pytest.raises(InternalError, match=wording.OF_THE_CHOICE):
         one.check("U6", 1e-6 * (1 - 5e-9))
 
 

@@ -19,6 +19,7 @@ from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.experiment.model import Candidate, Experiment, Position
 from ballplate.simulator.experiment.pool import with_chosen
 
+from tests.planning import wording
 from tests.reference.copies import copy_file
 
 FOLDER = Path("designs/planning")
@@ -211,9 +212,7 @@ def test_beside_its_source_sections_keep_their_text(source: Path) -> None:
     assert_same(lay_out(found), lay_out(with_chosen(experiment, chosen)))
     text = (source.parent / "chosen.yaml").read_text("utf-8")
     assert text.startswith("# chosen here\n\ntitle: from a campaign   # kept\n")
-    assert (
-        "\n# the model\nerror_model: {kind: python" in text and "seed: 5   # kept as well" in text
-    )
+    assert "\n# the model\nerror_model: {kind: python" in text and wording.KEPT_AS_WELL in text
     # The bar stands nowhere, and nothing is known of a position that is not read.
     for gone in (
         "spare",

@@ -20,6 +20,8 @@ from ballplate.simulator.experiment.model import Experiment, Position
 from ballplate.simulator.experiment.pool import with_chosen
 from ballplate.simulator.inputs.messages import ExperimentError
 
+from tests.planning import wording
+
 from .small_pool import TEXT
 
 CAMPAIGN = Path("designs/planning/campaign.yaml")
@@ -176,7 +178,7 @@ def test_what_no_candidate_determines_is_left_out(tmp_path: Path) -> None:
     information = pool_information(experiment, candidates)
     assert information.deficiency == full.verdict.deficiency > 0
     assert full.quantities["U6"].undetermined == full.quantities["U6"].count
-    with pytest.raises(ExperimentError, match="no selection determines any"):
+    with pytest.raises(ExperimentError, match=wording.NO_SELECTION_DETERMINES_ANY):
         criterion(information, experiment, "U6")
     with pytest.raises(ExperimentError, match="undetermined"):
         criterion(information, experiment, "A")
@@ -204,7 +206,7 @@ def test_rounding_determines_nothing_where_balls_take_up_all(tmp_path: Path) -> 
     full = predict(with_chosen(experiment, candidates))
     information = pool_information(experiment, candidates)
     assert information.deficiency == full.verdict.deficiency == 6
-    with pytest.raises(ExperimentError, match="no selection determines any"):
+    with pytest.raises(ExperimentError, match=wording.NO_SELECTION_DETERMINES_ANY):
         criterion(information, experiment, "U6")
 
 
@@ -216,7 +218,7 @@ def test_priors_about_poses_are_refused(tmp_path: Path) -> None:
     prior = 'priors: [{parameter: "low: origin x", standard_uncertainty: 1 um}]'
     (experiment,) = load(written(tmp_path, f"{TEXT}{drawn}\n{prior}\n"), planning=True)
     assert experiment.pool is not None
-    with pytest.raises(ExperimentError, match="which a plan cannot weigh"):
+    with pytest.raises(ExperimentError, match=wording.WHICH_A_PLAN_CANNOT):
         pool_information(experiment, experiment.pool.candidates)
 
 
@@ -369,7 +371,7 @@ def test_two_plates_of_unlike_certificates(tmp_path: Path, positions: int) -> No
     assert found.bound <= found.value == pytest.approx(best, rel=1e-9)
     with pytest.raises(
         ExperimentError,
-        match='U5 includes the distances of ".*", but no position of these can be read',
+        match=wording.INCLUDES_THE_DISTANCES,
     ):
         campaign(experiment, Request("U5", Budget(positions=1)))
 

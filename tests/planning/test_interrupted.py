@@ -24,6 +24,8 @@ from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.experiment.model import Experiment, Position
 from ballplate.simulator.experiment.pool import with_chosen
 
+from tests.planning import wording
+
 from .random_pools import write_some
 
 TEXT = """
@@ -87,7 +89,7 @@ def test_a_position_is_completed_where_it_stands_without_another_set_up(pool: Pa
     step = sheet.steps[-1]
     assert (step.name, step.done, step.readings, step.seconds) == ("low", False, 5, 300.0)
     assert step.balls == "the rest, 5 of 9 readings: r2c2, r2c3, r3c1, r3c2, r3c3"
-    assert step.place.startswith("as it stands: flat, across z")
+    assert step.place.startswith(wording.AS_IT_STANDS)
     # It is worth what both positions are worth that are read in one go.
     (experiment,) = load(pool, planning=True)
     assert experiment.pool is not None
@@ -211,9 +213,9 @@ def test_the_file_written_takes_the_complete_readings(
     options = ["--done", readings, "--hours", "1.2", "--workers", "1", "-o", rest, "--sheet", sheet]
     assert command("plan", pool, *options) == 0
     told = capsys.readouterr().out
-    assert "low was interrupted after 5 readings; 4 more complete it" in told
+    assert wording.LOW_WAS_INTERRUPTED_AFTER_READINGS in told
     assert (
-        "| low |  | as it stands: flat" in sheet.read_text()
+        wording.LOW_AS_IT_STANDS in sheet.read_text()
         and "the rest, 4 of 9 readings: r2c3, r3c1" in sheet.read_text()
     )
     assert command("simulate", rest, "-o", data) == 0
@@ -260,9 +262,7 @@ def test_a_position_set_up_again_may_be_interrupted_again(
     }
     assert "low again 2" in found["chosen"]
     assert command(*plan_on[:-2], "--done", readings, "--from", rest) == 0
-    assert (
-        "low again was interrupted after 7 readings; 2 more complete it" in capsys.readouterr().out
-    )
+    assert wording.LOW_AGAIN_WAS_INTERRUPTED_AFTER_READINGS in capsys.readouterr().out
 
 
 def test_a_position_that_has_to_be_chosen_is_refused_where_there_is_no_room_for_it(
@@ -271,7 +271,7 @@ def test_a_position_that_has_to_be_chosen_is_refused_where_there_is_no_room_for_
     readings = readings_of(pool, ["side", "low"], 2)
     pool.write_text(TEXT.replace("  candidates:", "  limits: {keep: [low]}\n  candidates:"))
     assert command("plan", pool, "--done", readings, "--readings", 3, "--workers", "1") == 3
-    assert '"low" has to be chosen, but was interrupted' in capsys.readouterr().err
+    assert wording.HAS_TO_BE_CHOSEN in capsys.readouterr().err
 
 
 def test_readings_with_uncertainties_of_their_own_are_written_with_them(
@@ -332,10 +332,7 @@ def test_without_any_further_position_balls_may_be_unread(
     assert command("plan", pool, "--done", readings, "--hours", "2", "--workers", "1") == 0
     capsys.readouterr()
     assert command("plan", pool, "--done", readings, "--hours", "0.01", "--workers", "1") == 3
-    assert (
-        '"plate" was begun, but no position of its other balls can be read'
-        in capsys.readouterr().err
-    )
+    assert wording.WAS_BEGUN_BUT_NO_POSITION in capsys.readouterr().err
 
 
 def test_a_first_position_is_not_paid_for_twice_in_the_default_budget(pool: Path) -> None:
@@ -415,6 +412,4 @@ def test_a_second_plate_that_was_only_begun_is_gone_on_with_or_left_out(
     )
     assert status == 0
     told = capsys.readouterr().out
-    assert ("small low is left out: nothing else worth its time" in told) == bool(
-        found[False].ignored
-    )
+    assert (wording.SMALL_LOW_IS_LEFT_OUT in told) == bool(found[False].ignored)

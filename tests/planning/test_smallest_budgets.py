@@ -24,6 +24,7 @@ from ballplate.simulator.experiment.model import Candidate, Experiment, Position
 from ballplate.simulator.experiment.pool import with_chosen
 from ballplate.simulator.inputs.messages import ExperimentError
 
+from tests.planning import wording
 from tests.planning.small_pool import TEXT as SMALL
 from tests.reference import dense
 
@@ -230,8 +231,8 @@ def test_the_choice_that_limits_leave_deficient_is_the_nearest_to_a_determined_o
 
 def test_limits_that_leave_no_position_are_named() -> None:
     experiment = loaded(SMALL + "  limits: {at_most: [{of: {name: '*'}, count: 0}]}\n")
-    with pytest.raises(ExperimentError, match="limits: no position can be read, as limits allow"):
+    with pytest.raises(ExperimentError, match=wording.NO_POSITION_CAN_BE_READ_AS_LIMITS):
         campaign(experiment, Request("U6", Budget(positions=6)))
     experiment = loaded(SMALL)
-    with pytest.raises(ExperimentError, match="no position can be read with 0.01 h; allow more"):
+    with pytest.raises(ExperimentError, match=wording.NO_POSITION_CAN_BE_READ_WITH_ALLOW):
         campaign(experiment, Request("U6", Budget(seconds=36.0)))

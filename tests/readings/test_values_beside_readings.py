@@ -15,6 +15,8 @@ from ballplate.extensions.certificates.certificate_files import read_certificate
 from ballplate.simulator.inputs.messages import ExperimentError
 from ballplate.simulator.inputs.yamltree import GivenText
 
+from tests.readings import wording
+
 QUICKSTART = "designs/quickstart.yaml"
 
 
@@ -73,7 +75,7 @@ def test_exact_values_of_a_file_are_compared_with_one_another(
     # Both diagonals longer than those of a square: bending makes one of them shorter.
     wrong = right.copy()
     wrong.loc[wrong["value"].str.startswith("1060"), "value"] = "1060.67 mm"
-    with pytest.raises(ExperimentError, match="stated as exact contradict one another"):
+    with pytest.raises(ExperimentError, match=wording.STATED_AS_EXACT_CONTRADICT_ONE_ANOTHER):
         bp.fit(exact, readings, certificate=wrong)
 
 
@@ -91,13 +93,13 @@ def test_a_star_of_a_file_is_compared_with_the_offsets(
     wrong = right.assign(first=right["first"].where(~of_star, right["first"].replace(names)))
     found = read_certificate(GivenText("own.csv", wrong.to_csv(index=False)), star)
     (told,) = found.doubts
-    assert told.startswith("own.csv: stars[0]: its tips are up to ")
+    assert told.startswith(wording.ITS_TIPS_ARE_UP)
     assert '"right" and "back" are exchanged' in told
     # Whatever else is made of the readings tells of a table as well.
     down = of_star & (right["first"] == "down") & (right["second"] == "z")
     apart = right.assign(value=right["value"].where(~down, "-55 mm"))
     judged = bp.validate(star, readings, certificate=apart)
-    assert sum("5.0 mm from the stated offsets" in one for one in judged.warnings) == 1
+    assert sum(wording.MM_FROM_THE_STATED_OFFSETS in one for one in judged.warnings) == 1
     text = Path(QUICKSTART).read_text(encoding="utf-8")
     (tmp_path / "star.yaml").write_text(f"{text}\nstars: [{{standard_uncertainty: 0.2 um}}]\n")
     wrong.to_csv(tmp_path / "wrong.csv", index=False)

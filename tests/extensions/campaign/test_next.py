@@ -25,6 +25,7 @@ from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.inputs.yamltree import GivenText
 from scipy.stats import chi2
 
+from tests.extensions.campaign import wording
 from tests.planning.small_pool import TEXT
 
 QUICKSTART = "designs/quickstart.yaml"
@@ -104,7 +105,7 @@ def test_a_gross_error_is_named_and_stops_nothing(readings: pandas.DataFrame) ->
     assert found.now is not None and found.now.is_met and not found.is_met
     line = found.lines()[0]
     assert any("suspected: " in one and "line 32" in one for one in found.lines())
-    assert "target met but for what is suspected: look at that first" in line
+    assert wording.TARGET_MET_BUT_FOR_WHAT in line
 
 
 def small(positions: int) -> Experiment:
@@ -144,7 +145,7 @@ def test_few_degrees_of_freedom_are_a_reason_to_go_on() -> None:
     between = f"U6 average {average * np.sqrt(ratio):.9f} um"
     narrow = judged(table, between, experiment)
     assert narrow.now is not None and narrow.now.is_met and not narrow.is_met
-    assert "with so few degrees of freedom it may be" in narrow.lines()[0]
+    assert wording.WITH_SO_FEW_DEGREES_OF_FREEDOM in narrow.lines()[0]
 
 
 def test_without_redundancy_nothing_is_known_of_the_scatter() -> None:
@@ -161,12 +162,12 @@ def test_positions_read_again_replace_earlier_ones(readings: pandas.DataFrame) -
     both = pandas.concat([wrong, of(other, "x low")], ignore_index=True)
     expected = pandas.concat([readings[readings.position != "x low"], of(other, "x low")])
     found, plain = judged(both), judged(expected)
-    assert found.observed.redone == ("x low was read again: 50 readings taken before are left out",)
+    assert found.observed.redone == (wording.LOW_WAS_READ_AGAIN_READINGS,)
     assert found.fit is not None and plain.fit is not None
     assert found.fit.solution.factor.sum_of_squares == pytest.approx(
         plain.fit.solution.factor.sum_of_squares, rel=1e-9
     )
-    assert "x low was read again" in found.lines()[1] and found.read == (
+    assert wording.LOW_WAS_READ_AGAIN in found.lines()[1] and found.read == (
         *NAMES[:2],
         *NAMES[3:],
         "x low",
@@ -185,7 +186,7 @@ def test_repeats_within_a_run_replace_single_readings(readings: pandas.DataFrame
     bad["z_mm"] += 0.05
     table = pandas.concat([first.iloc[:3], bad, first.iloc[3:], readings.iloc[25:]])
     found = judged(table)
-    assert found.observed.redone == ("z low: of 1 reading that is repeated the last counts",)
+    assert found.observed.redone == (wording.LOW_OF_READING_THAT_IS_REPEATED,)
     assert found.is_met
 
 
@@ -199,10 +200,7 @@ def test_what_goes_on_with_a_position_replaces_nothing(readings: pandas.DataFram
 def test_an_interrupted_position_is_completed_first(readings: pandas.DataFrame) -> None:
     found = judged(readings.iloc[:13])
     line = found.lines()[0]
-    assert (
-        found.fit is None
-        and "nothing can be estimated yet (balls not read yet: " in found.lines()[2]
-    )
+    assert found.fit is None and wording.NOTHING_CAN_BE_ESTIMATED_YET in found.lines()[2]
     assert "next: rest of z low (12 readings)" in line and not found.is_met
     later = judged(pandas.concat([readings.iloc[:100], readings.iloc[100:115]]))
     assert later.missing == {"x high": 35} and later.fit is not None
@@ -336,7 +334,7 @@ def test_a_folder_is_watched_until_the_target_is_met(
     told = capsys.readouterr()
     lines = told.out.splitlines()
     answers = [line for line in lines if " positions read, last " in line]
-    assert answers[0].startswith("3 positions read, last x low; target not met; next: ")
+    assert answers[0].startswith(wording.POSITIONS_READ_LAST_LOW)
     assert len(answers) >= 2 and answers[-1].endswith("target met: stop")
     assert "wrong.csv" in told.err and set(waits) == {0.5}
 
@@ -349,4 +347,4 @@ def test_a_watch_that_is_interrupted_has_not_met_the_target(
 
     monkeypatch.setattr("time.sleep", sleep)
     assert main(["next", QUICKSTART, "--watch", str(tmp_path)]) == 1
-    assert "stopped before the target was met" in capsys.readouterr().err
+    assert wording.STOPPED_BEFORE_THE_TARGET_WAS_MET in capsys.readouterr().err

@@ -29,6 +29,7 @@ from ballplate.simulator.inputs.messages import ExperimentError
 from ballplate.uncertainty.kernel_quantities import evaluation_points
 from numpy.typing import NDArray
 
+from tests.extensions.campaign import wording
 from tests.reference.small_quickstart import small_sections
 
 Real = NDArray[np.float64]
@@ -328,7 +329,7 @@ def test_a_drift_has_no_part_in_the_choice_and_is_told(tmp_path: Path) -> None:
     with_drift, without = planned(tmp_path, influences=[DRIFT]), planned(tmp_path)
     assert with_drift.value == pytest.approx(without.value, rel=1e-12)
     lines = "\n".join(with_drift.lines())
-    assert "positions were chosen as if nothing drifted" in lines and "0.3000 ppm/h" in lines
+    assert wording.POSITIONS_WERE_CHOSEN_AS_IF_NOTHING in lines and "0.3000 ppm/h" in lines
     assert not without.orders and "drift" not in "\n".join(without.lines())
     u6 = [one.prediction.to_dict()["quantities"]["U6"]["average"] for one in (with_drift, without)]
     assert u6[0] > u6[1]
@@ -348,14 +349,14 @@ def test_sizes_of_drift_scale_what_it_does(tmp_path: Path) -> None:
 def test_more_hours_than_allowed_are_told(tmp_path: Path) -> None:
     campaign = bp.plan(pool_file(tmp_path), hours=3.0, order="mirrored")
     (line,) = [one for one in campaign.lines() if one.startswith("mirrored")]
-    assert line.endswith("chosen, more hours than allowed")
+    assert line.endswith(wording.CHOSEN_MORE_HOURS_THAN_ALLOWED)
 
 
 def test_a_campaign_that_has_begun_has_its_order(tmp_path: Path) -> None:
     path = pool_file(tmp_path)
     readings = bp.simulate(load(_drawn(tmp_path))[0], seed=1)
     done = readings[readings["position"] == "z low"]
-    with pytest.raises(ExperimentError, match="has begun, and its times are unknown"):
+    with pytest.raises(ExperimentError, match=wording.HAS_BEGUN_AND_ITS_TIMES):
         bp.plan(path, positions=3, done=done, order="mirrored")
 
 
@@ -382,6 +383,6 @@ def test_drift_of_length_standards_is_refused_or_told(tmp_path: Path) -> None:
     path = tmp_path / "bar.yaml"
     path.write_text(yaml.safe_dump(told), encoding="utf-8")
     lines = "\n".join(bp.plan(path, positions=7, order="mirrored").lines())
-    assert "no figures of drift: that of length standards is not followed" in lines
+    assert wording.NO_FIGURES_OF_DRIFT in lines
     with pytest.raises(ExperimentError, match="has length standards"):
         bp.plan(path, positions=7, order="least-drift")

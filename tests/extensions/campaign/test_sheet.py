@@ -19,6 +19,8 @@ from ballplate.extensions.campaign.sheet import Sheet, sheet_of
 from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.inputs.messages import ExperimentError
 
+from tests.extensions.campaign import wording
+
 # Positions of all kinds; poses and layouts that can be computed by hand.
 DESIGN = """
 title: "two plates | <b>& a bar"
@@ -199,7 +201,7 @@ def test_angles_of_a_head_are_those_of_the_file(form: str, tmp_path: Path) -> No
     assert re.search(r"z, mm\s+A\s+B\s+from -z", flat)
     assert re.search(r"down\s+0\s+0\s+-40\s+–\s+–\s+0°", flat)
     assert re.search(r"right\s+30\s+\S+\s+\S+\s+90°\s+90°\s+90°", flat)
-    assert "A, B of the head" not in flat
+    assert wording.OF_THE_HEAD not in flat
 
 
 def test_the_drawing_of_an_artefact_has_its_balls_where_they_are(sheet: Sheet) -> None:
@@ -374,7 +376,7 @@ def test_the_list_of_centres_is_not_taken_for_readings(
     points = tmp_path / "points.csv"
     assert main(["sheet", str(design), "--points", str(points)]) == 0
     assert main(["fit", str(design), str(points)]) == 3
-    assert "as ballplate sheet --points writes it, and has no readings" in capsys.readouterr().err
+    assert wording.AS_BALLPLATE_SHEET_POINTS_WRITES in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(

@@ -24,6 +24,8 @@ from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.geometry.positions import ball_coordinates
 
+from tests.extensions.campaign import wording
+
 
 @pytest.fixture(scope="module")
 def experiment() -> Experiment:
@@ -50,11 +52,11 @@ def test_lines(sheet: RunSheet) -> None:
     lines = sheet_lines(sheet)
     assert lines[0].split() == ["start", "min", "position", "probes", "balls", "readings"]
     assert lines[1].split() == ["1", "done", "flat", "low", "down", "all", "25", "25"]
-    assert "turned 90 deg counter-clockwise seen from +z" in "\n".join(lines)
+    assert wording.TURNED_DEG_COUNTER_CLOCKWISE_SEEN in "\n".join(lines)
     assert "3 times each" in "\n".join(lines)
-    assert lines[-2] == "calibration better sides: 1 h"
+    assert lines[-2] == wording.CALIBRATION_BETTER_SIDES
     assert lines[-1] == summary(sheet)
-    assert "1 position done before" in lines[-1]
+    assert wording.POSITION_DONE_BEFORE in lines[-1]
 
 
 def test_csv_has_minutes_as_numbers(sheet: RunSheet) -> None:

@@ -23,6 +23,8 @@ from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.inputs.messages import ExperimentError
 from ballplate.simulator.readings.reading_files import read_readings
 
+from tests.extensions.certificates import wording
+
 QUICKSTART = "designs/quickstart.yaml"
 
 EVERYTHING = """
@@ -216,14 +218,9 @@ def test_both_files_are_written_or_none(tmp_path: Path, capsys: pytest.CaptureFi
     assert main([*arguments, str(tmp_path / "nowhere" / "certificate.csv"), "--force"]) == 3
     assert readings.read_text() == "old"
     assert main([*arguments, str(readings), "--force"]) == 2
-    assert (
-        "are the same file; name another" in capsys.readouterr().err
-        and readings.read_text() == "old"
-    )
+    assert wording.ARE_THE_SAME_FILE in capsys.readouterr().err and readings.read_text() == "old"
     assert main([*arguments, str(certificate), "--force"]) == 0
-    assert certificate.read_text().startswith(
-        "# certificate values of quickstart, drawn with seed 1"
-    )
+    assert certificate.read_text().startswith(wording.CERTIFICATE_VALUES_OF_QUICKSTART)
     bare = tmp_path / "bare.yaml"
     text = Path(QUICKSTART).read_text()
     start, end = text.index("calibration:"), text.index("evaluation:")
@@ -283,7 +280,7 @@ def test_values_missing_or_given_twice_are_told(tmp_path: Path) -> None:
     certificate, experiment = tmp_path / "c.csv", load(Path(QUICKSTART))[0]
     lines = lines_of_simulated(certificate)
     certificate.write_text("\n".join(lines[:-1]))
-    with pytest.raises(ExperimentError, match=r"no value of calibration\[0\] r1c5, r5c5; add it"):
+    with pytest.raises(ExperimentError, match=wording.NO_VALUE_OF_ADD):
         read_certificate(certificate, experiment)
     certificate.write_text("\n".join([*lines, lines[-1]]))
     with pytest.raises(ExperimentError, match="in line 6 already"):

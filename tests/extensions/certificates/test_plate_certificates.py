@@ -11,6 +11,7 @@ import pytest
 import yaml
 from ballplate.cli import main
 
+from tests.extensions.certificates import wording
 from tests.extensions.certificates.campaigns import IN_SPACE
 
 
@@ -116,7 +117,7 @@ def test_adjust_takes_maps_and_experiments(
     assert "not as predicted" in capsys.readouterr().out
     assert main(["adjust", str(folder / "after.yaml"), "--turn", "y+x=100 urad"]) == 0
     out = capsys.readouterr().out
-    assert "as predicted after adjustment" not in out and "1 change, predicted" in out
+    assert wording.AS_PREDICTED_AFTER_ADJUSTMENT not in out and "1 change, predicted" in out
     for wrong, told in (
         ([maps[0], first], "is a map, which needs no readings"),
         ([maps[0], "--after", second], "is no map file"),

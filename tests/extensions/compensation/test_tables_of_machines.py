@@ -25,6 +25,8 @@ from ballplate.simulator.experiment.machine_file import load_machine
 from ballplate.simulator.machines.arrangement import ARRANGEMENTS
 from ballplate.simulator.machines.description import true_volumetric
 
+from tests.extensions.compensation import wording
+
 MACHINES = Path("designs/park/machines")
 AXES = "XYZ"
 
@@ -149,7 +151,7 @@ def test_csv_tables_give_the_machines_errors(arrangement: str) -> None:
 
 def test_a_volumetric_table_holds_a_machine_that_is_no_chain() -> None:
     machine = machine_of("gec-like", "MH2")
-    with pytest.raises(ValueError, match="tilt of the column by the arm depends on two axes"):
+    with pytest.raises(ValueError, match=wording.TILT_OF_THE_COLUMN):
         made_compensation(machine, "m", "isg")
     made = made_compensation(machine, "m", "isg", (0.2, 0.15, 0.15), volumetric=True)
     (table,) = blocks(made.files("m")["m.csv"], None, "//")
@@ -177,9 +179,9 @@ def test_a_volumetric_table_holds_a_machine_that_is_no_chain() -> None:
 
 def test_heidenhain_tables_are_made_without_rotations_only_if_that_is_said() -> None:
     machine, _ = tabled_machine(MACHINES / "measured-errors.yaml")
-    with pytest.raises(ValueError, match="do not say which sign"):
+    with pytest.raises(ValueError, match=wording.DO_NOT_SAY_WHICH_SIGN):
         made_compensation(machine, "m", "heidenhain", without_rotations=True)
-    with pytest.raises(ValueError, match="turn by up to 8.9 µrad"):
+    with pytest.raises(ValueError, match=wording.TURN_BY_UP_TO_RAD):
         made_compensation(machine, "m", "heidenhain", sense="corrections")
     made = made_compensation(
         machine, "m", "heidenhain", (0.13,), sense="corrections", without_rotations=True

@@ -19,6 +19,8 @@ from ballplate.simulator.experiment.machine_file import load_machine
 from ballplate.simulator.machines.description import true_volumetric
 from numpy.testing import assert_allclose
 
+from tests.extensions.compensation import wording
+
 MACHINES = Path("designs/park/machines")
 NODES = np.array([[0.0, 0.0, 0.0], [0.01, 0.0, 0.0], [0.005, 0.0, 0.0]])
 
@@ -104,7 +106,7 @@ def test_an_isg_table_of_all_axes(tmp_path: Path) -> None:
     assert_allclose(found, [[0.01, -0.045, 0.04], [0.0225, -0.0925, 0.025]])
     with_tool = 1e3 * read.correction([[0.0, 0.0, 0.0]], [0.1, 0.0, 0.0])
     assert_allclose(with_tool, [[0.02, 0.01 + 0.003 * 100.0, 0.07]])
-    with pytest.raises(ValueError, match="is no machine file"):
+    with pytest.raises(ValueError, match=wording.IS_NO_MACHINE_FILE):
         read.machine_files("m")
 
 
@@ -113,7 +115,7 @@ def test_heidenhain_tables_by_the_active_line_of_their_assignment(tmp_path: Path
     for name, text in COM.items():
         written(tmp_path, name, f"BEGIN {name} MM\n{text}[END]\n")
     read = bp.read_compensation(file, "heidenhain", "errors of indication", "MB2")
-    assert any("BACKLASH is not read" in note for note in read.notes)
+    assert any(wording.BACKLASH_IS_NOT_READ in note for note in read.notes)
     assert any("no rotations" in note for note in read.notes)
     found = -1e3 * read.correction([[0.0, -0.0875, -0.1975]])
     assert_allclose(found, [[0.0, 0.0125, -0.0025 + 0.02]], atol=1e-15)
@@ -143,7 +145,7 @@ def test_a_written_table_becomes_a_machine_file_with_the_same_errors(
     files = [tmp_path / one for one in made.files("t") if not one.endswith(".com")]
     arrangement = "probe y x z" if source == "npl-like" else "MB2"
     if name == "heidenhain":
-        with pytest.raises(bp.ExperimentError, match="does not state whether"):
+        with pytest.raises(bp.ExperimentError, match=wording.DOES_NOT_STATE_WHETHER_2):
             bp.read_compensation(files, name, arrangement=arrangement)
     say = sense if name == "heidenhain" else None
     read = bp.read_compensation(files, name, say, arrangement)  # type: ignore[arg-type]
@@ -168,10 +170,10 @@ def test_a_written_table_becomes_a_machine_file_with_the_same_errors(
 
 def test_the_sense_is_never_guessed(tmp_path: Path) -> None:
     file = written(tmp_path, "v.csv", ISG)
-    with pytest.raises(bp.ExperimentError, match="does not state whether values are corrections"):
+    with pytest.raises(bp.ExperimentError, match=wording.DOES_NOT_STATE_WHETHER_VALUES):
         bp.read_compensation(file, "isg", arrangement="MB2")
     file = written(tmp_path, "v.csv", f"// states: errors of indication\n{ISG}")
-    with pytest.raises(bp.ExperimentError, match="states errors of indication, not corrections"):
+    with pytest.raises(bp.ExperimentError, match=wording.STATES_ERRORS_OF_INDICATION):
         bp.read_compensation(file, "isg", "corrections", "MB2")
     one = bp.read_compensation(file, "isg", arrangement="MB2")
     two = bp.read_compensation(written(tmp_path, "w.csv", ISG), "isg", "corrections", "MB2")
@@ -182,11 +184,11 @@ def test_files_of_one_table_state_the_same_sense(tmp_path: Path) -> None:
     made = bp.compensation(MACHINES / "npl-like.yaml", "csv", "200 mm").files("t")
     files = [written(tmp_path, name, text) for name, text in made.items()]
     written(tmp_path, "t-y.csv", made["t-y.csv"].partition("\n")[2])
-    with pytest.raises(bp.ExperimentError, match="t-y.csv: does not state whether"):
+    with pytest.raises(bp.ExperimentError, match=wording.DOES_NOT_STATE_WHETHER):
         bp.read_compensation(files, "csv", "corrections")
     one = written(tmp_path, "a.csv", "// states: corrections\nX EXX\n0 0\n1 0\n")
     two = written(tmp_path, "b.csv", "Y EYY\n0 0\n1 0\n")
-    with pytest.raises(bp.ExperimentError, match="b.csv: states not what another file does"):
+    with pytest.raises(bp.ExperimentError, match=wording.STATES_NOT_WHAT_ANOTHER_FILE_DOES):
         bp.read_compensation([one, two], "isg", "corrections", "MB2")
 
 

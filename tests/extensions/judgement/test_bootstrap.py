@@ -13,6 +13,8 @@ from ballplate.extensions.judgement.bootstrap import Replicate, bootstrap
 from ballplate.results.fits import Fit
 from ballplate.simulator.experiment.model import Experiment
 
+from tests.extensions.judgement import wording
+
 
 @cache
 def small(deficient: bool = False) -> Experiment:
@@ -84,7 +86,7 @@ def test_standard_deviations_are_the_linear_ones(deficient: bool) -> None:
     if deficient:
         found = fit.with_trials(2, 5).bootstrap
         assert found is not None and np.isnan(found.standard_deviations).any()
-        assert "undetermined, and are left out" in "\n".join(found.lines())
+        assert wording.UNDETERMINED_AND_ARE_LEFT_OUT in "\n".join(found.lines())
 
 
 @pytest.mark.long
@@ -110,7 +112,7 @@ def test_statistics_are_those_written_down(monkeypatch: pytest.MonkeyPatch) -> N
     found = bootstrap("a", "b", functions, 1.0, True, 50, 1)
     kept = np.delete(np.arange(50), [7, 30])
     assert found.failed == ((7, "diverged"), (30, "diverged"))
-    assert "2 did not converge" in found.lines()[1] and "7 (diverged)" in found.lines()[1]
+    assert wording.DID_NOT_CONVERGE in found.lines()[1] and "7 (diverged)" in found.lines()[1]
     np.testing.assert_allclose(found.standard_deviations, drawn[kept].std(axis=0, ddof=1))
     np.testing.assert_allclose(found.biases, drawn[kept].mean(axis=0), atol=1e-12)
     studentised = np.sort(drawn[kept] / sigmas[kept, None], axis=0)
@@ -130,9 +132,9 @@ def test_monomials_and_names() -> None:
 
 
 def test_what_goes_with_trials_only_is_refused() -> None:
-    with pytest.raises(ValueError, match="go with trials only"):
+    with pytest.raises(ValueError, match=wording.GO_WITH_TRIALS_ONLY):
         bp.fit(small(), bp.simulate(small()), seed=3)
-    with pytest.raises(ValueError, match="trials goes with the estimator full"):
+    with pytest.raises(ValueError, match=wording.TRIALS_GOES_WITH_THE_ESTIMATOR_FULL):
         bp.fit(small(), bp.simulate(small()), estimator="distances", trials=3)  # type: ignore[call-overload]
     with pytest.raises(ValueError, match="has not converged|unknown"):
         replace(fitted(), estimated=None).with_trials(2, 1)

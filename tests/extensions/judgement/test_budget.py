@@ -23,6 +23,7 @@ from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.model import Experiment
 from numpy.typing import NDArray
 
+from tests.extensions.judgement import wording
 from tests.reference import dense
 from tests.reference.small_quickstart import small_sections
 
@@ -245,7 +246,7 @@ def test_a_fit_multiplies_by_its_sigma_and_says_of_few_degrees_of_freedom() -> N
 
 def test_options_without_readings_are_refused(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["run", "--budget", str(TOP / "designs/quickstart.yaml"), "--sigma", "given"]) == 2
-    assert "--sigma goes with readings" in capsys.readouterr().err
+    assert wording.SIGMA_GOES_WITH_READINGS in capsys.readouterr().err
 
 
 def test_a_certificate_counts_whatever_is_said_of_the_table(
@@ -285,7 +286,7 @@ def test_sources_stand_in_the_order_of_what_they_contribute() -> None:
         figure = next(one for one in found.figures if one.name == "U6")
         parts = np.array(figure.contributions)
         assert (np.diff(parts) <= 1e-6 * parts.max()).all() and len(parts) > 2
-        assert found.lines()[1].endswith("sources by their part of U6, the largest first")
+        assert found.lines()[1].endswith(wording.SOURCES_BY_THEIR_PART)
         shown = [line.split("  ")[0].strip() for line in found.lines()[4 : 4 + len(parts)]]
         assert shown == list(found.sources)
 

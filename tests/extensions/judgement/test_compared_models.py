@@ -43,6 +43,7 @@ from ballplate.simulator.readings.observed_readings import ObservedReadings, obs
 from ballplate.simulator.readings.simulated import simulated_readings
 from numpy.typing import NDArray
 
+from tests.extensions.judgement import wording
 from tests.extensions.judgement.model_campaigns import (
     KINDS,
     campaign,
@@ -422,8 +423,8 @@ def test_the_richest_model_of_one_position_is_recommended_with_a_warning() -> No
     found = compared_models(experiment, simulated(experiment))
     chosen = next(one for one in found.rungs if one.is_recommended)
     assert not found.is_none and chosen.beaten.count == 0 and found.lengths.undetermined
-    assert any("nothing shows that it is rich enough" in text for text in found.cautions)
-    assert found.verdict()[-1].endswith("is not determined by this design")
+    assert any(wording.NOTHING_SHOWS_THAT_IT_IS_RICH in text for text in found.cautions)
+    assert found.verdict()[-1].endswith(wording.IS_NOT_DETERMINED_BY_THIS_DESIGN)
     assert "undetermined µm" not in "\n".join(found.lines())
     # A model that asks for less than the others leaves less open, and not a negative number.
     fewer = flat(error_model={"kind": "metric", "scale": "none"})

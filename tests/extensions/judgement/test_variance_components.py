@@ -46,6 +46,7 @@ from numpy.typing import NDArray
 from scipy.optimize import minimize
 from scipy.stats import binomtest, chi2
 
+from tests.extensions.judgement import wording
 from tests.reference import dense
 from tests.reference.small_quickstart import OF_ENTRIES, small_sections
 
@@ -176,7 +177,7 @@ def test_what_leaves_no_residual_is_not_estimated(small: bp.Experiment) -> None:
         with_errors(leftover(linearise(design), None, 1), np.ones(3 * 90 + 1)),
         groups_of(design, "calibration"),
     )
-    assert [found.verdict for found in every][1] == "cannot be estimated: too little redundancy"
+    assert [found.verdict for found in every][1] == wording.CANNOT_BE_ESTIMATED
     assert np.isnan([every[1].ratio, every[1].lower, every[1].upper]).all()
     assert not np.isnan(every[0].ratio)
 
@@ -189,7 +190,8 @@ def test_groups_that_nothing_tells_apart_are_not_estimated(small: bp.Experiment)
     assert fit.variance_components is not None
     verdicts = {one.name: one.verdict for one in fit.variance_components.groups}
     assert (
-        verdicts["displacements by position and ball and probe"] == "cannot be told from readings"
+        verdicts["displacements by position and ball and probe"]
+        == wording.CANNOT_BE_TOLD_FROM_READINGS
     )
     assert verdicts["readings"] == AS_STATED
 
@@ -351,9 +353,9 @@ def test_the_command_prints_and_writes_them(
     text = capsys.readouterr().out
     assert "readings along z" in text
     assert "larger than stated" in text
-    assert "sigma = 1 times the stated uncertainties (those of groups as estimated below)" in text
+    assert wording.SIGMA_TIMES_THE_STATED_UNCERTAINTIES in text
     assert expected.to_frame()["group"].tolist()[2] == "readings along z"
-    assert "larger than stated: readings along z" in repr(expected)
+    assert wording.LARGER_THAN_STATED in repr(expected)
 
 
 @pytest.fixture
@@ -396,5 +398,5 @@ def test_too_many_groups_are_refused(
     small: bp.Experiment, noisy: pandas.DataFrame, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("ballplate.extensions.judgement.components.MOST_ENTRIES", 1000)
-    with pytest.raises(ExperimentError, match="4 groups of observations of 90 parameters"):
+    with pytest.raises(ExperimentError, match=wording.GROUPS_OF_OBSERVATIONS_OF_PARAMETERS):
         bp.fit(small, noisy, components="axis")

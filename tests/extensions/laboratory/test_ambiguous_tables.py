@@ -21,6 +21,8 @@ from ballplate.simulator.readings.reading_sources import source_text
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
+from tests.extensions.laboratory import wording
+
 DESIGN = Path("designs/quickstart.yaml")
 HEAD = "position;ball;probe;x_mm;y_mm;z_mm\n"
 
@@ -121,15 +123,13 @@ def test_beside_thousands_decimals_are_not_said_to_be_of_two_kinds(
         ]
         text += f"z low;r1c{k};down;{';'.join(cells)}\n"
     told = asked(text, experiment)
-    assert told.count("has signs between thousands") == 3
+    assert told.count(wording.HAS_SIGNS_BETWEEN_THOUSANDS) == 3
     assert "others have decimal" not in told
 
 
 def test_two_kinds_of_decimals(experiment: Experiment) -> None:
     text = HEAD + "z low;r1c1;down;1,5;2,5;3,5\nz low;r1c2;down;4,5;2.25;3,5\n"
-    assert '3:1: "2.25" has a decimal point, and others have decimal commas' in asked(
-        text, experiment
-    )
+    assert wording.HAS_A_DECIMAL in asked(text, experiment)
 
 
 def test_commas_that_separate_columns_and_decimals(experiment: Experiment) -> None:
@@ -141,7 +141,7 @@ def test_commas_that_separate_columns_and_decimals(experiment: Experiment) -> No
     assert "perhaps decimals too" in asked(text, experiment)
     assert numbers(read(text, experiment, decimal="point"))[:3] == [612, 345, 100]
     short = text.replace(",dx,dy,dz", "")
-    assert "9 columns instead of 6" in asked(short, experiment)
+    assert wording.COLUMNS_INSTEAD_OF in asked(short, experiment)
 
 
 def test_commas_with_blanks_behind_them(experiment: Experiment) -> None:
@@ -153,26 +153,23 @@ def test_commas_with_blanks_behind_them(experiment: Experiment) -> None:
 
 def test_two_columns_of_one_name(experiment: Experiment) -> None:
     text = "position;ball;probe;x_mm;x actual [mm];y_mm;z_mm\nz low;r1c1;down;1,5;1,6;2;3\n"
-    assert "could all be x; say which" in asked(text, experiment)
+    assert wording.COULD_ALL_BE in asked(text, experiment)
     found = read(text, experiment, columns={"x": "x actual"})
     assert numbers(found) == [1.6, 2.0, 3.0]
 
 
 def test_lengths_without_a_unit(experiment: Experiment) -> None:
     text = HEAD.replace("_mm", "") + "z low;r1c1;down;1,5;2,5;3\n"
-    assert 'no unit is stated for the columns "x", "y", "z"' in asked(text, experiment)
+    assert wording.NO_UNIT_IS_STATED in asked(text, experiment)
     assert numbers(read(text, experiment, unit="in"))[0] == pytest.approx(38.1)
     both = "unit: inch\n" + text
     assert numbers(read(both, experiment))[0] == pytest.approx(38.1)
-    assert "lengths are in in, the experiment file mm" in asked(both, experiment, unit="mm")
+    assert wording.LENGTHS_ARE_IN in asked(both, experiment, unit="mm")
 
 
 def test_columns_that_are_missing_are_named_beside_those_there(experiment: Experiment) -> None:
     text = "Lage;Taster;X [mm];Y [mm];Z [mm]\nz low;down;1,5;2,5;3\n"
-    assert (
-        'columns found: "Lage", "Taster", "X [mm]", "Y [mm]", "Z [mm]"; missing: ball; name them in'
-        " the experiment file: readings: {columns: {ball: …}}"
-    ) in asked(text, experiment)
+    assert (wording.COLUMNS_FOUND_MISSING) in asked(text, experiment)
     assert 'columns found: "A", "B", "C"; missing: x, y, z' in asked("A;B;C\n1;2;3\n", experiment)
 
 
@@ -184,7 +181,7 @@ def test_columns_by_name_number_and_constant(experiment: Experiment) -> None:
     bare = "17 1.5 2.5 3.5\n18 4.5 5.5 6.5\n"
     columns |= {"ball": "1", "x": "2", "y": "3", "z": "4"}
     assert numbers(read(bare, experiment, columns=columns, unit="mm", header=0))[3] == 4.5
-    assert 'there is no column "F"' in asked(text, experiment, columns=columns | {"x": "F"})
+    assert wording.THERE_IS_NO_COLUMN in asked(text, experiment, columns=columns | {"x": "F"})
 
 
 def test_lines_among_the_rows_that_say_something(experiment: Experiment) -> None:
@@ -192,11 +189,11 @@ def test_lines_among_the_rows_that_say_something(experiment: Experiment) -> None
     rows = "r1c1;down;1,5;2,5;3,5\n"
     text = "Position: z low\nball;probe;x_mm;y_mm;z_mm\n" + rows
     assert read(text, experiment).rows[0].texts[0] == "z low"
-    assert "a line without co-ordinates among the rows" in asked(
+    assert wording.A_LINE_WITHOUT_CO_ORDINATES_AMONG in asked(
         text + "Position: z high\n" + rows, experiment
     )
     full = HEAD + "z low;r1c1;down;1,5;2,5;3,5\nz high;;;;;\nz low;r1c2;down;1,5;2,5;3,5\n"
-    assert "a line without co-ordinates among the rows" in asked(full, experiment)
+    assert wording.A_LINE_WITHOUT_CO_ORDINATES_AMONG in asked(full, experiment)
 
 
 def test_rows_that_were_cut_off(experiment: Experiment) -> None:
@@ -230,7 +227,7 @@ def test_an_encoding_that_is_stated(experiment: Experiment, tmp_path: Path) -> N
     path = tmp_path / "t.csv"
     found = read(text.encode("cp1250"), experiment, path, encoding="cp1250", columns=columns)
     assert found.rows[0].texts[1] == "r1c1"
-    assert "is not in the encoding utf-8" in asked(
+    assert wording.IS_NOT_IN_THE_ENCODING in asked(
         text.encode("cp1250"), experiment, path, encoding="utf-8"
     )
     marked = read(text.encode("utf-8-sig"), experiment, path, encoding="utf-8", columns=columns)

@@ -18,6 +18,8 @@ from ballplate.simulator.readings.reading_files import read_readings
 from scipy.spatial.distance import pdist
 from scipy.spatial.transform import Rotation
 
+from tests.extensions.laboratory import wording
+
 DESIGN = "designs/quickstart.yaml"
 AXES = ["x_mm", "y_mm", "z_mm"]
 OFFSETS = {
@@ -125,16 +127,16 @@ def test_part_coordinates_of_one_position_given_as_another(
         table.to_csv(path, index=False)
         return " ".join(read_readings(path, design, settings=settings).doubts)
 
-    assert "to the last digit" not in doubts(parts)
+    assert wording.TO_THE_LAST_DIGIT not in doubts(parts)
     one, other = (parts["position"] == name for name in ("z low", "z high"))
     copied = parts.copy()
     copied.loc[other, AXES] = parts.loc[one, AXES].to_numpy()
     assert list(copied.loc[one, "ball"]) == list(copied.loc[other, "ball"])
     said = doubts(copied)
-    assert 'positions "z low" and "z high" have the same readings to the last digit' in said
-    assert said.count("to the last digit") == 1
+    assert wording.POSITIONS_AND_HAVE_THE_SAME_READINGS in said
+    assert said.count(wording.TO_THE_LAST_DIGIT) == 1
     copied.loc[copied.index[other][0], "x_mm"] += 1e-4
-    assert "to the last digit" not in doubts(copied)
+    assert wording.TO_THE_LAST_DIGIT not in doubts(copied)
 
 
 def test_offsets_of_the_controller(readings: pandas.DataFrame, plain: pandas.DataFrame) -> None:
@@ -213,7 +215,7 @@ def test_the_verdict_is_right_or_none_however_little_offsets_differ(difference: 
 
 def test_offsets_of_the_wrong_sign_are_told_as_that(readings: pandas.DataFrame) -> None:
     probes = {name: [f"{-x} mm" for x in offset] for name, offset in OFFSETS.items()}
-    with pytest.raises(bp.ExperimentError, match="correct the signs of the offsets"):
+    with pytest.raises(bp.ExperimentError, match=wording.CORRECT_THE_SIGNS_OF_THE_OFFSETS):
         bp.fit(bp.load(DESIGN).with_(probes=probes), readings)
 
 
@@ -224,7 +226,7 @@ def test_part_co_ordinates_give_the_same_machine(
     found = bp.fit(DESIGN, in_parts(centres(readings), 6), coordinates="part")
     machine, balls = worst(found, plain)
     assert machine < 0.05 and balls < 1e-9
-    assert any("placed by the nominal poses" in text for text in found.remarks)
+    assert any(wording.PLACED_BY_THE_NOMINAL_POSES in text for text in found.remarks)
 
 
 def test_part_co_ordinates_that_nobody_states_are_no_readings(
@@ -280,7 +282,9 @@ def test_a_correction_is_taken_off(
     on = bp.fit(
         bp.load(DESIGN).with_(readings={"coordinates": kind, "compensation": "on"}), corrected
     )
-    assert worst(on, plain)[0] > 1.0 and any("the errors that it leaves" in t for t in on.remarks)
+    assert worst(on, plain)[0] > 1.0 and any(
+        wording.THE_ERRORS_THAT_IT_LEAVES in t for t in on.remarks
+    )
 
 
 def test_readings_that_are_the_same_are_all_of_one_kind() -> None:
@@ -314,7 +318,7 @@ def test_too_few_balls_do_not_place_part_co_ordinates(
     own = readings["position"] == "z high"
     few = pandas.concat([readings[~own], readings[own].iloc[:count]])
     assert bp.fit(DESIGN, few).warnings == ()
-    with pytest.raises(bp.ExperimentError, match="too few balls were read in z high"):
+    with pytest.raises(bp.ExperimentError, match=wording.TOO_FEW_BALLS_WERE_READ):
         bp.fit(DESIGN, centres(few), coordinates="part")
 
 
@@ -349,7 +353,7 @@ def test_a_wrong_unit_of_centres_is_told_once(
     with pytest.raises(bp.ExperimentError) as refused:
         bp.fit(experiment, wrong)
     (message,) = refused.value.messages
-    assert what in message.text and "otherwise the names of balls are wrong" in message.text
+    assert what in message.text and wording.OTHERWISE_THE_NAMES_OF_BALLS in message.text
     assert ", or lengths" not in message.text and ", or if" not in message.text
     assert bp.fit(experiment, table).converged
 

@@ -15,6 +15,8 @@ from ballplate.simulator.inputs.quantities import DURATION_UNITS
 from ballplate.simulator.inputs.yamltree import GivenText
 from ballplate.simulator.readings.reading_sources import source_rows
 
+from tests.extensions.laboratory import wording
+
 DRIFT = {"kind": "drift", "axes": {"standard_uncertainty": "2 um/h"}}
 START = datetime(2026, 3, 4, 8, 5, 17)
 
@@ -105,16 +107,14 @@ def test_what_does_not_tell_the_day_is_refused(
     first, second = bare.assign(time=clock)[:after], bare.assign(time=clock)[after:]
     with pytest.raises(ExperimentError, match="another day; write dates"):
         times(experiment, first, second)
-    with pytest.raises(ExperimentError, match=r"no clock times, which 0.csv has"):
+    with pytest.raises(ExperimentError, match=wording.NO_CLOCK_TIMES):
         times(experiment, first, table[after:])
     dated = [(late + timedelta(seconds=int(s))).isoformat() for s in table["time_s"]]
-    with pytest.raises(
-        ExperimentError, match="dates without a zone, and others are times of a day"
-    ):
+    with pytest.raises(ExperimentError, match=wording.DATES_WITHOUT_A):
         times(experiment, first, bare.assign(time=dated)[after:])
-    with pytest.raises(ExperimentError, match="no time, and other rows have one"):
+    with pytest.raises(ExperimentError, match=wording.NO_TIME_AND_OTHER_ROWS_HAVE):
         bp.fit(experiment, bare.assign(time=[*clock[:after], *[""] * (len(bare) - after)]))
-    with pytest.raises(ExperimentError, match='"12.5" is no time of a clock; write 10:05:30 or'):
+    with pytest.raises(ExperimentError, match=wording.IS_NO_TIME_OF_A_CLOCK):
         times(experiment, bare.assign(time=12.5))
 
 
@@ -128,5 +128,5 @@ def test_without_a_drift_times_are_not_used(table: pd.DataFrame) -> None:
     "text", ["", "25:00", "10:60", "10:05:60", "2026-02-30T10:00", "11/22/2026 10:05", "10", "x:y"]
 )
 def test_what_is_no_time_is_refused(text: str) -> None:
-    with pytest.raises(ClockError, match="is no time of a clock"):
+    with pytest.raises(ClockError, match=wording.IS_NO_TIME):
         clock_time(text)

@@ -13,6 +13,8 @@ from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.inputs.yamltree import GivenText
 from ballplate.simulator.readings.reading_files import read_readings
 
+from tests.extensions.laboratory import wording
+
 DESIGN = "designs/quickstart.yaml"
 AXES = ["x_mm", "y_mm", "z_mm"]
 Change = Callable[[pandas.DataFrame], pandas.DataFrame]
@@ -55,7 +57,7 @@ def test_a_cause_of_all_is_told_once(name: str, readings: pandas.DataFrame) -> N
     with pytest.raises(bp.ExperimentError) as refused:
         bp.fit(DESIGN, change(readings))
     (message,) = refused.value.messages
-    assert told in message.text and "otherwise the names of balls are wrong" in message.text
+    assert told in message.text and wording.OTHERWISE_THE_NAMES_OF_BALLS in message.text
     # No other one fits.
     assert ", or " not in message.text
 
@@ -70,7 +72,7 @@ def test_wrong_names_have_no_cause_in_common(readings: pandas.DataFrame) -> None
     with pytest.raises(bp.ExperimentError) as refused:
         bp.fit(DESIGN, wrong)
     assert len(refused.value.messages) == 6
-    assert all("correct the names of the balls" in one.text for one in refused.value.messages)
+    assert all(wording.CORRECT_THE_NAMES_OF_THE_BALLS in one.text for one in refused.value.messages)
 
 
 def test_readings_as_planned_have_no_doubts(readings: pandas.DataFrame) -> None:
@@ -82,7 +84,7 @@ def test_odd_diameters_are_told(readings: pandas.DataFrame) -> None:
     diameters = 22.0 + 3e-4 * generator.standard_normal(len(readings))
     table = readings.assign(**{"diameter [mm]": diameters})
     (text,) = (t for t in bp.fit(DESIGN, table).remarks if "sphere diameters" in t)
-    assert "22 mm in the middle" in text and "none is odd" in text
+    assert wording.MM_IN_THE_MIDDLE in text and "none is odd" in text
     diameters[37] += 0.02
     table = readings.assign(**{"diameter [mm]": diameters})
     (text,) = (t for t in bp.fit(DESIGN, table).remarks if "sphere diameters" in t)

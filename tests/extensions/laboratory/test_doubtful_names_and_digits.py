@@ -17,6 +17,8 @@ from ballplate.simulator.inputs.messages import ExperimentError
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from tests.extensions.laboratory import wording
+
 AXES = ["x_mm", "y_mm", "z_mm"]
 OFFSETS = {"down": (0, 0, -50), "right": (50, 0, 0), "left": (-50, 0, 0), "back": (0, 50, 0)}
 OFFSETS |= {"front": (0, -50, 0)}
@@ -71,7 +73,7 @@ def test_numbers_that_agree_with_places_in_the_part_are_taken(
     named = bp.fit(experiment, part, coordinates="part")
     numbered = part.assign(ball=part["ball"].map(by_rows))
     found = bp.fit(experiment, numbered, coordinates="part")
-    assert any("balls matched by number in reading order" in one for one in found.remarks)
+    assert any(wording.BALLS_MATCHED_BY_NUMBER_IN_READING in one for one in found.remarks)
     assert not any("matched by number" in one for one in found.warnings)
     values = (pd.DataFrame(one.rows())["value"] for one in (found, named))
     np.testing.assert_allclose(*values, atol=1e-12)
@@ -82,7 +84,7 @@ def test_numbers_that_contradict_places_in_the_part_are_refused(
 ) -> None:
     numbered = in_part(readings, np.eye(3))
     numbered["ball"] = numbered["ball"].map(by_columns)
-    with pytest.raises(ExperimentError, match="along the part's axes disagree, .* write the names"):
+    with pytest.raises(ExperimentError, match=wording.ALONG_THE_PARTS_AXES_DISAGREE):
         bp.fit(experiment, numbered, coordinates="part")
 
 
@@ -93,7 +95,7 @@ def test_numbers_that_nothing_tells_are_warned_of(
     numbered = in_part(readings, ASKEW)
     numbered["ball"] = numbered["ball"].map(number)
     found = bp.fit(experiment, numbered, coordinates="part")
-    assert any("part co-ordinates do not tell whether they are" in one for one in found.warnings)
+    assert any(wording.PART_CO_ORDINATES_DO_NOT_TELL in one for one in found.warnings)
 
 
 def test_numbers_of_a_plate_without_symmetry_are_told_by_it(
@@ -145,7 +147,7 @@ def test_exchanged_names_of_positions_are_told_as_such(
         bp.fit(experiment, exchanged(readings, first, second))
     text = str(refused.value)
     assert f"other positions were planned, {first} where {second}, {second} where {first}" in text
-    assert "exchange the names of positions" in text and "turned" not in text
+    assert wording.EXCHANGE_THE_NAMES_OF_POSITIONS in text and "turned" not in text
 
 
 def test_exchanged_names_of_positions_that_are_not_turned(
@@ -155,7 +157,7 @@ def test_exchanged_names_of_positions_that_are_not_turned(
     straight = experiment.with_({"positions.1.quarter_turns": 0})
     both = bp.simulate(straight)
     found = bp.fit(straight, exchanged(both, "z low", "z high"))
-    assert any("exchange the names of positions" in one for one in found.warnings)
+    assert any(wording.EXCHANGE_THE_NAMES_OF_POSITIONS in one for one in found.warnings)
     assert not any("exchange" in one for one in bp.fit(straight, both).warnings)
 
 
@@ -164,7 +166,7 @@ def test_a_plate_that_was_turned_is_told_as_that(
 ) -> None:
     """And not as names of positions."""
     turned = experiment.with_({"positions.0.quarter_turns": 2})
-    with pytest.raises(ExperimentError, match="z low: the readings fit the plate turned by 180"):
+    with pytest.raises(ExperimentError, match=wording.LOW_THE_READINGS_FIT_THE_PLATE):
         bp.fit(turned, readings)
 
 
@@ -187,6 +189,6 @@ def test_a_stated_uncertainty_is_what_digits_are_compared_with(
     experiment: bp.Experiment, readings: pd.DataFrame
 ) -> None:
     table = readings.assign(**{axis: readings[axis].round(3) for axis in AXES})
-    assert any("no digit below 1 µm" in one for one in bp.fit(experiment, table).warnings)
+    assert any(wording.NO_DIGIT_BELOW in one for one in bp.fit(experiment, table).warnings)
     fitted = bp.fit(experiment, table.assign(u_um=1.0))
     assert not any("no digit below" in one for one in fitted.warnings)

@@ -16,6 +16,8 @@ import pandas
 import pytest
 from ballplate.cli import main
 
+from tests.extensions.laboratory import wording
+
 DESIGN = "designs/quickstart.yaml"
 OFFSETS = {
     "down": (0, 0, -50),
@@ -234,7 +236,7 @@ def test_an_export_fits_to_the_estimates_of_the_plain_file(
     path = tmp_path / "export.txt"
     path.write_bytes(write(readings))
     found, err = fitted([path], capsys)
-    assert told in err and "planned but not read" not in err, err
+    assert told in err and wording.PLANNED_BUT_NOT_READ_2 not in err, err
     same(found, estimates, 1e-4)
 
 
@@ -282,9 +284,9 @@ def test_a_file_for_each_position(
         paths.append(tmp_path / f"{name}.csv")
         paths[-1].write_text(text if k % 2 else f"Position: {position}\n\n{text}", encoding="utf-8")
     found, err = fitted(paths, capsys)
-    assert 'position "Z_HIGH" by the name of the file' in err
-    assert 'position "z low" above the headings' in err
-    assert "positions matched by name but for case and signs: " in err and "Z_HIGH = z high" in err
+    assert wording.POSITION_BY_THE_NAME in err
+    assert wording.POSITION_ABOVE_THE_HEADINGS in err
+    assert wording.POSITIONS_MATCHED_BY_NAME_BUT in err and "Z_HIGH = z high" in err
     same(found, estimates, 1e-9)
 
 
@@ -305,5 +307,5 @@ def test_missing_balls(readings: Rows, tmp_path: Path, capsys: pytest.CaptureFix
     other.write_text(plain([row for i, row in enumerate(readings) if i not in dropped]))
     found, err = fitted([path], capsys)
     assert "without co-ordinates, left out: lines 9, 62, 63" in err
-    assert "planned but not read (3)" in err
+    assert wording.PLANNED_BUT_NOT_READ in err
     same(found, pandas.DataFrame(bp.fit(DESIGN, other).rows()), 1e-9)

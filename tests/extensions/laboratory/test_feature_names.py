@@ -12,6 +12,8 @@ from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.name_rules import check_rule
 from ballplate.simulator.inputs.messages import ExperimentError
 
+from tests.extensions.laboratory import wording
+
 QUICKSTART = "designs/quickstart.yaml"
 DESIGN = lay_out(bp.quickstart())
 
@@ -58,7 +60,7 @@ def test_a_rule_that_is_given_counts() -> None:
     names = ["M1-z low/r1c1", "M1-z low/r1c2", "other"]
     found = parts(names, "M1-{position}/{ball}")
     assert found[1:] == [("z low", "r1c1"), ("z low", "r1c2"), None]
-    assert "no names of the experiment in r1c1" in refusal(["r1c1"], "{position}_{ball}")
+    assert wording.NO_NAMES_OF_THE_EXPERIMENT_2 in refusal(["r1c1"], "{position}_{ball}")
 
 
 def test_what_can_be_read_in_two_ways_is_refused(tmp_path: Path) -> None:
@@ -67,10 +69,7 @@ def test_what_can_be_read_in_two_ways_is_refused(tmp_path: Path) -> None:
     (tmp_path / "twin.yaml").write_text(text, encoding="utf-8")
     design = lay_out(bp.load(tmp_path / "twin.yaml"))
     told = refusal(["x low_r1c1_r1c2", "x low_r1c2_r1c1"], None, design)
-    assert told == (
-        "f: the names can be read as {position}_{ball}_{probe} and {position}_{probe}_{ball}; state"
-        " the one that is right with --name"
-    )
+    assert told == (wording.THE_NAMES_CAN_BE_READ)
     rule = "{position}_{probe}_{ball}"
     assert named(["x low_r1c1_r1c2"], rule, design, "f").parts == (
         {"position": "x low", "probe": "r1c1", "ball": "r1c2"},
@@ -78,11 +77,7 @@ def test_what_can_be_read_in_two_ways_is_refused(tmp_path: Path) -> None:
 
 
 def test_names_that_are_not_of_the_experiment_say_what_is() -> None:
-    assert refusal(["KUGEL A", "KUGEL B"]) == (
-        "f: no names of the experiment in KUGEL A, KUGEL B; its positions are z low, z high, x low"
-        " and 3 more, its balls r1c1, r1c2, r1c3 and 22 more; state the rule with --name, such as"
-        " {position}_{ball}"
-    )
+    assert refusal(["KUGEL A", "KUGEL B"]) == (wording.NO_NAMES_OF_THE_EXPERIMENT)
 
 
 @pytest.mark.parametrize(
@@ -101,11 +96,9 @@ def test_without_an_experiment_names_are_parted_alike(
 
 
 def test_without_an_experiment_what_is_not_alike_is_refused() -> None:
-    assert "no rule parts the names P_1, P_1_2_3 into position" in refusal(
-        ["P_1", "P_1_2_3"], None, None
-    )
+    assert wording.NO_RULE_PARTS_THE_NAMES_INTO in refusal(["P_1", "P_1_2_3"], None, None)
     told = refusal(["z_low_r1c1"], "{position}_{ball}", None)
-    assert 'the name "z_low_r1c1" can be parted as {position}_{ball} in several ways' in told
+    assert wording.THE_NAME_CAN_BE_PARTED in told
 
 
 @pytest.mark.parametrize(
@@ -130,7 +123,7 @@ def test_a_file_tells_the_position_if_no_name_does() -> None:
     assert position_of_file("2026-03-04 Z_low run 2", DESIGN, "f") == "z low"
     assert position_of_file("anything", None, "f") == "anything"
     for stem in ("plate", "z low x low"):
-        with pytest.raises(ExperimentError, match="put it into the file's name"):
+        with pytest.raises(ExperimentError, match=wording.PUT_IT_INTO_THE_FILES_NAME):
             position_of_file(stem, DESIGN, "f")
 
 
@@ -182,7 +175,7 @@ def test_several_files_each_of_a_position(
         "z high,r1c1,down,1.0,2.0,3.0",
     ]
     assert all(line.startswith("# ") for line in lines[:-3])
-    assert 'position "z low" by the name of the file' in capsys.readouterr().err
+    assert wording.POSITION_BY_THE_NAME_OF_THE_FILE in capsys.readouterr().err
     assert main(["import", str(paths[0]), "-o", str(paths[1])]) == 3
     assert main(["import", str(paths[0]), "-o", str(paths[0]), "--force"]) == 2
 
@@ -200,7 +193,7 @@ def test_points_are_numbered_by_a_rule(tmp_path: Path) -> None:
         assert [round(1e3 * value, 6) for value in one.centre] == [100, 200, 300]
     told = bp.read_report(path, QUICKSTART).told
     assert told[0].endswith("taken: 1 sphere centre; left: nothing")
-    assert told[1].startswith("1 centre is of points on the surface")
+    assert told[1].startswith(wording.CENTRE_IS_OF_POINTS)
 
 
 def test_circles_are_taken_when_asked_for(tmp_path: Path) -> None:

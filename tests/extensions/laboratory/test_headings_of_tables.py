@@ -15,6 +15,8 @@ from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.inputs.messages import ExperimentError
 from ballplate.simulator.readings.reading_files import ObservedReadings, read_readings
 
+from tests.extensions.laboratory import wording
+
 DESIGN = Path("designs/quickstart.yaml")
 AXES = ["x_mm", "y_mm", "z_mm"]
 
@@ -51,7 +53,7 @@ def test_an_unknown_heading_with_names_of_positions_is_named(
 ) -> None:
     heads = ["Ort", "Kugel", "Taster", "X [mm]", "Y [mm]", "Z [mm]"]
     text = refusal(readings, heads, tmp_path / "t.csv")
-    assert 'the column "Ort" has names of positions' in text and "--columns position=Ort" in text
+    assert wording.THE_COLUMN_HAS_NAMES_OF_POSITIONS in text and "--columns position=Ort" in text
 
 
 def test_columns_that_are_not_used_are_told_where_the_name_of_the_file_is_no_position(
@@ -61,7 +63,7 @@ def test_columns_that_are_not_used_are_told_where_the_name_of_the_file_is_no_pos
     table = readings.assign(position=["ort " + letters[name] for name in readings["position"]])
     heads = ["Ort", "Kugel", "Taster", "X [mm]", "Y [mm]", "Z [mm]"]
     text = refusal(table, heads, tmp_path / "t.csv")
-    assert 't.csv:1:1: "t", the name of the file, was taken for the position' in text
+    assert wording.THE_NAME_OF_THE_FILE in text
     assert 'not used: "Ort"' in text and "--columns position=Ort" in text
 
 
@@ -99,4 +101,4 @@ def test_a_heading_that_occurs_twice_is_named_with_its_line(
         ["Position", "Kugel", "Taster", "X", "Y", "Z", "X"],
         tmp_path / "t.csv",
     )
-    assert 't.csv:1:1: the heading "X" occurs more than once, and could be x' in more
+    assert wording.THE_HEADING_OCCURS_MORE_THAN_ONCE in more

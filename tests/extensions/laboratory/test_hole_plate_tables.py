@@ -10,6 +10,8 @@ from pathlib import Path
 import pytest
 from ballplate.cli import main
 
+from tests.extensions.laboratory import wording
+
 OFFSETS = {"down": (0, 0, -50), "right": (50, 0, 0), "left": (-50, 0, 0)}
 OFFSETS |= {"back": (0, 50, 0), "front": (0, -50, 0)}
 
@@ -58,7 +60,7 @@ def test_a_co_ordinate_that_is_read_may_not_be_empty(
     Path("lab.csv").write_text("\n".join(lines).replace(",", ";"), encoding="utf-8")
     status, _, complaint = fitted(capsys, "lab.csv")
     assert status == 3
-    assert complaint.startswith("lab.csv:6:1: no x; write a number, or remove the line")
+    assert complaint.startswith(wording.NO_WRITE_A)
 
 
 def centres(source: str) -> str:
@@ -75,12 +77,12 @@ def test_centres_are_found_out(folder: Path, capsys: pytest.CaptureFixture[str])
     Path("centres.csv").write_text(centres(plain), encoding="utf-8")
     status, _, complaint = fitted(capsys, "centres.csv")
     assert status == 3
-    assert "as ball centres, but only to 50 mm as scale readings, the default" in complaint
+    assert wording.AS_BALL_CENTRES in complaint
     status, out, _ = fitted(capsys, "centres.csv", "--coordinates", "ball centres")
     assert status == 0
     status, _, complaint = fitted(capsys, "readings.csv", "--coordinates", "ball centres")
     assert status == 3
-    assert "as scale readings, but only to 50 mm as ball centres, which is stated" in complaint
+    assert wording.AS_SCALE_READINGS in complaint
 
 
 def test_offsets_across_the_plate_change_nothing(
@@ -111,7 +113,7 @@ def test_some_uncertainties_are_missing(folder: Path, capsys: pytest.CaptureFixt
         status, _, complaint = fitted(capsys, name)
         assert status == 3
         assert complaint.startswith(f"{name}:3:")
-        assert "leave the column out" in complaint
+        assert wording.LEAVE_THE_COLUMN_OUT in complaint
 
 
 def test_circles_of_a_report_are_readings_of_holes(

@@ -17,7 +17,7 @@ from ballplate.extensions.laboratory.formats.registered import FORMATS
 from ballplate.extensions.laboratory.formats.report import Report
 from ballplate.simulator.inputs.messages import ExperimentError
 
-from tests.extensions.laboratory import makers
+from tests.extensions.laboratory import makers, wording
 from tests.extensions.laboratory.makers import Ball
 
 D = Decimal
@@ -101,7 +101,7 @@ def test_what_begins_at_the_end_of_a_file_is_refused(end: str) -> None:
 def test_a_table_that_ends_within_a_name_is_told() -> None:
     content = WRITTEN["calypso"][1]()
     found = read("calypso", (content.rstrip("\n") + "\nPLA").encode())
-    assert found is not None and "may have been cut off" in found.remarks[-1]
+    assert found is not None and wording.MAY_HAVE_BEEN_CUT_OFF in found.remarks[-1]
     found = read("calypso", content.encode())
     assert found is not None and not found.remarks
 

@@ -13,7 +13,7 @@ from ballplate.extensions.laboratory.formats.registered import FORMATS, read_rep
 from ballplate.extensions.laboratory.formats.report import Feature
 from ballplate.simulator.inputs.messages import ExperimentError
 
-from tests.extensions.laboratory import makers
+from tests.extensions.laboratory import makers, wording
 from tests.extensions.laboratory.makers import Ball
 
 D = Decimal
@@ -87,7 +87,7 @@ def test_reports_are_decoded_as_tables_are(tmp_path: Path) -> None:
         assert found.to_frame().equals(expected.to_frame())
         assert {*found.remarks} - {*expected.remarks} == {f"{path}: {one}" for one in told}
     assert refusal(tmp_path, text.replace("geprüft", "\x07")).startswith(
-        "report:2:1: the control character U+0007 is no part of a text"
+        wording.THE_CONTROL_CHARACTER_IS_NO_PART
     )
     assert "is a workbook" in refusal(tmp_path, "PK\x03\x04" + text)
 
@@ -162,8 +162,8 @@ FA(A_4)=FEAT/SPHERE,OUTER,CART,1,2,3,4"""
         ("TIP_1", "machine", ""), ("TIP2", "part", "PART"), ("TIP2", "machine", ""), ("TIP2", "part", "PART"),
     ]  # fmt: skip
     read = bp.read_report(tmp_path / "report")
-    assert "2 centres are in a part's co-ordinate system (PART)" in read.remarks[-2]
-    assert read.remarks[-1].startswith("warning: centres in the machine's and in a part's system")
+    assert wording.CENTRES_ARE_IN_A_PARTS_CO in read.remarks[-2]
+    assert read.remarks[-1].startswith(wording.CENTRES_IN_THE_MACHINES)
     assert "coordinates: ball centres" in read.imported.key
 
 
@@ -194,7 +194,7 @@ def test_points_that_were_measured_make_a_sphere(tmp_path: Path, word: str) -> N
 def test_points_of_a_program_are_no_measurements(tmp_path: Path) -> None:
     sphere = "MODE/PROG,MAN\nF(P_1)=FEAT/SPHERE,OUTER,CART,100,200,300,22\n"
     told = refusal(tmp_path, DMIS.format(units="MM", lines=sphere + lines_of_points(6)))
-    assert "PTMEAS of a program are where to probe, not what was measured" in told
+    assert wording.PTMEAS_OF_A_PROGRAM_ARE_WHERE in told
 
 
 def test_four_points_are_too_few_and_a_plane_of_points_is_no_sphere(tmp_path: Path) -> None:
@@ -204,7 +204,7 @@ def test_four_points_are_too_few_and_a_plane_of_points_is_no_sphere(tmp_path: Pa
     sphere = sphere.replace("P_1", "P_1r")
     flat = "\n".join(f"FA(P_1r_{k})=FEAT/POINT,CART,{k},{k * k},7,0,0,1" for k in range(6))
     told = refusal(tmp_path, DMIS.format(units="MM", lines=sphere + flat))
-    assert "1 sphere (has points about in a plane)" in told
+    assert wording.SPHERE_HAS_POINTS_ABOUT in told
 
 
 def test_a_program_has_only_nominal_features(tmp_path: Path) -> None:
@@ -258,17 +258,15 @@ def test_rows_of_pcdmis_that_are_damaged_are_told(tmp_path: Path) -> None:
     text = makers.pcdmis(BALLS)
     assert "10.00012" in text
     damaged = text.replace("10.0001200", "10.0901200")
-    assert refusal(tmp_path, damaged) == (
-        "report:14:1: X: the deviation is not measured minus nominal; is the line damaged?"
-    )
+    assert refusal(tmp_path, damaged) == (wording.THE_DEVIATION_IS_NOT_MEASURED_MINUS)
     short = text.replace("     0.0500     10.0001200", "     10.0001200")
-    assert "its numbers are not below the 6 headings" in refusal(
+    assert wording.ITS_NUMBERS_ARE_NOT_BELOW_THE_HEADINGS in refusal(
         tmp_path, short.replace("0.0500    10.", "10.")
     )
     headless = text.replace("MEAS", "MIST")
     assert "no column MEAS" in refusal(tmp_path, headless)
     unitless = text.replace("UNITS=MM", "")
-    assert "no UNITS= of this dimension" in refusal(tmp_path, unitless)
+    assert wording.NO_UNITS_OF_THIS_DIMENSION in refusal(tmp_path, unitless)
 
 
 PCDMIS = """DIM #4A,5 LOC1= LOCATION OF SPHERE P1_r1c1  UNITS=MM
@@ -290,10 +288,10 @@ X      57.750      damaged
 def test_reports_of_pcdmis_have_names_with_blanks_and_blank_columns(tmp_path: Path) -> None:
     assert spheres(tmp_path, PCDMIS) == {"P1_r1c1": (0.100049, -0.057049, 0.001002)}
     told = bp.read_report(tmp_path / "report").told[0]
-    assert "1 dimension (position of sphere), 1 dimension (location of plane)" in told
+    assert wording.DIMENSION_POSITION_OF_SPHERE in told
     # Where a column is blank and the others are not below their headings, it is not clear.
     shifted = PCDMIS.replace("Y     -57.000   ", "Y     -57.000")
-    assert "report:4:1: its numbers are not below the 6 headings" in refusal(tmp_path, shifted)
+    assert wording.ITS_NUMBERS_ARE_NOT_BELOW in refusal(tmp_path, shifted)
 
 
 def test_circles_of_every_format(tmp_path: Path) -> None:
@@ -314,7 +312,7 @@ def test_a_feature_without_all_axes_is_left(tmp_path: Path) -> None:
     lines = [line for line in every if not (line.startswith("Z") and " 30.0" in line)]
     (tmp_path / "report").write_text("\n".join(lines), encoding="utf-8")
     found = bp.read_report(tmp_path / "report")
-    assert "left: 1 dimension (flatness of plane), 1 sphere (no row Z)" in found.told[0]
+    assert wording.DIMENSION_FLATNESS_OF_PLANE in found.told[0]
     assert '1 left, no row Z: "P2_r1c1"' in found.remarks[0]
 
 
@@ -342,11 +340,11 @@ def test_points_of_qif_are_found_through_their_sets(tmp_path: Path) -> None:
     assert one.points is not None
     np.testing.assert_allclose(one.points[5], (0.1066, 0.2088, 0.3))
     wrong = qif_of_points('<RangePointSetId range="2 7">12</RangePointSetId>', points)
-    assert '"2 7" are not among the 6 points of the set' in refusal(tmp_path, wrong)
+    assert wording.ARE_NOT_AMONG_THE_POINTS in refusal(tmp_path, wrong)
     wrong = qif_of_points("<WholePointSetId>13</WholePointSetId>", points)
-    assert 'no points with the id "13" in clear' in refusal(tmp_path, wrong)
+    assert wording.NO_POINTS_WITH_THE_ID in refusal(tmp_path, wrong)
     wrong = qif_of_points("<WholePointSetId>12</WholePointSetId>", points + " 1")
-    assert "19 co-ordinates, which is no multiple of 3" in refusal(tmp_path, wrong)
+    assert wording.CO_ORDINATES_WHICH_IS_NO_MULTIPLE in refusal(tmp_path, wrong)
 
 
 def test_points_of_qif_2_stand_below_their_sphere(tmp_path: Path) -> None:
@@ -366,15 +364,13 @@ def test_points_of_qif_2_stand_below_their_sphere(tmp_path: Path) -> None:
 def test_documents_that_are_no_results_of_qif_are_refused(tmp_path: Path) -> None:
     text = makers.qif(BALLS)
     other = text.replace("qifstandards.org/xsd/qif3", "example.org/x")
-    assert "<QIFDocument> is no document of QIF 2 or 3" in refusal(tmp_path, other)
+    assert wording.QIFDOCUMENT_IS_NO_DOCUMENT_OF_QIF in refusal(tmp_path, other)
     plan = text.replace("MeasurementResults id", "Plan id").replace(
         "/MeasurementResults>", "/Plan>"
     )
-    assert "no measurement results; is it a plan, or a model?" in refusal(tmp_path, plan)
+    assert wording.NO_MEASUREMENT_RESULTS in refusal(tmp_path, plan)
     unitless = text.replace("LinearUnit>", "MassUnit>")
-    assert "the file states no unit of length; state it with --unit mm" in refusal(
-        tmp_path, unitless
-    )
+    assert wording.THE_FILE_STATES_NO_UNIT in refusal(tmp_path, unitless)
     other = text.replace("<Location>10", '<Location linearUnit="furlong">10')
     assert 'unknown unit "furlong"' in refusal(tmp_path, other)
 
@@ -382,16 +378,11 @@ def test_documents_that_are_no_results_of_qif_are_refused(tmp_path: Path) -> Non
 @pytest.mark.parametrize("separator", [",", ";", "\t"])
 def test_tables_need_no_import(tmp_path: Path, separator: str) -> None:
     rows = "# of today\nposition,ball,x_mm,y_mm,z_mm\nP1,r1c1,1.5,2.5,3.5\n"
-    assert refusal(tmp_path, rows.replace(",", separator)) == (
-        "report: this is a table, which needs no import; ballplate fit reads it"
-    )
+    assert refusal(tmp_path, rows.replace(",", separator)) == (wording.THIS_IS_A)
 
 
 @pytest.mark.parametrize("text", ["", "\n" * 1000, "a,b,c\n1,2,3\n", "Lorem ipsum\n", "{}", "<a/>"])
 def test_files_of_no_format_are_refused_with_the_formats_that_there_are(
     tmp_path: Path, text: str
 ) -> None:
-    assert refusal(tmp_path, text) == (
-        "report: not recognised as QIF results, DMIS output, PC-DMIS report, Calypso table; state its"
-        " format with --from (qif, dmis, pcdmis, calypso)"
-    )
+    assert refusal(tmp_path, text) == (wording.NOT_RECOGNISED_AS_QIF_RESULTS)

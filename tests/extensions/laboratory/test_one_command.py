@@ -20,6 +20,8 @@ import yaml
 from ballplate.cli import main
 from scipy.spatial.distance import pdist
 
+from tests.extensions.laboratory import wording
+
 FOLDER = Path(__file__).parent / "samples"
 CAMPAIGN = FOLDER / "campaign.yaml"
 ROWS = list(csv.DictReader((FOLDER / "index.csv").read_text(encoding="utf-8").splitlines()))
@@ -93,7 +95,7 @@ def test_an_export_fits_by_one_command(
     assert largest_difference(found, expected) <= WITHIN.get(row["file"], 1e-4)
     if path.suffix in (".dmo", ".qif") or path.name.startswith(("pcdmis", "calypso")):
         assert "taken: 112 " in told and "left: " in told
-        assert "co-ordinates are taken for ball centres, as reports have them" in told
+        assert wording.CO_ORDINATES_ARE_TAKEN_FOR_BALL in told
 
 
 def test_an_experiment_names_its_reports(tmp_path: Path) -> None:
@@ -112,7 +114,7 @@ def test_an_experiment_names_its_reports(tmp_path: Path) -> None:
     table = pd.read_csv(FOLDER / "centres.csv")
     table[table["position"] != "P1"].to_csv(tmp_path / "rest.csv", index=False)
     both = [tmp_path / "first.dmo", tmp_path / "rest.csv"]
-    with pytest.raises(bp.ExperimentError, match="a table beside reports .* state what all"):
+    with pytest.raises(bp.ExperimentError, match=wording.A_TABLE_BESIDE_REPORTS_STATE_WHAT):
         bp.fit(CAMPAIGN, both)
     found = bp.fit(CAMPAIGN, both, coordinates="ball centres").to_dict()["estimates"]
     assert largest_difference(found, plain("plain/mm5.csv")) <= 1e-4
@@ -133,7 +135,7 @@ def test_the_rule_of_names_in_a_report_can_be_stated(
     path = tmp_path / "other.qif"
     path.write_text(text, encoding="utf-8")
     assert main(["fit", str(CAMPAIGN), str(path)]) == 3
-    assert "state the rule with --name" in capsys.readouterr().err
+    assert wording.STATE_THE_RULE_WITH_NAME in capsys.readouterr().err
     rule = "{probe}+{ball}@{position}, one"
     found, _ = fitted([str(CAMPAIGN), str(path), "--name", rule], capsys)
     assert largest_difference(found, plain("plain/mm6.csv")) <= 1e-4
@@ -170,12 +172,12 @@ def test_names_of_reports_are_matched_by_number_and_place_as_those_of_tables(
     for rule in ([], ["--name", "{position}_{ball}_{probe}"]):
         found, told = fitted([str(CAMPAIGN), str(path), *rule], capsys)
         assert largest_difference(found, expected) <= 1e-4
-        assert "positions matched by number, and by place" in told
-        assert "balls matched by number in reading order" in told
+        assert wording.POSITIONS_MATCHED_BY_NUMBER in told
+        assert wording.BALLS_MATCHED_BY_NUMBER_IN_READING in told
 
 
 def test_what_reports_say_of_co_ordinates_is_not_contradicted() -> None:
-    with pytest.raises(bp.ExperimentError, match="scale readings are stated; state ball centres"):
+    with pytest.raises(bp.ExperimentError, match=wording.SCALE_READINGS_ARE_STATED):
         bp.fit(CAMPAIGN, FOLDER / "dmis_mm.dmo", coordinates="scale readings")
     # Who names columns says that it is a table.
     with pytest.raises(bp.ExperimentError, match='no column "Kugel"'):
@@ -183,18 +185,16 @@ def test_what_reports_say_of_co_ordinates_is_not_contradicted() -> None:
 
 
 def test_names_are_swapped_only_where_asked_and_only_those_that_are(tmp_path: Path) -> None:
-    with pytest.raises(bp.ExperimentError, match="swap the names of the balls in lines 54 and 55"):
+    with pytest.raises(bp.ExperimentError, match=wording.SWAP_THE_NAMES_OF_THE_BALLS):
         bp.fit(CAMPAIGN, FOLDER / "swapped.csv")
     swapped = bp.fit(CAMPAIGN, FOLDER / "swapped.csv", swap_names=True)
     told = [one for one in swapped.remarks if "swapped" in one]
-    assert told == [
-        "the names of balls r2c2 and r2c1 in position P3 were swapped (lines 54 and 55)"
-    ]
+    assert told == [wording.THE_NAMES_OF_BALLS]
     right = bp.fit(CAMPAIGN, FOLDER / "plain" / "mm5.csv", swap_names=True)
     assert not [one for one in right.remarks if "swapped" in one]
     # A ball that has the name of another, which was not read itself, stays wrong.
     table = pd.read_csv(FOLDER / "swapped.csv").drop(index=53)
-    with pytest.raises(bp.ExperimentError, match="is where ball .* should be; correct its name"):
+    with pytest.raises(bp.ExperimentError, match=wording.IS_WHERE_BALL_SHOULD):
         bp.fit(CAMPAIGN, table, swap_names=True)
     # Many exchanges of neighbours in one position, each of which is told.
     table = pd.read_csv(FOLDER / "plain" / "mm5.csv")

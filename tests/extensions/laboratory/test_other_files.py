@@ -11,6 +11,8 @@ from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.inputs.messages import ExperimentError
 from ballplate.simulator.readings.reading_files import read_readings
 
+from tests.extensions.laboratory import wording
+
 DESIGN, POOL = "designs/quickstart.yaml", "designs/planning/campaign.yaml"
 SAMPLES = Path("tests/extensions/laboratory/samples")
 
@@ -26,7 +28,7 @@ def test_reports_of_another_experiment_are_told_by_their_names(
     capsys: pytest.CaptureFixture[str], name: str
 ) -> None:
     text = refusal(capsys, SAMPLES / name)
-    assert 'the positions "P1", "P2", "P3"' in text and "are not in the experiment" in text
+    assert 'the positions "P1", "P2", "P3"' in text and wording.ARE_NOT_IN_THE_EXPERIMENT in text
     assert len(text.splitlines()) == 1
 
 
@@ -37,8 +39,8 @@ def test_what_was_done_of_a_plan_is_told_by_tables(
     report = str(SAMPLES / "dmis_mm.dmo")
     assert main(["plan", POOL, "--positions", "4", "--done", report, "-q"]) == 3
     text = capsys.readouterr().err
-    assert "this is a report of a measuring program (DMIS output), and no table" in text
-    assert "run ballplate import first" in text and len(text.splitlines()) == 1
+    assert wording.THIS_IS_A_REPORT in text
+    assert wording.RUN_BALLPLATE_IMPORT_FIRST in text and len(text.splitlines()) == 1
 
 
 @pytest.mark.parametrize("separator", [",", ";", "\t"])
@@ -52,10 +54,10 @@ def test_what_sheet_writes_holds_no_readings(
     assert main(program) == 0
     for name in ("empty.csv", "points.csv"):
         made[name].write_text(made[name].read_text().replace(",", separator))
-    assert "nothing is filled in: x, y, z are empty" in refusal(capsys, made["empty.csv"])
-    assert "table of the nominal centres of balls" in refusal(capsys, made["points.csv"])
+    assert wording.NOTHING_IS_FILLED in refusal(capsys, made["empty.csv"])
+    assert wording.TABLE_OF_THE_NOMINAL_CENTRES in refusal(capsys, made["points.csv"])
     assert "this is a run sheet" in refusal(capsys, made["run.csv"])
-    assert "this is a DMIS program, not what was measured" in refusal(capsys, made["p.dmi"])
+    assert wording.THIS_IS_A_DMIS in refusal(capsys, made["p.dmi"])
 
 
 def test_certificate_values_belong_elsewhere(
@@ -63,7 +65,7 @@ def test_certificate_values_belong_elsewhere(
 ) -> None:
     readings, values = tmp_path / "readings.csv", tmp_path / "values.csv"
     assert main(["simulate", DESIGN, "-o", str(readings), "--certificate", str(values)]) == 0
-    assert "give them with --certificate" in refusal(capsys, values)
+    assert wording.GIVE_THEM_WITH_CERTIFICATE in refusal(capsys, values)
     assert main(["fit", DESIGN, str(readings), "--certificate", str(values)]) == 0
     for heads, row in (
         ("first,second,value_mm,standard_uncertainty_um", "r1c1,r1c5,600.0001,0.3"),
@@ -89,7 +91,7 @@ def test_a_file_that_is_named_twice(capsys: pytest.CaptureFixture[str], tmp_path
     link.symlink_to(readings)
     for other in (readings, tmp_path / ".." / tmp_path.name / "readings.csv", link):
         text = refusal(capsys, readings, other)
-        assert "the file is named twice" in text and len(text.splitlines()) == 1
+        assert wording.THE_FILE_IS_NAMED_TWICE in text and len(text.splitlines()) == 1
         assert ("as well" in text) == (other != readings)
     with pytest.raises(ExperimentError, match="named twice"):
         read_readings([readings, readings], lay_out(load(Path(DESIGN))[0]))

@@ -19,6 +19,8 @@ from ballplate.simulator.inputs.messages import ExperimentError
 from ballplate.simulator.inputs.yamltree import GivenText
 from ballplate.simulator.readings.reading_sources import source_text
 
+from tests.extensions.laboratory import wording
+
 DESIGN = Path("designs/quickstart.yaml")
 
 
@@ -79,7 +81,7 @@ def test_expanded_uncertainties_are_divided_by_their_coverage_factors(
     for separator in (",", ";", "\t"):
         found, told = uncertainties(experiment, heads, cells, separator)
         assert found == pytest.approx([expected, expected], rel=1e-12)
-        assert ("divided by its coverage factor" in told) == ("standard" not in heads)
+        assert (wording.DIVIDED_BY_ITS_COVERAGE_FACTOR in told) == ("standard" not in heads)
 
 
 @pytest.mark.parametrize(
@@ -90,7 +92,7 @@ def test_expanded_uncertainties_are_divided_by_their_coverage_factors(
 def test_what_does_not_say_which_uncertainty_it_is_is_refused(
     experiment: Experiment, head: str
 ) -> None:
-    with pytest.raises(ExperimentError, match="does not say which uncertainty it is") as refused:
+    with pytest.raises(ExperimentError, match=wording.DOES_NOT_SAY_WHICH_UNCERTAINTY) as refused:
         uncertainties(experiment, head, "0.9")
     assert "standard_uncertainty_um" in str(refused.value)
     if "k=" in head:
@@ -136,7 +138,7 @@ def test_an_uncertainty_of_all_rows_is_that_of_a_column() -> None:
     expected = bp.fit(experiment, readings.assign(u_um=0.35))
     for column in ("value", "standard uncertainty"):
         pd.testing.assert_series_equal(found.to_frame()[column], expected.to_frame()[column])
-    assert any("u is 0.35 um in all rows" in one for one in found.remarks)
+    assert any(wording.IS_UM_IN_ALL_ROWS in one for one in found.remarks)
 
 
 @pytest.mark.parametrize(

@@ -9,6 +9,8 @@ from ballplate.extensions.laboratory.xmltree import DEEPEST, Element, parse_xml,
 from ballplate.simulator.inputs.messages import ExperimentError
 from ballplate.simulator.inputs.yamltree import GivenText
 
+from tests.extensions.laboratory import wording
+
 TEXT = """<?xml version="1.0" encoding="{}"?>
 <!-- a report -->
 <q:Report xmlns:q="urn:q" xmlns="urn:other">
@@ -77,7 +79,7 @@ BOMB = "".join(f'<!ENTITY e{i} "{f"&e{i - 1};" * 10}">' for i in range(1, 10))
 def test_no_document_type_is_read(text: str) -> None:
     place, _, told = refusal(text.encode()).partition(": ")
     assert place.startswith("f:1:")
-    assert told == "a document type (<!DOCTYPE …>) is not read, nor any entity of it; remove it"
+    assert told == wording.A_DOCUMENT_TYPE_DOCTYPE
 
 
 @pytest.mark.parametrize(
@@ -103,9 +105,9 @@ def test_limits(monkeypatch: pytest.MonkeyPatch) -> None:
     assert "more than 100 deep" in refusal(b"<a>" * 100_000)
     monkeypatch.setattr(xmltree, "MOST_ELEMENTS", 3)
     parse_xml(b"<a><b/><b/></a>", "f")
-    assert refusal(b"<a><b/><b/><b/></a>") == "f:1:12: more than 3 elements; leave some of them out"
+    assert refusal(b"<a><b/><b/><b/></a>") == wording.MORE_THAN_ELEMENTS
     monkeypatch.setattr(xmltree, "MOST_XML_BYTES", 10)
-    assert refusal(b"<a>       </a>") == "f: has more than 0 MB; leave some of it out"
+    assert refusal(b"<a>       </a>") == wording.HAS_MORE_THAN_MB
 
 
 def test_a_file_cut_anywhere_is_refused_with_a_place() -> None:

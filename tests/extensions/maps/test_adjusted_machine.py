@@ -36,6 +36,7 @@ from numpy.typing import NDArray
 from scipy.stats import binom, chi2
 
 from tests.extensions.certificates.campaigns import IN_PLANE, IN_SPACE
+from tests.extensions.maps import wording
 from tests.maps.kinds import fit_of, write_files
 
 Real = NDArray[np.float64]
@@ -335,11 +336,11 @@ def test_undetermined_figures_are_told_and_left_out() -> None:
 def test_a_model_without_an_error_cannot_follow_its_change(tmp_path: Path) -> None:
     write_files(tmp_path)
     # The mean of the scales of this model is what it is.
-    with pytest.raises(ValueError, match="X made to read .* cannot follow"):
+    with pytest.raises(ValueError, match=wording.MADE_TO_READ_CANNOT_FOLLOW):
         bp.adjust(fit_of("metric", tmp_path).to_map(), "x=10 ppm")
     both = bp.adjust(fit_of("metric", tmp_path).to_map(), turn="y+x=3 urad")
     assert both.predicted[2].value - both.before[2].value == pytest.approx(-3e-6, rel=1e-4)
-    with pytest.raises(ValueError, match="has the axes x, y only"):
+    with pytest.raises(ValueError, match=wording.HAS_THE_AXES):
         bp.adjust(fit_of("plane", tmp_path).to_map(), "z=10 ppm")
 
 
@@ -391,4 +392,4 @@ def test_a_machine_that_is_exactly_known_differs_or_not(tmp_path: Path) -> None:
     )
     assert np.isnan(same.normalised_errors).all() and same.is_within is None
     assert "undetermined" not in "".join(same.lines()[1:-1])
-    assert same.headline() == "nothing that is determined in both can be tested"
+    assert same.headline() == wording.NOTHING_THAT_IS_DETERMINED_IN_BOTH

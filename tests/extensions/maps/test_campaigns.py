@@ -22,6 +22,7 @@ from ballplate.simulator.design.observations.joint_values import JointValues
 from ballplate.simulator.machines.protocol import Array
 from scipy.stats import chi2, norm
 
+from tests.extensions.maps import wording
 from tests.extensions.maps.campaigns import simulated_fit, simulated_map
 from tests.observations.test_joint_values import (
     PAIRS,
@@ -239,7 +240,7 @@ def test_only_what_undetermined_directions_change_is_left_out_of_a_test() -> Non
 def test_other_certificates_are_not_shared() -> None:
     experiment = bp.quickstart()
     maps = [simulated_map(experiment, seed) for seed in (1, 2)]
-    with pytest.raises(NothingSharedError, match="no certified value in common"):
+    with pytest.raises(NothingSharedError, match=wording.NO_CERTIFIED_VALUE_IN_COMMON):
         with_shared_certificates(maps[0], maps[1])
-    with pytest.raises(NothingSharedError, match="does not hold what certificates do"):
+    with pytest.raises(NothingSharedError, match=wording.DOES_NOT_HOLD_WHAT_CERTIFICATES_DO):
         with_shared_certificates(replace(maps[0], fit=None), maps[1])

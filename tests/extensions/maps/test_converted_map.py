@@ -16,6 +16,8 @@ from ballplate.extensions.maps.corrected_points import corrected, corrected_with
 from ballplate.simulator.inputs.messages import ExperimentError
 from ballplate.simulator.maps.fitted_map import FittedMap
 
+from tests.extensions.maps import wording
+
 
 @cache
 def fitted(model: str = "kinematic", deficient: bool = False) -> FittedMap:
@@ -88,7 +90,7 @@ def test_what_a_poorer_model_loses_is_told() -> None:
     left = columns @ solution - wanted
     np.testing.assert_allclose(found.conversion.differences(x, p).ravel(), left, atol=1e-13)
     np.testing.assert_allclose(found.map.values, solution[:6], atol=1e-13)
-    assert "cannot follow the old one exactly" in found.lines()[3]
+    assert wording.CANNOT_FOLLOW_THE_OLD_ONE_EXACTLY in found.lines()[3]
 
 
 def test_what_is_undetermined_stays_so() -> None:
@@ -125,7 +127,7 @@ def test_the_command_writes_a_map(tmp_path: Path, capsys: pytest.CaptureFixture[
         "{kind: empirical, coefficients: 4}",
     ]
     assert main([*arguments, "-o", str(tmp_path / "new.yaml")]) == 0
-    assert "the new error model does all that the old one did" in capsys.readouterr().out
+    assert wording.THE_NEW_ERROR_MODEL_DOES_ALL in capsys.readouterr().out
     again = bp.load_map(tmp_path / "new.yaml")
     np.testing.assert_array_equal(again.values, bp.convert(fitted(), arguments[-1]).map.values)
     assert main(["map", "--convert", str(tmp_path / "map.yaml"), "--to", "metric"]) == 1

@@ -15,6 +15,7 @@ from ballplate.cli import main
 from ballplate.simulator.inputs.covariances import read_matrix
 from ballplate.simulator.maps.fitted_map import FittedMap
 
+from tests.extensions.maps import wording
 from tests.maps.kinds import FREE, fit_of, write_files
 from tests.reference import dense
 
@@ -199,7 +200,7 @@ def test_the_command_writes_what_python_gives(
         assert one["standard_uncertainty"] == pytest.approx(right, rel=1e-9)
     assert np.allclose([one["point"] for one in data["points"]], found.points, rtol=1e-14)
     assert [one["outside"] for one in data["points"]] == [False, False, True]
-    assert "1 of 3 points lie outside the volume of the map" in captured.err
+    assert wording.OF_POINTS_LIE_OUTSIDE_THE_VOLUME in captured.err
     with (tmp_path / "out.csv").open() as stream:
         rows = list(csv.DictReader(stream))
     assert [row["outside"] for row in rows] == ["no", "no", "yes"]
@@ -255,7 +256,7 @@ def test_few_degrees_of_freedom_are_told(folder: Path) -> None:
         fit_of("metric", folder).to_map(), degrees_of_freedom=5, sigma_is_estimated=True
     )
     found = bp.correct(fitted, [[0.1, 0.1]])
-    assert any("degrees of freedom is itself uncertain by" in one for one in found.warnings)
+    assert any(wording.DEGREES_OF_FREEDOM_IS_ITSELF_UNCERTAIN in one for one in found.warnings)
 
 
 def test_fits_and_files_that_name_readings_are_taken_as_their_maps_are(
@@ -280,7 +281,7 @@ def test_fits_and_files_that_name_readings_are_taken_as_their_maps_are(
         lambda one: bp.compensation(one, "isg"),
     ):
         assert call(fit).to_dict() == call(fitted).to_dict()
-    with pytest.raises(TypeError, match="give a fit, what its to_map"):
+    with pytest.raises(TypeError, match=wording.GIVE_A_FIT_WHAT):
         bp.correct(3, points)  # type: ignore[arg-type]
     for command, given in (("correct", [str(points)]), ("map", ["--curves"])):
         bp.write_map(fitted, folder / "named-map.yaml")
@@ -294,4 +295,4 @@ def test_fits_and_files_that_name_readings_are_taken_as_their_maps_are(
     assert main(["correct", "designs/quickstart.yaml", str(points)]) == 3
     assert "names no readings" in capsys.readouterr().err
     assert main(["check", str(folder / "named-map.yaml")]) == 3
-    assert "this is a map that a fit left behind" in capsys.readouterr().err
+    assert wording.THIS_IS_A_MAP in capsys.readouterr().err

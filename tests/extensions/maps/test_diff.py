@@ -14,6 +14,8 @@ import pytest
 from ballplate.cli import main
 from ballplate.results.fits import Fit
 
+from tests.extensions.maps import wording
+
 PARK = Path("designs/park")
 
 
@@ -38,8 +40,8 @@ def test_maps_of_files_are_compared(
     table, picture = tmp_path / "all.csv", tmp_path / "all.svg"
     assert main(["diff", *maps, "-o", str(table), "--plot", str(picture)]) == 0
     out = capsys.readouterr().out
-    assert out.startswith("b less a: ") and "no change is shown" in out
-    assert "the campaigns are taken to be independent" in out
+    assert out.startswith("b less a: ") and wording.NO_CHANGE_IS_SHOWN in out
+    assert wording.THE_CAMPAIGNS_ARE_TAKEN in out
     rows = list(csv.DictReader(table.read_text("utf-8").splitlines()))
     diagonal = next(row for row in rows if row["kind"] == "body diagonals")
     assert diagonal["figure"] == "(0, 0, 0) mm to (1000, 1000, 1000) mm"
@@ -63,7 +65,7 @@ def test_the_same_readings_twice_are_no_agreement(
     bp.write_map(again.to_map(), tmp_path / "again.npz")  # type: ignore[attr-defined]
     assert main(["diff", maps[0], str(tmp_path / "again.npz"), "--grid", "2", "--fail"]) == 1
     said = capsys.readouterr()
-    assert "rest on the same readings" in said.err and "change is shown" not in said.out
+    assert wording.REST_ON_THE_SAME_READINGS in said.err and "change is shown" not in said.out
     poorer = bp.quickstart().with_({"error_model.position_coefficients": 4})
     for second in (again, bp.fit(poorer, table)):
         found = bp.diff(fits[0], second, grid=2)  # type: ignore[arg-type]
@@ -73,25 +75,25 @@ def test_the_same_readings_twice_are_no_agreement(
     assert bp.diff(fits[0], bp.fit(bp.quickstart(), mixed), grid=2).is_changed is False  # type: ignore[arg-type]
     mixed.loc[mixed["position"] == "x low"] = table.loc[table["position"] == "x low"]
     found = bp.diff(fits[0], bp.fit(bp.quickstart(), mixed), grid=2)  # type: ignore[arg-type]
-    assert found.is_changed is None and "the same in both campaigns in x low:" in found.notes[-1]
+    assert found.is_changed is None and wording.THE_SAME_IN_BOTH_CAMPAIGNS in found.notes[-1]
     # One reading fewer in each position, and the others rounded to a tenth of a micrometre.
     edited = table.groupby("position", sort=False).tail(-1).round(4)
     evaluated: Any = bp.fit(bp.quickstart(), edited)
     assert bp.diff(fits[0], evaluated, grid=2).is_changed is None
     # Maps have no single readings, but are too much alike.
-    assert "as alike as these" in bp.diff(maps[0], evaluated.to_map(), grid=2).notes[-1]
+    assert wording.AS_ALIKE_AS_THESE in bp.diff(maps[0], evaluated.to_map(), grid=2).notes[-1]
     assert not any("alike" in note for note in bp.diff(*maps, grid=2).notes)
     # So are those that say nothing of readings.
     given = bp.load_map(maps[0])
     silent = bp.diff(given, replace(given, data=None), grid=2)
     assert silent.comparison.test is not None and silent.comparison.test.statistic == 0.0
-    assert "as alike as these" in silent.notes[-1]
+    assert wording.AS_ALIKE_AS_THESE in silent.notes[-1]
     # Earlier ones only tell all readings together.
     assert given.data is not None
     earlier = replace(given, data=replace(given.data, positions=()))
     assert bp.diff(given, earlier, grid=2).in_common == "same"
     assert main(["adjust", maps[0], "--scale", "x=1 ppm", "--after", maps[0]]) == 2
-    assert "has readings of the first" in capsys.readouterr().err
+    assert wording.HAS_READINGS_OF_THE_FIRST in capsys.readouterr().err
 
 
 def printed(capsys: pytest.CaptureFixture[str], *arguments: str) -> Any:

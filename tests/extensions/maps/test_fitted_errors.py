@@ -28,6 +28,7 @@ from numpy.polynomial.chebyshev import cheb2poly, chebvander
 from numpy.polynomial.legendre import poly2leg
 from numpy.typing import NDArray
 
+from tests.extensions.maps import wording
 from tests.maps import kinds
 from tests.reference import dense
 
@@ -404,7 +405,7 @@ def test_what_is_undetermined_is_said_everywhere(
     printed, told = capsys.readouterr()
     name = next(one.name for one in open_ if one.is_undetermined)
     line = next(line for line in printed.splitlines() if line.startswith(f"{name} "))
-    assert "undetermined" in line and "undetermined; what these change is not stated" in told
+    assert "undetermined" in line and wording.UNDETERMINED_WHAT_THESE_CHANGE in told
     assert main(["map", "--curves", str(path), "--format", "csv", "--error", name]) == 0
     rows = capsys.readouterr().out.splitlines()[1:]
     # Zero where the frame holds it, and otherwise empty.
@@ -507,12 +508,12 @@ def test_influences_of_the_campaign_are_told() -> None:
 def test_a_machine_file_has_no_map_and_no_probe(capsys: pytest.CaptureFixture[str]) -> None:
     machine = str(TOP / "designs/park/machines/npl-like.yaml")
     assert main(["map", machine, "--probe", "down"]) == 2
-    assert "a machine file states its own probe" in capsys.readouterr().err
+    assert wording.A_MACHINE_FILE_STATES_ITS_OWN in capsys.readouterr().err
     gantry = str(TOP / "designs/park/machines/gec-like.yaml")
     assert main(["map", gantry, "--draw", "2"]) == 2
     assert "no random part" in capsys.readouterr().err
     assert main(["map", "--curves", machine]) == 3
-    assert "is no map file" in capsys.readouterr().err
+    assert wording.IS_NO_MAP_FILE in capsys.readouterr().err
 
 
 def covered(fitted: FittedMap, experiment: Experiment, campaigns: int) -> list[Real]:

@@ -27,6 +27,7 @@ from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.inputs.quantities import LengthFunction
 
+from tests.extensions.maps import wording
 from tests.reference import dense
 
 TEXT = (
@@ -203,10 +204,10 @@ def test_the_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None
     limits = ["--target", "0.1 um + L/10000000", "--grid", "3,2,3", "--coverage-factor", "1.5"]
     assert main(["run", "--lengths", file, *limits, "-o", points, "--pairs", pairs]) == 0
     out, err = capsys.readouterr()
-    assert err == "" and "153 lengths between 18 points of a grid, with the probe down" in out
+    assert err == "" and wording.LENGTHS_BETWEEN_POINTS in out
     assert (
-        "met by the standard uncertainty u of" in out
-        and "by the expanded uncertainty 1.5 u of" in out
+        wording.MET_BY_THE_STANDARD_UNCERTAINTY in out
+        and wording.BY_THE_EXPANDED_UNCERTAINTY in out
     )
     found = length_map(load(file)[0], settings(coverage_factor=1.5))
     with open(points, encoding="utf-8") as stream:
@@ -236,16 +237,10 @@ def test_a_deficient_design_is_told_and_named(
     file = str(tmp_path / "design.yaml")
     assert main(["run", "--lengths", file, "--grid", "3"]) == 1
     out = capsys.readouterr().out
-    assert (
-        "rank deficiency 3; " in out
-        and "change none of these lengths, but may change those of another --grid" in out
-    )
+    assert "rank deficiency 3; " in out and wording.CHANGE_NONE_OF_THESE_LENGTHS in out
     assert main(["run", "--lengths", file, "--grid", "4"]) == 1
     out = capsys.readouterr().out
-    assert (
-        "rank deficiency " in out
-        and "lengths are undetermined and meet no target, such as (" in out
-    )
+    assert "rank deficiency " in out and wording.LENGTHS_ARE_UNDETERMINED_AND_MEET in out
 
 
 def test_wrong_usage(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -290,4 +285,4 @@ def test_the_picture(tmp_path: Path, grid: str) -> None:
         == 0
     )
     text = picture.read_text(encoding="utf-8")
-    assert "u within it for 100 % of the lengths" in text
+    assert wording.WITHIN_IT_FOR_OF_THE_LENGTHS in text

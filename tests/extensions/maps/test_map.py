@@ -17,6 +17,8 @@ from ballplate.extensions.maps.map_places import PlacesAsked, map_places
 from ballplate.extensions.maps.volumetric_errors import Volumetric
 from ballplate.simulator.experiment.machine_file import load_machine
 
+from tests.extensions.maps import wording
+
 MACHINES = Path("designs/park/machines")
 ARM, BRIDGE, MEASURED = (
     MACHINES / f"{name}.yaml" for name in ("gec-like", "npl-like", "measured-errors")
@@ -49,9 +51,7 @@ def test_text(scales: Path, capsys: pytest.CaptureFixture[str]) -> None:
     out, err = capsys.readouterr()
     assert err.count("\n") == 1 and "errors.EXX.polynomial: 1 µm is subtracted" in err
     lines = out.split("\n")
-    assert lines[1].startswith(
-        "FB1: x carries z carries the probe, y carries the workpiece; errors are the tip's position"
-    )
+    assert lines[1].startswith(wording.CARRIES_CARRIES_THE_PROBE)
     assert [
         "EYY",
         "δy(y)",
@@ -113,7 +113,7 @@ def test_json_has_full_precision(capsys: pytest.CaptureFixture[str]) -> None:
     phi1 = json.loads(capsys.readouterr().out)["other_errors"]["phi1"]
     assert (phi1["value"], phi1["meaning"]) == (
         pytest.approx(7.2e-6),
-        "tilt of the column by the arm, over the whole axis",
+        wording.TILT_OF_THE_COLUMN,
     )
 
 
@@ -320,9 +320,9 @@ def test_a_bad_file_is_status_3(tmp_path: Path, capsys: pytest.CaptureFixture[st
         f"{path}:5:28",
     ]
     assert run("map", "designs/quickstart.yaml") == 3
-    assert "this is an experiment or a sweep; name a machine file" in capsys.readouterr().err
+    assert wording.THIS_IS_AN_EXPERIMENT in capsys.readouterr().err
     assert run("check", ARM) == 3
-    assert "this describes a machine; use it with ballplate map" in capsys.readouterr().err
+    assert wording.THIS_DESCRIBES_A in capsys.readouterr().err
 
 
 def test_a_picture_is_not_written_over_the_machine(

@@ -12,6 +12,8 @@ from ballplate.extensions.maps.map_difference import MapDifference
 from ballplate.simulator.experiment.model import Experiment
 from scipy.stats import chi2
 
+from tests.extensions.maps import wording
+
 
 def estimated(experiment: Experiment, seed: int) -> Any:
     return bp.fit(experiment, bp.simulate(experiment, seed))
@@ -40,8 +42,8 @@ def test_readings_in_common_hide_changes_and_make_none(tmp_path: Path) -> None:
         found = bp.diff(first, updated(first, {}, seed + 50), grid=2)
         test = found.comparison.test
         assert test is not None and found.is_changed is None
-        assert "readings in common may hide a change" in found.headline()
-        assert "no change is shown" not in str(found)
+        assert wording.READINGS_IN_COMMON_MAY_HIDE in found.headline()
+        assert wording.NO_CHANGE_IS_SHOWN not in str(found)
         total, dimensions = total + 3.0 * test.statistic, dimensions + test.dimensions
     assert 1e-4 < chi2.cdf(total, dimensions) < 1.0 - 1e-4
 
@@ -55,8 +57,8 @@ def test_an_update_that_differs_shows_a_change(
     for second in (later, tmp_path / "later.yaml"):
         found: MapDifference = bp.diff(first, second, grid=2)
         assert found.is_changed is True and found.to_dict()["readings_in_common"] == "some"
-        assert found.notes[-1].startswith("warning: readings are the same in both campaigns in 6 p")
-        assert "both rest on some of the same readings" in str(found)
+        assert found.notes[-1].startswith(wording.READINGS_ARE_THE_SAME_IN_BOTH)
+        assert wording.BOTH_REST_ON_SOME in str(found)
         assert not found.to_dict()["same_readings"]
     # So do the new readings alone, of which there is no doubt.
     other = bp.quickstart().with_({"true_machine.seed": 8})
@@ -64,4 +66,4 @@ def test_an_update_that_differs_shows_a_change(
     assert bp.diff(first, alone, grid=2).is_changed is True
     after = ["--after", str(tmp_path / "later.yaml")]
     assert main(["adjust", str(first), "--scale", "x=1 ppm", *after]) == 2
-    assert "has readings of the first, from before the changes" in capsys.readouterr().err
+    assert wording.HAS_READINGS_OF_THE_FIRST_FROM_BEFORE in capsys.readouterr().err

@@ -15,6 +15,8 @@ from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.inputs.messages import ExperimentError
 
+from tests.extensions.maps import wording
+
 EXPERIMENT = """\
 title: a long probe
 machine: {{volume: [1 m, 1 m, 1 m], repeatability: 1 um}}
@@ -101,7 +103,7 @@ def test_a_file_is_accepted_just_where_all_scale_readings_are_inside(tmp_path: P
         if expected:
             assert len(load(path)) == 1
         else:
-            with pytest.raises(ExperimentError, match="puts the scales at"):
+            with pytest.raises(ExperimentError, match=wording.PUTS_THE_SCALES):
                 load(path)
         accepted += expected
     assert 5 < accepted < 115
@@ -124,8 +126,4 @@ def test_readings_outside_are_told_by_fit(
     readings.write_text("\n".join([lines[0], *higher]))
     main(["fit", path, str(readings)])
     told = [line for line in capsys.readouterr().err.splitlines() if "extrapolated" in line]
-    assert told == [
-        "warning: 9 readings are outside the measuring volume, and the error model is extrapolated"
-        " there; furthest is ball r3c3 in position flat with probe long, at z = 1050 mm, 50 mm"
-        " above it (line 10); correct machine.volume, or the readings"
-    ]
+    assert told == [wording.READINGS_ARE_OUTSIDE_THE_MEASURING_VOLUME]

@@ -17,6 +17,8 @@ from ballplate.results.checked_designs import predict
 from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.experiment.pool import with_chosen
 
+from tests.extensions.pages import wording
+
 pytest.importorskip("matplotlib", reason="pictures need matplotlib")
 
 
@@ -141,7 +143,7 @@ def test_positions_that_are_read_already_are_named(found: Campaign, tmp_path: Pa
 def test_many_chosen_ones_are_counted(found: Campaign, tmp_path: Path) -> None:
     gains = tuple(Gain(one, 7e-7, 6e-7) for one in found.pool.candidates[:40])
     drawn = texts(replace(found, gains=gains), tmp_path)
-    assert "… and 16 chosen ones more" in drawn and len(np.unique(drawn)) > 20
+    assert wording.AND_CHOSEN_ONES_MORE in drawn and len(np.unique(drawn)) > 20
 
 
 def test_a_budget_of_positions_is_counted(found: Campaign, tmp_path: Path) -> None:

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+from tests.extensions.pages import wording
 from tests.extensions.pages.browser import assert_quiet, browser, program
 
 CHROMIUM = program()
@@ -42,7 +43,7 @@ def test_page_opens_alone(plate_sizes_page: Path, tmp_path: Path) -> None:
             tab.resize(width)
             tab.open(plate_sizes_page)
             assert tab.value(OUTSIDE) == [] and tab.value(CUT) == []
-        assert tab.value("document.title") == "size of the plate and number of its balls"
+        assert tab.value("document.title") == wording.SIZE_OF_THE_PLATE_AND_NUMBER
         assert tab.value("document.querySelectorAll('svg').length") == 15
         assert (
             tab.value("getComputedStyle(document.querySelector('svg path[style*=stroke]')).stroke")

@@ -14,6 +14,8 @@ import pytest
 from ballplate.cli import main
 from ballplate.results.fits import Fit
 
+from tests.extensions.pages import wording
+
 pytest.importorskip("matplotlib", reason="pictures need matplotlib")
 
 REAL = (
@@ -73,7 +75,7 @@ def test_predictions_and_plans_draw_their_positions(tmp_path: Path) -> None:
     assert set(prediction.design.positions.names) <= set(names)
     pool = {"candidates": [PLACES | {"probes": ["down"]}]}
     campaign = bp.plan(bp.quickstart().with_(pool=pool), positions=7)
-    assert repr(campaign).startswith("<Campaign of quickstart: 7 of ") and len(repr(campaign)) < 100
+    assert repr(campaign).startswith(wording.CAMPAIGN_OF_QUICKSTART) and len(repr(campaign)) < 100
     assert bp.run(campaign.chosen_experiment).quantities == campaign.prediction.quantities
     figure = campaign.plot(str(tmp_path / "plan.png"))
     assert (tmp_path / "plan.png").read_bytes().startswith(b"\x89PNG")
@@ -84,9 +86,9 @@ def test_predictions_and_plans_draw_their_positions(tmp_path: Path) -> None:
 def test_what_cannot_be_drawn_is_refused(planar: Fit, tmp_path: Path) -> None:
     experiment = bp.quickstart()
     other = bp.fit(experiment, bp.simulate(experiment), estimator="distances")
-    with pytest.raises(ValueError, match="by the full estimator and reversal only"):
+    with pytest.raises(ValueError, match=wording.BY_THE_FULL_ESTIMATOR_AND_REVERSAL):
         other.plot()
-    with pytest.raises(ValueError, match=r"should end in one of \.svg"):
+    with pytest.raises(ValueError, match=wording.SHOULD_END_IN_ONE_OF_SVG):
         planar.plot(tmp_path / "picture.jpg")
 
 

@@ -18,6 +18,7 @@ import pytest
 from ballplate.cli import main
 from ballplate.extensions.pages.design_contents import page_of_design
 
+from tests.extensions.pages import wording
 from tests.extensions.pages.pages_read import ResultPage, assert_quoted
 
 # Names that mean something in HTML.
@@ -154,7 +155,7 @@ def test_ratios_have_steps_of_colour_on_either_side_of_the_target(met: str) -> N
     places = r'<rect class="(\w+)-(\d)"[^>]*/><text class="place"[^>]*data-value="([^"]+)"'
     found = re.findall(places, page)
     shown = np.array([float(value) for _, _, value in found])
-    assert len(found) == len(points) and "in either colour darker is larger" in page
+    assert len(found) == len(points) and wording.IN_EITHER_COLOUR_DARKER_IS_LARGER in page
     assert {name for name, _, _ in found} == {
         "some": {"heat", "over"},
         "all": {"heat"},
@@ -220,19 +221,21 @@ def test_a_fit_that_fails_has_a_page_that_says_so(fitted: bp.Fit) -> None:
     failed = replace(fitted, solution=status, quantities={}, estimates=(), largest=(), plates=())
     page = failed.page()
     assert_quoted(page, {"fit": failed.to_dict()})
-    assert 'class="verdict bad"' in page and "there are no results" in page
+    assert 'class="verdict bad"' in page and wording.THERE_ARE_NO_RESULTS in page
     with pytest.raises(ValueError, match="fit it anew"):
         replace(fitted, experiment=None).page()
 
 
 def test_a_page_does_not_call_good_what_was_not_tested(fitted: bp.Fit) -> None:
-    assert 'class="verdict"' in fitted.page() and "no test of the residuals" in fitted.page()
+    assert 'class="verdict"' in fitted.page() and wording.NO_TEST_OF_THE_RESIDUALS in fitted.page()
     untested = replace(fitted, untested="too many entries").page()
-    assert "Not tested: too many entries." in untested
+    assert wording.NOT_TESTED_TOO_MANY_ENTRIES in untested
     exact = replace(fitted, degrees_of_freedom=0, sigma_is_estimated=False, sigma=1.0)
     page = exact.page()
-    assert "no test of the residuals" not in page and "no larger than stated" not in page
-    assert 'class="verdict bad"' in page and "there is no redundancy" in page
+    assert (
+        wording.NO_TEST_OF_THE_RESIDUALS not in page and wording.NO_LARGER_THAN_STATED not in page
+    )
+    assert 'class="verdict bad"' in page and wording.THERE_IS_NO_REDUNDANCY in page
 
 
 def test_commands_write_pages(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -263,11 +266,11 @@ def test_what_has_no_page_is_refused(tmp_path: Path) -> None:
     prediction = bp.run(small())
     with pytest.raises(ValueError, match="predict it anew"):
         bp.page(replace(prediction, experiment=None))
-    with pytest.raises(ValueError, match="go with sweeps only"):
+    with pytest.raises(ValueError, match=wording.GO_WITH_SWEEPS_ONLY):
         bp.page(prediction, run_modules=True)
-    with pytest.raises(TypeError, match="neither an experiment nor the path"):
+    with pytest.raises(TypeError, match=wording.NEITHER_AN_EXPERIMENT_NOR_THE_PATH):
         bp.page(3)  # type: ignore[arg-type]
-    with pytest.raises(FileNotFoundError, match="there is no folder"):
+    with pytest.raises(FileNotFoundError, match=wording.THERE_IS_NO_FOLDER):
         bp.page(bp.fit(small(), bp.simulate(small())), tmp_path / "none" / "a.html")
 
 

@@ -8,6 +8,8 @@ from pathlib import Path
 import pytest
 from ballplate.presentation.svg import drawing, placed_axes, save
 
+from tests.extensions.pages import wording
+
 pytest.importorskip("matplotlib", reason="pictures need matplotlib")
 
 
@@ -36,5 +38,5 @@ def test_a_picture_that_stands_alone_needs_no_fonts(tmp_path: Path) -> None:
 
 
 def test_other_endings_are_refused(tmp_path: Path) -> None:
-    with pytest.raises(ValueError, match="should end in one of"):
+    with pytest.raises(ValueError, match=wording.SHOULD_END_IN_ONE):
         drawn(tmp_path / "one.jpg")

@@ -22,6 +22,7 @@ import numpy as np
 import pytest
 from ballplate.extensions.pages import embedded
 
+from tests.extensions.pages import wording
 from tests.extensions.pages.browser import Browser, browser, program
 from tests.extensions.pages.pages_read import ResultPage
 from tests.extensions.pages.test_result_pages import CHANGED, FOUR, NAMES, small
@@ -202,9 +203,9 @@ def test_views_are_written(tmp_path: Path) -> None:
     assert shown.page.startswith("<!DOCTYPE html>") and "data-view" not in shown.page
     with pytest.raises(ValueError, match=r"as \.html or \.svg, unlike .*a\.png"):
         view.save(tmp_path / "a.png")
-    with pytest.raises(FileNotFoundError, match="there is no folder"):
+    with pytest.raises(FileNotFoundError, match=wording.THERE_IS_NO_FOLDER):
         view.save(tmp_path / "none" / "a.svg")
-    with pytest.raises(TypeError, match="neither an experiment nor the path"):
+    with pytest.raises(TypeError, match=wording.NEITHER_AN_EXPERIMENT_NOR_THE_PATH):
         bp.view(3)  # type: ignore[arg-type]
 
 

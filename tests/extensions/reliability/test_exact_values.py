@@ -11,6 +11,8 @@ import numpy as np
 import pytest
 import yaml
 
+from tests.extensions.reliability import wording
+
 QUICKSTART = Path("designs/quickstart.yaml")
 SIDE, DIAGONAL = 750.0, float(np.hypot(750.0, 750.0))
 FIVE = {
@@ -70,7 +72,7 @@ def test_an_exact_value_that_is_wrong_is_named_as_one_that_is_let_go_shows_it(
     (one,) = suspected(fit)
     assert one["kind"] == "distance" and " to ".join(pair) in one["name"]
     more = "long" if wrong > right[pair] else "short"
-    assert "is stated as exact and would have to be" in one["words"]
+    assert wording.IS_STATED_AS_EXACT_AND_WOULD in one["words"]
     assert f"too {more}" in one["words"] and "check the certificate" in one["words"]
     # Without the value, the readings tell the distance.
     others = {key: value for key, value in right.items() if key != pair}

@@ -22,6 +22,7 @@ from ballplate.simulator.estimation.gauss_newton import estimate, linearised_fit
 from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.machines.arrangement import ARRANGEMENTS
 
+from tests.extensions.reliability import wording
 from tests.extensions.reliability.designs import experiment
 from tests.extensions.reliability.offsets import (
     DESIGNS,
@@ -106,10 +107,8 @@ def test_a_probe_of_one_position_may_be_an_artefact_that_moved(folder: Path) -> 
     text = text.replace("quarter_turns: 1, probes: [right]", both)
     given = Plan(lay_out(experiment(folder, text)))
     (said,) = sentences(given, mistake(given, "x of left by 10 mm"), 7)
-    assert "the offset of probe left is another one (x is -40 mm, not -50 mm)" in said
-    assert said.endswith(
-        "; or the artefact moved in position near between the probes: read it again"
-    )
+    assert wording.THE_OFFSET_OF_PROBE_LEFT in said
+    assert said.endswith(wording.OR_THE_ARTEFACT_MOVED_IN_POSITION)
 
 
 def test_nothing_is_estimated_anew_where_nothing_is_unexplained(
@@ -136,13 +135,13 @@ def other_machine(tmp_path_factory: pytest.TempPathFactory) -> tuple[bp.Experime
 def test_fit_names_another_arrangement(other_machine: tuple[bp.Experiment, object]) -> None:
     found = bp.fit(*other_machine)
     (words,) = diagnosis_words(found.diagnosis)
-    assert found.too_large and "the arrangement of the axes is MB1" in words
+    assert found.too_large and wording.THE_ARRANGEMENT_OF_THE_AXES in words
     right = bp.fit(other_machine[0].with_({"error_model.arrangement": "MB1"}), other_machine[1])
     assert found.diagnosis.refit is not None
     assert found.diagnosis.refit.times == pytest.approx(right.sigma, rel=1e-6)
     (data,) = found.to_dict()["suspected"]
-    assert data["kind"] == "arrangement" and data["name"] == "the arrangement of the axes is MB1"
-    assert any("see what is suspected" in one for one in found.cautions)
+    assert data["kind"] == "arrangement" and data["name"] == wording.THE_ARRANGEMENT_OF_THE_AXES
+    assert any(wording.SEE_WHAT_IS_SUSPECTED in one for one in found.cautions)
 
 
 def test_ladder_names_another_arrangement_before_richer_models(
@@ -151,7 +150,7 @@ def test_ladder_names_another_arrangement_before_richer_models(
     observed = bp.fit(*other_machine).observed
     found = compared_models(other_machine[0], observed, most=4)
     assert found.is_none and found.to_dict()["recommended"] is None
-    assert "the arrangement of the axes is MB1" in found.verdict()[0]
+    assert wording.THE_ARRANGEMENT_OF_THE_AXES in found.verdict()[0]
     assert "pitch" not in " ".join(found.lines())
 
 

@@ -14,6 +14,8 @@ import numpy as np
 import pytest
 from ballplate.cli import main
 
+from tests.extensions.reliability import wording
+
 QUICKSTART = "designs/quickstart.yaml"
 Rows = list[dict[str, str]]
 
@@ -23,12 +25,9 @@ def test_table_of_the_quickstart(tmp_path: Path, capsys: pytest.CaptureFixture[s
     assert main(["run", "--reliability", QUICKSTART, "-o", str(table)]) == 0
     out = capsys.readouterr().out
     assert "754 observations; redundancy 580.0 in total" in out
-    assert "estimated from the other residuals: 4.152 standard deviations" in out
-    assert (
-        "cannot be detected, harmless: offset x of probe down, offset y of probe down, offset z of"
-        " probe down" in out
-    )
-    assert "DANGEROUS" not in out and "scale of the certificate of plate" in out
+    assert wording.ESTIMATED_FROM_THE_OTHER_RESIDUALS in out
+    assert wording.CANNOT_BE_DETECTED in out
+    assert "DANGEROUS" not in out and wording.SCALE_OF_THE_CERTIFICATE_OF_PLATE in out
     rows = list(csv.DictReader(table.read_text(encoding="utf-8").splitlines()))
     assert len(rows) == 754
     assert {row["unit"] for row in rows} == {"um"} and "MDB, µm" in out
@@ -112,7 +111,7 @@ def test_one_table_is_of_one_experiment(tmp_path: Path, capsys: pytest.CaptureFi
         )
         == 2
     )
-    assert "choose one with --variant: length known, " in capsys.readouterr().err
+    assert wording.CHOOSE_ONE_WITH_VARIANT in capsys.readouterr().err
     own = tmp_path / "own.yaml"
     own.write_text(Path(QUICKSTART).read_text(encoding="utf-8"), encoding="utf-8")
     assert main(["run", "--reliability", str(own), "-o", str(own)]) == 2
@@ -302,7 +301,7 @@ def test_a_restless_position_is_no_set_of_single_readings(
     for sigma in ("given", "estimated"):
         (one,) = suspected(restless, sigma, clean, tmp_path, capsys)
         assert (
-            one["kind"] == "scatter" and one["name"] == "scatter of the readings in position x high"
+            one["kind"] == "scatter" and one["name"] == wording.SCATTER_OF_THE_READINGS_IN_POSITION
         )
         # With 150 readings the ratio is known to about a twelfth.
         assert one["value"] == pytest.approx(3.0, abs=0.8)
@@ -313,10 +312,7 @@ def test_a_wave_in_a_scale_is_laid_to_the_model(
 ) -> None:
     for sigma in ("given", "estimated"):
         (one,) = suspected(waves, sigma, clean, tmp_path, capsys)
-        assert (
-            one["kind"] == "model"
-            and "the best explanation is an error in x that depends on x" in one["words"]
-        )
+        assert one["kind"] == "model" and wording.THE_BEST_EXPLANATION_IS_AN_ERROR in one["words"]
         assert one["value"] > 1.5 and one["lines"] == []
 
 

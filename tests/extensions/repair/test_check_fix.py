@@ -17,6 +17,7 @@ from ballplate.cli import main
 from ballplate.results.checked_designs import check
 from ballplate.simulator.experiment.loading import load
 
+from tests.extensions.repair import wording
 from tests.reference.copies import copy_file
 
 SYMMETRICAL = Path("designs/npl/6.1.1.yaml").resolve()
@@ -130,7 +131,7 @@ def test_each_file_is_mended_by_itself(folder: Path, capsys: pytest.CaptureFixtu
         " change; change it by hand"
     ]
     # What is not mended is told as by --suggest.
-    assert "rank deficiency 2" in out and "repair 1, in the file: positions[straight]: " in out
+    assert "rank deficiency 2" in out and wording.REPAIR_IN_THE_FILE in out
     assert (folder / "commented.yaml").read_text(encoding="utf-8") == COMMENTED
     assert deficiencies(folder / "shifted.yaml") == [0]
     assert (folder / "good.yaml").read_bytes() == before
@@ -147,9 +148,9 @@ def test_what_cannot_be_repaired_is_told_as_it_is_suggested(
     for option in ("--suggest", "--fix"):
         status = run("check", option, path, "--variant", "one height")
         found.append((status, capsys.readouterr().out))
-    assert found[0] == found[1] and "no changes were found" in found[0][1]
+    assert found[0] == found[1] and wording.NO_CHANGES_WERE_FOUND in found[0][1]
     assert path.read_bytes() == text
-    with pytest.raises(bp.ExperimentError, match="no changes were found"):
+    with pytest.raises(bp.ExperimentError, match=wording.NO_CHANGES_WERE_FOUND):
         bp.repair(path, "one height")
     assert run("check", "--diff", path, "--variant", "one height") == 0
     assert capsys.readouterr().out == ""
@@ -162,7 +163,7 @@ def test_data_of_a_mended_file(folder: Path, capsys: pytest.CaptureFixture[str])
     data = json.loads(capsys.readouterr().out)
     assert data["rank_deficiency"] == 0 and data["repairs"] is None
     assert run("check", "--diff", "--json", "shifted.yaml") == 2
-    assert "--diff does not go with --format json" in capsys.readouterr().err
+    assert wording.DIFF_DOES_NOT_GO_WITH_FORMAT in capsys.readouterr().err
 
 
 def test_links_and_permissions_stay(folder: Path) -> None:
@@ -193,7 +194,7 @@ def test_a_failure_loses_nothing(
     assert sorted(os.listdir(folder)) == ["commented.yaml", "good.yaml", "shifted.yaml"]
     assert "repaired: " not in err and "\nfull rank" not in out
     if isinstance(error, OSError):
-        assert status == 3 and "the file there is as it was" in err
+        assert status == 3 and wording.THE_FILE_THERE in err
     else:
         assert status == 130 and err == "interrupted; no file was written\n"
 
@@ -232,7 +233,7 @@ def test_a_file_that_changes_meanwhile_is_left(
 
     monkeypatch.setattr(mending, "mended", slow)
     assert run("check", "--fix", path) == 3
-    assert "the file has changed meanwhile; nothing was written" in capsys.readouterr().err
+    assert wording.THE_FILE_HAS_CHANGED_MEANWHILE in capsys.readouterr().err
     assert path.read_text(encoding="utf-8") == "title: other\n"
 
 

@@ -19,6 +19,7 @@ from ballplate.simulator.inputs.messages import ExperimentError
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from tests.extensions.repair import wording
 from tests.reference.yaml_styles import COMMENTS, Writer, lines_ended, plain
 
 SOURCE = Path("example.yaml")
@@ -235,7 +236,7 @@ def test_a_text_that_does_not_say_what_was_found_is_refused() -> None:
         {key: item for key, item in edit.value.items() if key != "quarter_turns"},
         {**edit.value, "quarter_turns": 2},
     ):
-        with pytest.raises(ExperimentError, match="cannot be written as it was made"):
+        with pytest.raises(ExperimentError, match=wording.CANNOT_BE_WRITTEN_AS_IT_WAS):
             mended(text, SOURCE, None, replace(repair, edits=(replace(edit, value=value),)))
 
 

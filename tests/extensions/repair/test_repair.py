@@ -38,6 +38,7 @@ from ballplate.uncertainty.scale import with_offsets
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+from tests.extensions.repair import wording
 from tests.reference import dense
 
 NPL = Path("designs/npl")
@@ -235,21 +236,19 @@ def test_a_model_is_not_made_poorer_where_more_readings_help(tmp_path: Path) -> 
         assert dense.spread(whole).deficiency == 0
     # Where a poorer model is offered, its words say what becomes of the rest.
     words = [one.words for one in offers(experiment)[ChangeKind.MODEL]]
-    assert words and all(one.endswith("taking the others as zero") for one in words)
-    assert not any("ask for 1 coefficient of rotational" in one for one in words)
+    assert words and all(one.endswith(wording.TAKING_THE_OTHERS_AS_ZERO) for one in words)
+    assert not any(wording.ASK_FOR_COEFFICIENT_OF_ROTATIONAL in one for one in words)
 
 
 def test_words_name_errors_and_positions() -> None:
     experiment = design("npl/6.1.1", "B")
     lines = repair_lines(repaired("npl/6.1.1", "B"), check(experiment).verdict)
     first, written = lines[:2]
-    assert 'repair 1: turn position "z low" by one quarter-turn; and calibrate the dist' in first
-    assert "full rank, and nothing is weakly determined; average U6 0.2" in first
+    assert wording.REPAIR_TURN_POSITION_BY_ONE_QUARTER in first
+    assert wording.FULL_RANK_AND_NOTHING_IS_WEAKLY in first
     assert "; removes undetermined 1 and 2 (" in first and "scale rests" not in first
-    assert all(name in first for name in ("EXX", "EYY", "EZZ", "smallest singular value 0.0"))
-    assert written.startswith(
-        "repair 1, in the file: positions[z low]: {name: z low, plane: z, level: 100 mm, corner: "
-    )
+    assert all(name in first for name in ("EXX", "EYY", "EZZ", wording.SMALLEST_SINGULAR_VALUE))
+    assert written.startswith(wording.REPAIR_IN_THE_FILE_POSITIONS)
     kinds = [[one.kind for one in each.changes] for each in repaired("npl/6.1.1", "B").complete]
     assert kinds == [
         [ChangeKind.MOVE, ChangeKind.CERTIFICATE],
@@ -402,7 +401,7 @@ def test_an_unknown_scale_needs_a_length(tmp_path: Path) -> None:
     assert found is not None
     for repair in found.complete:
         words = " ".join(change.words for change in repair.changes)
-        assert "calibrate the " in words or "a new probe too" in words
+        assert "calibrate the " in words or wording.A_NEW_PROBE in words
 
 
 @pytest.mark.parametrize("variant, most", [("A w=0.01", 1), ("C w=0.01", 1)])
@@ -426,7 +425,7 @@ def test_nothing_to_repair() -> None:
 def test_what_cannot_be_repaired_says_what_was_tried() -> None:
     experiment = design("hurt_foss/bryan-gauge", "one plane")
     (line,) = repair_lines(repairs(experiment), check(experiment).verdict)
-    assert line.startswith("repair: no changes were found that determine everything; ")
+    assert line.startswith(wording.NO_CHANGES_WERE_FOUND_THAT_DETERMINE)
 
 
 def test_sets_that_were_tried_are_counted_once() -> None:
@@ -518,12 +517,12 @@ def from_pool(experiment: Experiment, pool: Pool) -> list[str]:
 def test_the_cheapest_of_a_pool() -> None:
     experiment = design("npl/6.1.1", "B")
     assert from_pool(experiment, pool_of(experiment, [60.0, 5400.0, 1800.0])) == [
-        'add "aside" of the pool (30 min)'
+        wording.ADD_OF_THE_POOL_MIN
     ]
     # Of the two only as many as the limits leave.
     no_more = (AtMost((4, 6), 0),)
     pool = pool_of(experiment, [60.0, 5400.0, 1800.0], no_more)
-    assert from_pool(experiment, pool) == ['add "turned" of the pool (1.5 h)']
+    assert from_pool(experiment, pool) == [wording.ADD_OF_THE_POOL]
 
 
 def test_what_costs_nothing_is_told_before_what_the_pool_has_a_price_for() -> None:

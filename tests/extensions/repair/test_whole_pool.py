@@ -21,6 +21,7 @@ from ballplate.simulator.experiment.model import Experiment, Position
 from ballplate.simulator.experiment.pool import placed_only, with_chosen
 from ballplate.simulator.inputs.messages import refused
 
+from tests.extensions.repair import wording
 from tests.planning.random_pools import random_pool
 from tests.reference import dense
 
@@ -160,13 +161,13 @@ def test_words_that_cannot_be_had_do_not_stop_a_plan(
     arguments = ["plan", path, "--positions", "6", "--workers", "1"]
     assert main(arguments) == 1
     told = capsys.readouterr().out
-    assert "even all 8 candidates" in told and "what would determine it" in told
+    assert "even all 8 candidates" in told and wording.WHAT_WOULD_DETERMINE in told
     monkeypatch.setattr(whole_pool, "repairs", refuses)
     assert main(arguments) == 1
     assert "even all 8 candidates" in capsys.readouterr().out
     monkeypatch.setattr(whole_pool, "MOST_WORK", 1.0)
     assert main(arguments) == 1
-    assert "were not looked for in so large a design" in capsys.readouterr().out
+    assert wording.WERE_NOT_LOOKED_FOR_IN_SO in capsys.readouterr().out
     monkeypatch.setattr(whole_pool, "check", refuses)
     assert main(arguments) == 1
     without = capsys.readouterr().out.splitlines()
@@ -186,8 +187,8 @@ def test_plan_says_so_and_of_offsets_that_carry_the_scale(
     written(tmp_path, more="expected_rank_deficiency: 2\n")
     assert main(["plan", path, "--positions", "6", "--workers", "1"]) == 0
     out = capsys.readouterr().out
-    assert "even all 8 candidates together leave 2 directions undetermined (EAZ, ECZ, EYZ)" in out
-    assert "the file expects that" in out and "the scale rests on probe offsets" in out
+    assert wording.EVEN_ALL_CANDIDATES_TOGETHER_LEAVE_DIRECTIONS in out
+    assert wording.THE_FILE_EXPECTS in out and wording.THE_SCALE_RESTS_ON_PROBE_OFFSETS in out
 
 
 def test_a_pool_that_determines_nothing_is_refused_with_what_it_lacks(
@@ -196,12 +197,10 @@ def test_a_pool_that_determines_nothing_is_refused_with_what_it_lacks(
     path = str(written(tmp_path, "down"))
     assert main(["plan", path]) == 3
     told = capsys.readouterr().err
-    assert "no selection determines any of it" in told and "together leave" in told
-    assert "what would determine it" in told and "with a new probe too" in told
+    assert wording.NO_SELECTION_DETERMINES_ANY in told and "together leave" in told
+    assert wording.WHAT_WOULD_DETERMINE in told and wording.WITH_A_NEW_PROBE in told
     assert main(["check", path]) == 3
-    assert (
-        "positions: empty; add positions, or choose some from the pool" in capsys.readouterr().err
-    )
+    assert wording.EMPTY_ADD_POSITIONS in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(

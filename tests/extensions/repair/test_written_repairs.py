@@ -20,6 +20,8 @@ from ballplate.results.checked_designs import check, predict
 from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.experiment.model import Experiment
 
+from tests.extensions.repair import wording
+
 TRIAL = "1 um"
 PLANES = {"x": ("right", "yz"), "y": ("back", "zx"), "z": ("down", "xy")}
 
@@ -110,9 +112,9 @@ def check_written(said: dict[str, Any], folder: Path) -> tuple[Repair, ...]:
         assert not judged.verdict.deficiency and len(judged.verdict.weak) == repair.weak
         assert f"average U6 {average(after)} µm" in line
         assert judged.scale is not None
-        assert judged.scale.rests_on_offsets == ("scale rests on probe offsets" in line)
+        assert judged.scale.rests_on_offsets == (wording.SCALE_RESTS_ON_PROBE_OFFSETS in line)
         if judged.scale.rests_on_offsets:
-            assert judged.table_lines()[2].startswith("warning: the scale rests on probe offsets")
+            assert judged.table_lines()[2].startswith(wording.THE_SCALE_RESTS_ON_PROBE_2)
         loose = re.search(r"average U6 [\d.e+-]+ µm, ([\d.e+-]+) µm with 1 µm on the exact", line)
         if variant is None and len(after.probes) > 1:
             changed = with_uncertain_offsets(yaml.safe_load(text))

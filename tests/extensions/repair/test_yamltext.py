@@ -12,6 +12,7 @@ from ballplate.simulator.inputs.messages import ExperimentError
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from tests.extensions.repair import wording
 from tests.reference.yaml_styles import COMMENTS, Writer, lines_ended, plain
 
 WORDS = ["z low", "Prüfkörper", "a: b", "# no comment", "1e-3", "on", "125 mm", "β, γ", "it's", ""]
@@ -122,7 +123,7 @@ def test_all_stays_beside_what_is_removed(random: Random, has_comments: bool) ->
         after = with_changes(text, "f", [TextChange(path, kind="remove")])
     except ExperimentError as error:
         assert has_comments
-        assert "a comment here would be lost" in str(error)
+        assert wording.A_COMMENT_HERE_WOULD in str(error)
         return
     assert is_kept(after, text)
     assert plain(after) == expected

@@ -15,6 +15,7 @@ from ballplate.extensions.reproduction.score import Score, scores
 from tests.certified.experiment_text import files
 from tests.certified.make import dumped, made
 from tests.certified.problems import PROBLEMS
+from tests.extensions.reproduction import wording
 
 FOLDER = Path(__file__).parents[3] / "designs" / "certified"
 # Those that take a second or less, and the rest, a minute or more each.
@@ -143,7 +144,7 @@ def test_unknown_problem_and_empty_folder(
     )
     assert '"two-dimensions"' in capsys.readouterr().err
     assert main(["reproduce", "certified", "--designs", str(tmp_path)]) == 3
-    assert "no certified problems here" in capsys.readouterr().err
+    assert wording.NO_CERTIFIED_PROBLEMS_HERE in capsys.readouterr().err
     assert main(["reproduce", "npl", "--results", "x.json"]) == 2
 
 
@@ -191,7 +192,7 @@ def test_a_problem_that_is_none_is_named(
     assert (
         main(["reproduce", "certified", "--designs", str(FOLDER), "--results", str(results)]) == 3
     )
-    assert 'no problem "three planes"; did you mean "three-planes"?' in capsys.readouterr().err
+    assert wording.NO_PROBLEM_DID_YOU_MEAN in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(

@@ -10,6 +10,8 @@ import pytest
 from ballplate.cli import main
 from ballplate.extensions.reproduction.published import npl
 
+from tests.extensions.reproduction import wording
+
 NPL = ["reproduce", "npl"]
 
 
@@ -97,7 +99,7 @@ def test_markdown(capsys: pytest.CaptureFixture[str]) -> None:
 def test_estimators_of_distances(capsys: pytest.CaptureFixture[str]) -> None:
     main([*NPL, "--experiment", "6.2.7", "--trials", "3"])
     out, _ = capsys.readouterr()
-    assert "the quantiles of 3 data sets" in out
+    assert wording.THE_QUANTILES_OF_DATA_SETS in out
     rows = [line for line in out.splitlines() if line.startswith(("5 x 5 ", "7 x 7 "))]
     assert len(rows) == 4 and max(map(len, rows)) <= 80
 
@@ -108,14 +110,14 @@ def test_what_differs_is_seen(capsys: pytest.CaptureFixture[str], tmp_path: Path
         changed = text.replace("repeatability: 0.2 um", "repeatability: 0.3 um")
         (tmp_path / f"{name}.yaml").write_text(changed, encoding="utf-8")
     assert main([*NPL, "--experiment", "6.1.2", "--designs", str(tmp_path)]) == 1
-    assert "NOT everything compared agrees" in capsys.readouterr().out
+    assert wording.NOT_EVERYTHING_COMPARED_AGREES in capsys.readouterr().out
 
 
 def test_wrong_usage(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     assert main([*NPL, "--experiment", "6.2.9"]) == 2
-    assert 'no experiment "6.2.9"; did you mean' in capsys.readouterr().err
+    assert wording.NO_EXPERIMENT_DID_YOU_MEAN in capsys.readouterr().err
     assert main([*NPL, "--designs", str(tmp_path / "none")]) == 3
-    assert "no such folder; name that of the shipped designs" in capsys.readouterr().err
+    assert wording.NO_SUCH_FOLDER in capsys.readouterr().err
     assert main([*NPL, "--designs", str(tmp_path)]) == 3
     out, err = capsys.readouterr()
     assert out == "" and "5.2.yaml" in err

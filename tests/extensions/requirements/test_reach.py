@@ -21,6 +21,8 @@ from ballplate.results.prediction import Prediction
 from ballplate.simulator.experiment.loading import load
 from scipy.optimize import brentq
 
+from tests.extensions.requirements import wording
+
 TEXT = (
     Path("designs/quickstart.yaml")
     .read_text(encoding="utf-8")
@@ -129,9 +131,7 @@ def test_where_no_certificate_does_the_limit_is_that_of_an_exact_one(tmp_path: P
     limit = average(tmp_path, (CERTIFICATE, "standard_uncertainty: 0.00001 um"))
     found = answer(tmp_path, Goal("quantity", limit=0.99 * limit), "certificate")
     assert found.status == "none" and f"average U6 {1e6 * limit:.4g}" in found.outcome
-    assert found.remarks == (
-        "an exact one would not be better: ten times that gives the same result",
-    )
+    assert found.remarks == (wording.AN_EXACT_ONE_WOULD,)
     found = answer(tmp_path, Goal("quantity", limit=1.0), "certificate")
     assert found.status == "any"
 
@@ -144,9 +144,7 @@ def test_the_size_is_the_smallest_that_does(tmp_path: Path) -> None:
     for size, does in ((edge, True), (edge - 1, False)):
         value = average(tmp_path, ("[750 mm, 750 mm]", f"[{size} mm, {size} mm]"))
         assert (value <= 1.2 * present) is does
-    assert found.remarks[0].startswith(
-        "from 752 mm x 752 mm on, the file is invalid: positions[1]: reading ball"
-    )
+    assert found.remarks[0].startswith(wording.FROM_MM_MM)
 
 
 @pytest.mark.parametrize("drawn", [(4, 4), (4, 3), (3, 5)])
@@ -219,7 +217,7 @@ def test_balls_that_are_named_set_limits_to_their_number(tmp_path: Path) -> None
     found = answer(tmp_path, "U6 average 0.08 um", "balls", text)
     assert found.is_met and found.value > 4  # type: ignore[operator]
     assert 'unknown ball "r' in found.remarks[0] and found.remarks[0].startswith(
-        "the file is invalid with 2 x 2, 3 x 2"
+        wording.THE_FILE_IS_INVALID
     )
 
 
@@ -262,12 +260,12 @@ def test_what_the_file_does_not_have(tmp_path: Path) -> None:
     experiment = load(file)[0]
     with pytest.raises(GoalError, match="states no target_uncertainty"):
         reach(experiment, Goal())
-    with pytest.raises(GoalError, match="the file has no tasks"):
+    with pytest.raises(GoalError, match=wording.THE_FILE_HAS_NO_TASKS):
         reach(experiment, Goal("tasks"))
     goal = parse_goal("U6 average 1 um")
     with pytest.raises(NotVariableError, match="states no calibration"):
         reach(experiment, goal, ("certificate",))
-    with pytest.raises(NotVariableError, match='unknown artefact "plat"; did you mean "plate"?'):
+    with pytest.raises(NotVariableError, match=wording.UNKNOWN_ARTEFACT_DID_YOU_MEAN):
         reach(experiment, goal, ("size",), artefact="plat")
     found = reach(experiment, goal, ("certificate", "repeats")).answers
     assert [one.status for one in found] == ["varied", "any"]
@@ -279,7 +277,7 @@ def test_the_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None
     out, err = capsys.readouterr()
     assert err == "" and out.splitlines()[1] == "goal: average U6 at most 0.09 µm"
     assert any(
-        line.startswith("repeats of every reading") and "at least " in line
+        line.startswith(wording.REPEATS_OF_EVERY_READING) and "at least " in line
         for line in out.splitlines()
     )
     assert (

@@ -13,6 +13,8 @@ import pytest
 from ballplate.cli import main
 from numpy.testing import assert_allclose
 
+from tests.extensions.splines import wording
+
 TABLE = Path("designs/gilsinn/table-1.csv")
 RADIUS = 0.037084
 CENTRE = np.array([0.0, -0.037084])
@@ -63,10 +65,10 @@ def test_nominal_points_between_the_measured_ones(tmp_path: Path) -> None:
     assert_allclose(found.errors, curve.values(lengths), atol=2e-9)
     assert_allclose(found.normals, (places - CENTRE) / RADIUS, atol=1e-5)
     file.write_text("nominal_x_mm,nominal_z_mm\n36,-30\n")
-    with pytest.raises(bp.ExperimentError, match="is not on the profile"):
+    with pytest.raises(bp.ExperimentError, match=wording.IS_NOT_ON_THE_PROFILE):
         curve.compensated(file)
     file.write_text("nominal_x_mm,nominal_z_mm\n37.084,-37.084\n")
-    with pytest.raises(bp.ExperimentError, match="is not on the profile"):
+    with pytest.raises(bp.ExperimentError, match=wording.IS_NOT_ON_THE_PROFILE):
         curve.compensated(file)
 
 
@@ -74,7 +76,7 @@ def test_a_corner_is_where_the_compensated_features_cross(tmp_path: Path) -> Non
     curve = bp.spline(
         part(tmp_path / "part.csv"), corner=["20 mm, 0 mm"], straight=[1, 2], knots="none"
     )
-    assert "features meet at a corner at 20 mm, with errors 10 µm and 4 µm" in str(curve)
+    assert wording.FEATURES_MEET_AT_A_CORNER in str(curve)
     assert curve.curve.fit.free == 4
     found = curve.compensated()
     assert found.names[-1] == "corner 1"
@@ -155,4 +157,4 @@ def test_the_command_writes_the_points(tmp_path: Path, capsys: pytest.CaptureFix
     assert float(found[-1]["compensated_x_mm"]) == pytest.approx(19.996, abs=5e-6)
     capsys.readouterr()
     assert main([*command, "--nominal", str(file)]) == 2
-    assert "--nominal is for --compensated" in capsys.readouterr().err
+    assert wording.NOMINAL_IS_FOR_COMPENSATED in capsys.readouterr().err

@@ -9,6 +9,8 @@ import pytest
 from ballplate.extensions.splines.read_points import Column, choose_points, read_points
 from ballplate.simulator.inputs.messages import ExperimentError
 
+from tests.extensions.splines import wording
+
 
 @pytest.fixture
 def write(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
@@ -53,7 +55,7 @@ def test_a_profile_an_uncertainty_and_a_choice_of_errors(write: Path) -> None:
     along_z = read_points(write, x="z", y="first")
     assert along_z.x is not None and along_z.x.tolist() == [0.0254, 0.0254]
     assert told(write, write.read_text(encoding="utf-8")) == [
-        "data.csv:1:1: several columns may be the error: first, second; choose one with --y"
+        wording.SEVERAL_COLUMNS_MAY_BE_THE_ERROR
     ]
 
 
@@ -66,29 +68,21 @@ def test_normals_of_the_drawing(write: Path) -> None:
     np.testing.assert_allclose(points.normals, [[0.6, 0.8], [-1.0, 0.0]])
     np.testing.assert_allclose(points.chosen([1]).normals, [[-1.0, 0.0]])
     assert told(write, "x_mm,z_mm,error_um,normal_x,normal_z\n1,1,2,0,0\n2,1,2,a,1\n") == [
-        'data.csv:2:7: "0" and "0" are not a direction; give its components, such as 0.6 and 0.8',
-        'data.csv:3:7: "a" is not a number; write for example "500.0003"',
+        wording.AND_ARE_NOT,
+        wording.IS_NOT_A_NUMBER_WRITE,
     ]
-    assert told(write, "x_mm,z_mm,error_um,normal_x\n1,1,2,0\n") == [
-        "data.csv:1:1: a normal has two parts; add the other of normal_x and normal_z"
-    ]
+    assert told(write, "x_mm,z_mm,error_um,normal_x\n1,1,2,0\n") == [wording.A_NORMAL_HAS_TWO]
 
 
 def test_rows_with_mistakes_are_told_all_at_once(write: Path) -> None:
     text = "point,position_mm,error_um,u_um\n1,0,1,0.1\n1,1,x,0.1\n3,2,,0.1\n4,3\n5,4,1,0\n6,5,2,1e30\n"
     assert told(write, text) == [
-        'data.csv:3:5: "x" is not a number; write for example "500.0003"',
-        'data.csv:3:1: a second point "1", as in line 2; rename one',
-        "data.csv:4:5: no error; write a number, or remove the line",
-        (
-            "data.csv:5:1: 2 columns instead of 4; write one line per row, its columns separated by"
-            " commas"
-        ),
-        'data.csv:6:7: "0" is not a standard uncertainty; give one above zero',
-        (
-            'data.csv:7:7: "1e30" is beyond what can be computed with; write 0, or a length of'
-            " 1e-18 m to 1e+06 m"
-        ),
+        wording.IS_NOT_A_NUMBER,
+        wording.A_SECOND_POINT_AS_IN_LINE,
+        wording.NO_ERROR_WRITE,
+        (wording.COLUMNS_INSTEAD_OF_WRITE_ONE_LINE),
+        wording.IS_NOT_A_STANDARD,
+        (wording.IS_BEYOND_WHAT_CAN_BE_COMPUTED),
     ]
 
 
@@ -144,22 +138,17 @@ def test_files_that_cannot_be_used(
 
 def test_decimal_commas_and_semicolons_are_told(write: Path) -> None:
     assert told(write, 'position_mm,error_um\n10,2\n30,4,11\n40,"5,3"\n50;6\n60,7;8\n') == [
-        (
-            "data.csv:3:1: 3 columns instead of 2; if a comma is meant as the decimal point, write"
-            " a point, as in 4.11"
-        ),
+        (wording.COLUMNS_INSTEAD_OF_IF_A_COMMA),
         'data.csv:4:4: "5,3" has a decimal comma; write 5.3',
-        "data.csv:5:1: 1 columns instead of 2; separate them by commas",
-        'data.csv:6:4: "7;8" is not a number; separate the columns by commas',
+        wording.COLUMNS_INSTEAD_OF_SEPARATE_THEM,
+        wording.IS_NOT_A,
     ]
 
 
 def test_an_experiment_is_no_table(tmp_path: Path) -> None:
     path = tmp_path / "mine.yml"
     path.write_text("title: t\n", encoding="utf-8")
-    with pytest.raises(
-        ExperimentError, match="this is YAML, not a table; give a CSV file that begins with"
-    ):
+    with pytest.raises(ExperimentError, match=wording.THIS_IS_YAML):
         read_points(path)
 
 
@@ -174,5 +163,5 @@ def test_points_by_name(write: Path) -> None:
         choose_points(points, "4-6, enf, 1", "data.csv")
     assert [message.text for message in error.value.messages] == [
         'no points "4-6"; known: 1, 2, 3, 7, end',
-        'no point "enf"; did you mean "end"?',
+        wording.NO_POINT_DID_YOU_MEAN,
     ]

@@ -12,6 +12,8 @@ import numpy as np
 import pytest
 from ballplate.cli import main
 
+from tests.extensions.splines import wording
+
 PART = "designs/gilsinn/table-1.csv"
 DOME = (PART, "--y", "semi_finish_error", "--points", "12-32")
 TANGENT = "37.084 mm, -37.084 mm"
@@ -36,9 +38,9 @@ def test_text(capsys: pytest.CaptureFixture[str]) -> None:
     assert run(*DOME, "--start-slope", "0", "--evaluate", "0 mm, 20 mm") == 0
     out, err = capsys.readouterr()
     assert err == "" and max(map(len, out.splitlines())) <= 120
-    assert "table-1.csv: semi finish error against arc length, 21 points" in out
+    assert wording.SEMI_FINISH_ERROR_AGAINST_ARC_LENGTH in out
     assert "prescribed: slope 0 at 0 mm" in out
-    assert "cubic spline, 4 knots" in out and "7 free coefficients, 14 degrees of freedom" in out
+    assert "cubic spline, 4 knots" in out and wording.FREE_COEFFICIENTS_DEGREES_OF_FREEDOM in out
     assert out.splitlines()[-2].split()[:2] == ["0", "12.17"]
     assert out.splitlines()[-2].endswith("0 µm/mm")
 
@@ -110,7 +112,7 @@ def test_knots_keep_away_from_boundaries(
     assert run(tmp_path / "data.csv", "--boundary", "150 mm") == 0
     out = capsys.readouterr().out
     assert "4 knots at 40, 90, 190, 240 mm" in out
-    assert "features share value and slope at 150 mm; point 16 there belongs to both" in out
+    assert wording.FEATURES_SHARE_VALUE_AND_SLOPE in out
     # The feature's own end, without a boundary, is as equation (5) of the document has it.
     assert run(tmp_path / "data.csv", "--end", "155 mm", "--points", "1-16") == 0
     assert "3 knots at 40, 90, 140 mm" in capsys.readouterr().out
@@ -155,7 +157,7 @@ def test_nothing_is_told_of_uncertainty_without_degrees_of_freedom(
         "position_mm,error_um\n0,0\n1,2\n2,1\n4,0\n", encoding="utf-8"
     )
     assert run(tmp_path / "data.csv", "--plot", tmp_path / "plot.svg") == 0
-    assert "no degrees of freedom are left to estimate sigma from" in capsys.readouterr().out
+    assert wording.NO_DEGREES_OF_FREEDOM_ARE_LEFT in capsys.readouterr().out
     assert run(tmp_path / "data.csv", "--json", "--evaluate", "1 mm") == 0
     found = json.loads(capsys.readouterr().out)
     assert found["sigma"] is None and found["values"][0]["standard_uncertainty"] is None
@@ -229,7 +231,7 @@ def test_drawings(tmp_path: Path) -> None:
             and b"<title>semi finish error against arc length" in plot.read_bytes()
         )
         drawn = bars.read_text(encoding="utf-8")
-        assert "32 points, magnified 300 times; the largest is 94.17 µm" in drawn
+        assert wording.POINTS_MAGNIFIED_TIMES in drawn
     assert (tmp_path / "True/fit.svg").read_bytes() == (tmp_path / "False/fit.svg").read_bytes()
 
 
@@ -336,10 +338,7 @@ def test_many_points_are_fitted_and_too_many_coefficients_refused(
     assert run(tmp_path / "data.csv", "--every", "100", "--json") == 0
     assert json.loads(capsys.readouterr().out)["sigma"] < 1e-10
     assert run(tmp_path / "data.csv") == 3
-    assert (
-        "1603 coefficients are too many; at most 500 are possible, leave out knots"
-        in capsys.readouterr().err
-    )
+    assert wording.COEFFICIENTS_ARE_TOO_MANY in capsys.readouterr().err
 
 
 def test_points_at_the_same_place_are_named(
@@ -350,10 +349,7 @@ def test_points_at_the_same_place_are_named(
         f"nominal_x_mm,nominal_z_mm,error_um\n{rows}", encoding="utf-8"
     )
     assert run(tmp_path / "data.csv") == 3
-    assert (
-        "two neighbouring points are at (9 mm, 1 mm); leave one of them out"
-        in capsys.readouterr().err
-    )
+    assert wording.TWO_NEIGHBOURING_POINTS_ARE_AT_MM in capsys.readouterr().err
 
 
 def test_whiskers_need_a_profile(
@@ -362,14 +358,14 @@ def test_whiskers_need_a_profile(
     assert run(ring, "--whiskers", tmp_path / "a.svg") == 2
     assert "--whiskers needs a profile" in capsys.readouterr().err
     assert run(*DOME, "--plot", tmp_path / "missing" / "a.svg") == 3
-    assert "a.svg: cannot be written (No such file or directory)" in capsys.readouterr().err
+    assert wording.CANNOT_BE_WRITTEN in capsys.readouterr().err
 
 
 def test_a_picture_of_an_unknown_kind_is_refused(capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(SystemExit) as leave:
         run(*DOME, "--plot", "a.gif")
     assert leave.value.code == 2
-    assert "a picture's name ends in .svg, .png, .pdf" in capsys.readouterr().err
+    assert wording.A_PICTURES_NAME_ENDS in capsys.readouterr().err
 
 
 def test_help(capsys: pytest.CaptureFixture[str]) -> None:

@@ -17,6 +17,8 @@ from ballplate.extensions.studio.document import (
 )
 from ballplate.simulator.inputs.messages import ExperimentError
 
+from tests.extensions.studio import wording
+
 
 @pytest.fixture
 def design(tmp_path: Path) -> Path:
@@ -174,7 +176,7 @@ def test_what_an_action_lacks_is_told(design, action, words):
 
 
 def test_a_move_out_of_the_volume_is_refused_with_how_far(design):
-    with pytest.raises(ExperimentError, match="below the measuring volume"):
+    with pytest.raises(ExperimentError, match=wording.BELOW_THE_MEASURING_VOLUME):
         done(opened(design), {"do": "move", "position": "z low", "by": [0.0, 0.0, -0.4]})
 
 

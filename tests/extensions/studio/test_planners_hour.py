@@ -13,6 +13,7 @@ import ballplate as bp
 import pytest
 from ballplate.designs import shipped
 
+from tests.extensions.studio import wording
 from tests.extensions.studio.chromium import Studio, chromium, settled, tab, until
 
 pytest.importorskip("starlette", reason="the studio is an extra")
@@ -122,7 +123,7 @@ def test_an_hour(design: Path) -> None:
         design.write_bytes(written)
         page.click("#save")
         page.wait_for_selector("#notice.bad")
-        assert "has changed on disk" in page.inner_text("#notice")
+        assert wording.HAS_CHANGED_ON_DISK in page.inner_text("#notice")
         assert design.read_bytes() == written
         # Nor is the other window's design: this one shows it, and asks again.
         with page.context.new_page() as other:
@@ -154,11 +155,11 @@ def test_an_hour(design: Path) -> None:
             page.goto(again.address)
             until(page, "!!window.studio?.state()?.design")
             assert "full rank" in page.inner_text("#verdict")
-            assert "not saved in an earlier session" in page.inner_text("#notice")
+            assert wording.NOT_SAVED_IN_AN_EARLIER_SESSION in page.inner_text("#notice")
             assert page.evaluate("window.studio.state().text") == unsaved
             page.click("#save")
             page.wait_for_selector("#notice.bad")
-            assert "has changed on disk" in page.inner_text("#notice")
+            assert wording.HAS_CHANGED_ON_DISK in page.inner_text("#notice")
             page.click("#toggle-text")
             page.click("#reopen")
             until(page, "window.studio.state().saved")

@@ -17,6 +17,7 @@ from ballplate.extensions.studio.sweeping import swept
 from ballplate.simulator.inputs.messages import ExperimentError
 
 from tests.cli.cuts import ACTED, remains
+from tests.extensions.studio import wording
 
 MODEL = """import numpy as np
 from ballplate.models import Parameter, Reported
@@ -56,9 +57,7 @@ def test_what_was_not_saved_is_there_again_with_the_file_a_step_back(design):
     assert not kept_in(design).exists()
     session.act({"do": "turn", "position": "z low"})
     text = session.state()["text"]
-    assert unsaved(session) == (
-        "changes are not saved, and are in .plate.yaml.unsaved: the same command takes them up again"
-    )
+    assert unsaved(session) == (wording.CHANGES_ARE_NOT_SAVED_AND_ARE_IN_PLATE)
     assert kept_in(design).stat().st_mode & 0o077 == 0
     # The first session is gone without another word.
     again = Session(design)
@@ -69,7 +68,7 @@ def test_what_was_not_saved_is_there_again_with_the_file_a_step_back(design):
     assert not kept_in(design).exists()
     again.act({"do": "redo"})
     again.act({"do": "save"})
-    assert unsaved(again) == "nothing is left to be saved"
+    assert unsaved(again) == wording.NOTHING_IS_LEFT_TO_BE_SAVED
     assert design.read_text() == text and not kept_in(design).exists()
     assert Session(design).state()["note"] == ""
 
@@ -80,7 +79,7 @@ def test_a_file_that_has_changed_since_is_not_overwritten_by_what_was_not_saved(
     design.write_bytes(written)
     again = Session(design)
     assert "changed since" in again.state()["note"]
-    with pytest.raises(RefusedError, match="has changed on disk"):
+    with pytest.raises(RefusedError, match=wording.HAS_CHANGED_ON_DISK):
         again.act({"do": "save"})
     assert design.read_bytes() == written
     again.act({"do": "undo"})
@@ -216,7 +215,7 @@ def test_what_was_kept_before_the_folder_was_full_is_no_promise(design, monkeypa
     monkeypatch.setattr("ballplate.extensions.studio.recovery.write_files", fail)
     session.act({"do": "turn", "position": "x low"})
     assert kept_in(design).exists() and not session.state()["recoverable"]
-    assert "could not be kept" in unsaved(session)
+    assert wording.COULD_NOT_BE_KEPT in unsaved(session)
     monkeypatch.undo()
     assert session.state()["recoverable"]
 
@@ -241,9 +240,9 @@ def test_after_a_refused_save_the_last_words_say_where_the_changes_are(design):
     session = Session(design)
     session.act({"do": "turn", "position": "z low"})
     design.write_bytes(design.read_bytes() + b"# another hand\n")
-    with pytest.raises(RefusedError, match="has changed on disk"):
+    with pytest.raises(RefusedError, match=wording.HAS_CHANGED_ON_DISK):
         session.act({"do": "save"})
-    assert unsaved(session).startswith("changes are not saved, and are in .plate.yaml.unsaved")
+    assert unsaved(session).startswith(wording.CHANGES_ARE_NOT_SAVED)
 
 
 def test_a_folder_that_cannot_be_written_keeps_nothing_and_stops_nobody(design, monkeypatch):
@@ -255,7 +254,7 @@ def test_a_folder_that_cannot_be_written_keeps_nothing_and_stops_nobody(design, 
     session.act({"do": "turn", "position": "z low"})
     state = session.state()
     assert state["back"] == 1 and not state["recoverable"] and not kept_in(design).exists()
-    assert "could not be kept" in unsaved(session)
+    assert wording.COULD_NOT_BE_KEPT in unsaved(session)
 
 
 def test_a_folder_that_is_not_there_is_told(tmp_path):
@@ -336,7 +335,7 @@ def test_no_sweep_brings_a_model_in_python_into_a_file_that_was_not_named(design
     ):
         found = swept(session._document, axes, lambda step: None)
         assert all(cell["reason"] for cell in found["cells"])
-        assert len(axes) > 1 or "is code in Python" in found["cells"][0]["reason"]
+        assert len(axes) > 1 or wording.IS_CODE_IN_PYTHON in found["cells"][0]["reason"]
     assert not ran.exists()
 
 

@@ -17,6 +17,8 @@ from ballplate.results.checked_designs import predict
 from ballplate.simulator.experiment.loading import load
 from starlette.testclient import TestClient
 
+from tests.extensions.studio import wording
+
 PORT, TOKEN = 8123, "a-token-of-the-tests"
 HOME = f"http://127.0.0.1:{PORT}"
 
@@ -116,7 +118,7 @@ def test_files_outside_the_folder_are_refused(client, design, tmp_path_factory, 
     design.with_name("link.yaml").symlink_to(elsewhere)
     for action in ({"do": "open", "name": name}, {"do": "save", "name": name}):
         answer = client.post("/api/do", json=action).json()
-        assert "is not the name of a design in the folder" in answer["error"]
+        assert wording.IS_NOT_THE_NAME in answer["error"]
     assert elsewhere.read_bytes() == design.read_bytes()
 
 
@@ -130,7 +132,7 @@ def test_a_text_that_no_file_can_hold_is_refused(client):
     body = '{"do": "text", "text": "title: \\ud800 x"}'
     headers = {"Content-Type": "application/json"}
     answer = client.post("/api/do", content=body, headers=headers).json()
-    assert "is no character of a file" in answer["error"]
+    assert wording.IS_NO_CHARACTER in answer["error"]
     assert "error" not in client.get("/api/state").json()
 
 
@@ -170,7 +172,7 @@ def test_saving_over_what_another_program_wrote_is_refused(client, design):
     client.post("/api/do", json={"do": "turn", "position": "z low"})
     design.write_bytes(design.read_bytes() + b"# another hand\n")
     answer = client.post("/api/do", json={"do": "save"}).json()
-    assert "has changed on disk" in answer["error"]
+    assert wording.HAS_CHANGED_ON_DISK in answer["error"]
     assert design.read_bytes().endswith(b"# another hand\n")
     answer = client.post("/api/do", json={"do": "save", "name": "mine.yaml"}).json()
     assert answer["file"] == "mine.yaml" and answer["saved"]
@@ -190,7 +192,7 @@ def test_a_request_is_limited_though_its_length_is_not_stated(client, monkeypatc
 
     before = session.state()["text"]
     answer = client.post("/api/do", content=parts(), headers=headers)
-    assert answer.status_code == 413 and "leave some of it out" in answer.json()["error"]
+    assert answer.status_code == 413 and wording.LEAVE_SOME_OF_IT_OUT in answer.json()["error"]
     long = client.post("/api/do", content=b'{"do": "' + b"x" * 3000 + b'"}', headers=headers)
     assert long.status_code == 413
     assert session.state()["text"] == before

@@ -12,6 +12,8 @@ from ballplate.extensions.studio.sweeping import MOST_CELLS, ensure_possible, sw
 from ballplate.simulator.computing.steps import unreported
 from ballplate.simulator.inputs.messages import ExperimentError
 
+from tests.extensions.studio import wording
+
 
 @pytest.fixture
 def document(tmp_path: Path) -> DesignDocument:
@@ -122,7 +124,7 @@ def test_a_number_without_a_unit_is_refused_before_the_start(document):
         return [{"paths": [path], "values": list(values)}]
 
     for path in ("artefacts.plate.size[0]", "machine.repeatability"):
-        with pytest.raises(ActionError, match="400.* has no unit") as told:
+        with pytest.raises(ActionError, match=wording.HAS_NO_UNIT) as told:
             ensure_possible(document, axes(path, "1 um", "400"))
         assert str(told.value).startswith(f"{path}: ")
         ensure_possible(document, axes(path, "1 um", "400 um"))

@@ -18,6 +18,7 @@ from ballplate.extensions.sweeps.report.series import plots
 from ballplate.extensions.sweeps.report.store_comparison import IncomparableError, compared
 from ballplate.extensions.sweeps.store import open_store
 
+from tests.extensions.sweeps import wording
 from tests.extensions.sweeps.stores import axis, done, failed, made_up
 
 SIZES, BALLS, MODELS = (300.0, 400.0, 500.0), (4.0, 6.0), ("metric", "kinematic")
@@ -72,7 +73,7 @@ def test_settings_within_the_target_are_counted_and_the_cheapest_named(tmp_path:
 
 def test_none_that_meets_the_target_is_said_with_the_nearest(tmp_path: Path) -> None:
     found = answer(sweep(tmp_path, limit=0.0))
-    assert found.sentences[0].startswith("None of the 12 settings meets")
+    assert found.sentences[0].startswith(wording.NONE_OF_THE_SETTINGS_MEETS)
     assert "size 500 mm, balls 6, model metric, with 40 %" in found.sentences[0]
 
 
@@ -80,7 +81,7 @@ def test_what_is_undetermined_never_meets_the_target(tmp_path: Path) -> None:
     """The setting of the smallest average leaves lengths undetermined."""
     best = 2 * 2 * 2 + 2
     found = answer(sweep(tmp_path, open_=(best,)))
-    assert "1 of 12 settings leaves something undetermined." in found.sentences
+    assert wording.OF_SETTINGS_LEAVES_SOMETHING_UNDETERMINED in found.sentences
     rows = [one.headings for one in found.settings.blocks[0].rows]
     assert ("500 mm", "6", "metric") not in rows[: int(found.sentences[0].split()[0])]
 
@@ -111,7 +112,7 @@ def test_cells_that_leave_something_undetermined_are_hatched(tmp_path: Path) -> 
         one for one in heat_maps(results) if (one.rows.name, one.columns.name) == ("size", "balls")
     ]
     assert heat.shades[0][0] == DEFICIENT and "Hatched" in heat.note
-    assert "model metric, as in the best cell" in heat.note
+    assert wording.MODEL_METRIC_AS_IN_THE_BEST in heat.note
     flat = [shade for line in heat.shades for shade in line]
     assert flat.count(DEFICIENT) == 1 and BLANK not in flat
     expected = [[1e6 * average(size, balls, "metric") for balls in BALLS] for size in SIZES]
@@ -124,14 +125,12 @@ def test_the_same_settings_of_two_stores_are_compared(tmp_path: Path) -> None:
         (tmp_path / name).mkdir()
     here, there = sweep(tmp_path / "a"), sweep(tmp_path / "b", worse=1.25, open_=(5,))
     found = compared(here, there, "b.sqlite")
-    assert found.sentences[0].startswith("12 settings are done in both; 0 in this store alone")
-    assert found.sentences[1].startswith("In 1 of them some of U6 is undetermined in one or both")
-    assert "smaller than in b.sqlite in 11 of them, by a factor of 0.800." in found.sentences[2]
-    assert (
-        "0 settings are rank-deficient only in this store, 1 only in b.sqlite." in found.sentences
-    )
+    assert found.sentences[0].startswith(wording.SETTINGS_ARE_DONE_IN_BOTH_IN_THIS_STORE)
+    assert found.sentences[1].startswith(wording.IN_OF_THEM_SOME)
+    assert wording.SMALLER_THAN_IN_SQLITE in found.sentences[2]
+    assert wording.SETTINGS_ARE_RANK_DEFICIENT_ONLY in found.sentences
     same = compared(here, here, "a.sqlite")
-    assert same.sentences[1:] == ("All averages are the same.",) and same.settings is None
+    assert same.sentences[1:] == (wording.ALL_AVERAGES_ARE_THE_SAME,) and same.settings is None
 
 
 def test_sweeps_over_other_axes_are_not_compared(tmp_path: Path) -> None:
@@ -142,7 +141,7 @@ def test_sweeps_over_other_axes_are_not_compared(tmp_path: Path) -> None:
         axis("balls", [f"{one:.0f}" for one in BALLS], list(BALLS), "1"),
         axis("model", list(MODELS), [], ""),
     ]
-    with pytest.raises(IncomparableError, match="swept over balls, edge, model and"):
+    with pytest.raises(IncomparableError, match=wording.SWEPT_OVER_BALLS):
         compared(sweep(tmp_path / "a"), sweep(tmp_path / "b", axes=other), "b.sqlite")
 
 
@@ -165,8 +164,8 @@ def test_settings_are_the_same_in_whichever_unit_they_are_written(tmp_path: Path
         ),
     )
     found = compared(here, read_results(there, 1), "b.sqlite")
-    assert found.sentences[0].startswith("12 settings are done in both; 0 in this store alone, 0")
-    assert found.sentences[1] == "All averages are the same."
+    assert found.sentences[0].startswith(wording.SETTINGS_ARE_DONE_IN_BOTH)
+    assert found.sentences[1] == wording.ALL_AVERAGES_ARE_THE_SAME
 
 
 def test_values_that_differ_in_late_digits_are_settings_of_their_own(tmp_path: Path) -> None:
@@ -196,7 +195,7 @@ def test_values_that_differ_in_late_digits_are_settings_of_their_own(tmp_path: P
         )
         assert len(found.settings.blocks[0].rows) == count
     alone = compared(there, there, "b")
-    assert alone.sentences[1:] == ("1 average is the same.",)
+    assert alone.sentences[1:] == (wording.AVERAGE_IS_THE_SAME,)
 
 
 def random_sweep(path: Path, seed: int) -> None:
@@ -296,19 +295,21 @@ def _assert_first(
     meeting = [row for row in shares if float(row["U6_within_target"]) == 1.0]
     average = f"{symbol}_average_m"
     if symbol == "U4":
-        assert text.startswith("U6 is not recorded")
+        assert text.startswith(wording.IS_NOT_RECORDED)
     elif not shares:
         assert text.startswith("No setting has a target")
     elif not meeting:
-        assert text.startswith(("None of the", "The only setting does not meet"))
-        assert "25 % of the lengths" in text
+        assert text.startswith(("None of the", wording.THE_ONLY_SETTING_DOES_NOT_MEET))
+        assert wording.OF_THE_LENGTHS in text
     else:
         assert re.match(rf"{len(meeting)} of {len(shares)} settings? meets? the target", text)
         fewest = min(float(row["observations"]) for row in meeting)
         cheapest = [row for row in meeting if float(row["observations"]) == fewest]
         best = min(float(row[average]) for row in cheapest)
         if len(cheapest) == 1:
-            assert f": {fewest:.0f} observations" in text and "The one with the fewest" in text
+            assert (
+                f": {fewest:.0f} observations" in text and wording.THE_ONE_WITH_THE_FEWEST in text
+            )
         else:
             assert f"observations are {fewest:.0f}, in {len(cheapest)} of these settings" in text
             tied = sum(float(row[average]) == best for row in cheapest) - 1
@@ -317,7 +318,7 @@ def _assert_first(
         assert first in [_labels(row) for row in chosen]
     if shares:
         apart = len(finished) - len(shares)
-        assert ("no target to be compared with" in text) == (apart > 0)
+        assert (wording.NO_TARGET_TO_BE_COMPARED in text) == (apart > 0)
     elif known:
         best = min(float(row[average]) for row in known)
         tied = sum(float(row[average]) == best for row in known) - 1

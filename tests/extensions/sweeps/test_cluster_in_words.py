@@ -19,6 +19,7 @@ from ballplate.extensions.sweeps.cluster import (
 )
 from ballplate.extensions.sweeps.task import CellTask
 
+from tests.extensions.sweeps import wording
 from tests.extensions.sweeps.support import ROOT, command, small_sweep, stored
 
 Start = Callable[..., subprocess.Popen[bytes]]
@@ -158,9 +159,7 @@ def test_no_worker(
     with (
         cluster._quiet(),
         Client(scheduler[0], set_as_default=False) as client,
-        pytest.raises(
-            ClusterError, match="the cluster has no workers; start some with: dask worker"
-        ),
+        pytest.raises(ClusterError, match=wording.THE_CLUSTER_HAS_NO_WORKERS),
     ):
         cluster._check_versions(client)
 
@@ -173,6 +172,6 @@ def test_a_worker_that_comes_later_computes_nothing_with_other_code() -> None:
 def test_all_workers_that_differ_are_counted() -> None:
     with pytest.raises(
         ClusterError,
-        match="the worker b has no ballplate, and this is ballplate 1, and 1 more differ;",
+        match=wording.THE_WORKER_HAS_NO_BALLPLATE,
     ):
         _refuse({"a": "ballplate 1", "b": "no ballplate", "c": "ballplate 2"}, "ballplate 1")

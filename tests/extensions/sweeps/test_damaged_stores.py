@@ -28,6 +28,7 @@ from ballplate.extensions.sweeps.store import (
 )
 from ballplate.extensions.sweeps.task import CellResult, CellTask, compute
 
+from tests.extensions.sweeps import wording
 from tests.extensions.sweeps.odd_stores import (
     DAMAGED,
     NO_STORES,
@@ -179,15 +180,15 @@ def test_digests_notice_one_bit(store: Path, capsys: pytest.CaptureFixture[str])
     store.write_bytes(content[:place] + bytes([content[place] ^ 1]) + content[place + 1 :])
     assert main(commands(store, "csv")[0]) == 3
     err = capsys.readouterr().err
-    assert "1 cell could not be read: 1 (its content is not what was stored)" in err
+    assert wording.CELL_COULD_NOT_BE_READ_ITS_CONTENT in err
     assert read_table(store.parent / "table.csv")["cell"].tolist() == [0, 2, 3]
     assert main(commands(store, "html")[0]) == 3
     page = (store.parent / "report.html").read_text(encoding="utf-8")
-    assert "1 could not be read from the damaged store" in page
+    assert wording.COULD_NOT_BE_READ in page
     capsys.readouterr()
     assert main(commands(store, "sweep")[0]) == 1
     captured = capsys.readouterr()
-    assert "1 cell could not be read" in captured.err and "(3 of them before)" in captured.out
+    assert wording.CELL_COULD_NOT_BE_READ in captured.err and wording.OF_THEM_BEFORE in captured.out
 
 
 def many(path: Path, count: int) -> Store:
@@ -253,7 +254,7 @@ def test_a_report_of_nothing_done_says_so(store: Path, capsys: pytest.CaptureFix
     for arguments in commands(store, "text", "html"):
         assert main(arguments) == 0
         out, err = capsys.readouterr()
-        assert out == "" and err.count("\n") == 1 and "none of its 4 cells is done" in err
+        assert out == "" and err.count("\n") == 1 and wording.NONE_OF_ITS_CELLS_IS_DONE in err
         assert_told_in_lines(err, store)
 
 
@@ -264,7 +265,7 @@ def test_a_damaged_file_is_kept_and_its_cells_are_computed_under_another_name(
     page_of("text")(store)
     damaged = store.read_bytes()
     assert main(commands(store, "sweep")[0]) == 3
-    assert "--store and a new name computes anew" in capsys.readouterr().err
+    assert wording.STORE_AND_A_NEW_NAME_COMPUTES in capsys.readouterr().err
     other = store.with_name("other.sqlite")
     assert main([*commands(store, "sweep")[0], "--store", str(other)]) == 1
     assert_same(rows(other), right)
@@ -298,7 +299,7 @@ def test_a_store_that_vanishes_while_a_sweep_runs(
     line = err.splitlines()[-1]
     assert (
         line.startswith(f"{store}: has been ")
-        and "while the sweep ran" in line
+        and wording.WHILE_THE_SWEEP_RAN in line
         and "Traceback" not in err
     )
     if what == "replaced":
@@ -321,7 +322,7 @@ def test_a_store_that_vanishes_at_the_end_is_not_called_done(
         )
         assert main(commands(store, "sweep")[0]) == 3
     out, err = capsys.readouterr()
-    assert out == "" and "has been deleted, moved or replaced" in err
+    assert out == "" and wording.HAS_BEEN_DELETED in err
 
 
 def _gone(found: object, store: Path) -> object:
@@ -379,9 +380,7 @@ def test_a_folder_that_cannot_be_written() -> None:
             # Nothing is forbidden to root.
             os.seteuid(65534)
         try:
-            with pytest.raises(
-                StoreError, match="its folder cannot be written; name another with --store"
-            ):
+            with pytest.raises(StoreError, match=wording.ITS_FOLDER_CANNOT_BE_WRITTEN):
                 open_store(folder / "s.sqlite", create=True)
         finally:
             if is_root:
@@ -442,7 +441,7 @@ def test_names_of_files_in_a_store_lead_nowhere(
     signed(store)
     assert main(commands(store, "html")[0]) == 0
     page = (store.parent / "report.html").read_text(encoding="utf-8")
-    assert "the store cannot be trusted" in page or "cannot be unpacked" in page
+    assert wording.THE_STORE_CANNOT_BE_TRUSTED in page or "cannot be unpacked" in page
     assert {path for path in store.parent.parent.rglob("*")} - before <= {
         store.parent / "report.html"
     }

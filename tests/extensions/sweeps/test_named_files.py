@@ -13,6 +13,8 @@ from ballplate.extensions.sweeps.load import load_sweep
 from ballplate.simulator.inputs.messages import ExperimentError
 from ballplate.simulator.inputs.yamltree import read_tree
 
+from tests.extensions.sweeps import wording
+
 EXPERIMENT = """\
 title: "../secret/id_rsa"
 description: "secret.txt"
@@ -76,7 +78,7 @@ def test_a_file_outside_is_refused_or_allowed_by_its_folder(where: str, folder: 
         load_sweep(folder / "s.yaml")
     message = str(raised.value.messages[0])
     assert str(path) in message
-    assert "outside the folders of the sweep and its base" in message
+    assert wording.OUTSIDE_THE_FOLDERS_OF_THE_SWEEP_AND_ITS_BASE in message
     assert "common/balls.csv" in names(folder, folder.parent / "common")
     options = ["--workers", "2", "--folder", str(folder.parent / "common")]
     assert main(["sweep", str(folder / "s.yaml")]) == 3
@@ -99,7 +101,7 @@ def test_readings_of_the_base_stay_where_they_are(folder: Path) -> None:
     (folder.parent / "curve.csv").write_text("position_mm,EXX_um\n0,0\n500,1\n1000,2\n")
     curves = "true_machine: {kind: curves, files: [../curve.csv]}\n"
     (folder / "e.yaml").write_text(EXPERIMENT.replace("variants:", f"{stated}{curves}variants:"))
-    with pytest.raises(ExperimentError, match="outside the folders of the sweep"):
+    with pytest.raises(ExperimentError, match=wording.OUTSIDE_THE_FOLDERS_OF_THE_SWEEP):
         load_sweep(folder / "s.yaml")
 
 
@@ -172,4 +174,4 @@ def test_too_much_is_refused(
 ) -> None:
     monkeypatch.setattr(bundles, "MOST_BYTES", 100)
     assert main(["sweep", str(folder / "s.yaml"), "--workers", "1"]) == 3
-    assert "are the limit of what a store takes" in capsys.readouterr().err
+    assert wording.ARE_THE_LIMIT_OF_WHAT in capsys.readouterr().err

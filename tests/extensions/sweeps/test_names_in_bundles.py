@@ -7,6 +7,8 @@ from pathlib import Path, PurePath, PurePosixPath, PureWindowsPath
 import pytest
 from ballplate.extensions.sweeps.bundle import Bundle, names_of, unpack
 
+from tests.extensions.sweeps import wording
+
 
 @pytest.mark.parametrize("top", ["C:/plan", "//server/share/plan", "D:/with blank/µ"])
 def test_names_in_a_bundle_are_those_of_posix(top: str) -> None:
@@ -36,6 +38,6 @@ def test_names_that_differ_in_case_only_are_not_mixed_up(tmp_path: Path) -> None
     bundle = Bundle(
         "s.yaml", "b.yaml", (("s.yaml", b"1"), ("b.yaml", b"2"), ("x.csv", b"3"), ("x.csv", b"4"))
     )
-    with pytest.raises(ValueError, match="differs in case only"):
+    with pytest.raises(ValueError, match=wording.DIFFERS_IN_CASE_ONLY):
         unpack(bundle, tmp_path)
     assert (tmp_path / "x.csv").read_bytes() == b"3"

@@ -28,6 +28,7 @@ from ballplate.results.checked_designs import predict
 from ballplate.simulator.computing.steps import unreported
 from ballplate.simulator.experiment.loading import load
 
+from tests.extensions.sweeps import wording
 from tests.extensions.sweeps.odd_stores import signed
 from tests.extensions.sweeps.stores import Page, axis, done, failed, made_up
 
@@ -111,7 +112,7 @@ def test_figures_of_the_page_are_the_store_s(plate_sizes: Path, plate_sizes_page
     # Two axes with numbers, four quantities; two designs with their probes; three levels of the
     # error map.
     assert len(found.of("svg")) == 2 * 4 + 2 * 2 + 3
-    assert "Smallest average of U6, 0.117 µm: cell 11, size 750 mm, balls 7" in found.texts["h3"]
+    assert wording.SMALLEST_AVERAGE_OF in found.texts["h3"]
 
 
 def test_same_store_same_bytes(plate_sizes: Path, plate_sizes_page: Path, tmp_path: Path) -> None:
@@ -132,7 +133,7 @@ def test_variants_with_deficient_designs(tmp_path: Path) -> None:
     assert found.texts["h1"] == ["<b>kinds</b> & $more$"]
     summaries = [" ".join(one.split()) for one in found.texts["summary"]]
     assert "rank deficiency 2, as expected: cell 1 (design B)" in summaries
-    assert any("EYY (positioning error of Y" in line for line in found.texts["li"])
+    assert any(wording.EYY_POSITIONING_ERROR in line for line in found.texts["li"])
     assert "full rank, as expected: 2 cells, 0, 2 (design A or C)" in [
         " ".join(one.split()) for one in found.texts["p"]
     ]
@@ -147,7 +148,10 @@ def test_failed_cells_and_two_dimensions(tmp_path: Path) -> None:
     assert "2 of 3 cells done, 1 failed." in found.texts["p"]
     assert "failed" in found.texts["td"]
     # One level only, and one point of the machine, so that there are no tips to draw.
-    assert sum("Map of standard uncertainties" in one["aria-label"] for one in found.of("svg")) == 1
+    assert (
+        sum(wording.MAP_OF_STANDARD_UNCERTAINTIES in one["aria-label"] for one in found.of("svg"))
+        == 1
+    )
 
 
 def test_the_page_of_a_sweep_made_in_the_studio_names_no_file_that_is_gone(tmp_path: Path) -> None:
@@ -157,7 +161,7 @@ def test_the_page_of_a_sweep_made_in_the_studio_names_no_file_that_is_gone(tmp_p
     found = swept(opened(path), axes, unreported)
     texts = assert_accessible(found["page"]).texts
     facts = dict(zip(texts["dt"], texts["dd"], strict=True))
-    assert facts["Sweep"] == "made in the studio"
+    assert facts["Sweep"] == wording.MADE_IN_THE_STUDIO
     assert facts["Experiment"].startswith("plates.yaml: ")
     assert ".ballplate" not in found["page"] and "Sweep file" not in found["page"]
 
@@ -200,18 +204,12 @@ def test_a_large_store_makes_a_small_page(tmp_path: Path) -> None:
     text = page(store, read_results(store, 1))
     assert len(text) < 1_000_000
     found = assert_accessible(text)
-    assert (
-        "7800 cells more are not shown here; ballplate sweep --export gives all."
-        in found.texts["p"]
-    )
+    assert wording.CELLS_MORE_ARE_NOT_SHOWN_HERE in found.texts["p"]
     # Lines of single cells for 6 of 20 values of a second axis, at the best cell's setting first.
-    assert any(
-        "c 1, the setting of the best cell; 6 of 20 values of b" in one
-        for one in found.texts["figcaption"]
-    )
+    assert any(wording.THE_SETTING_OF_THE_BEST_CELL in one for one in found.texts["figcaption"])
     assert not any("edian" in one for one in found.texts["figcaption"])
     groups = ranks(read_results(store, 1)).shown
-    assert [group.count for group in groups] == [1600, 6400] and "amounts of cell 0" in groups[
+    assert [group.count for group in groups] == [1600, 6400] and wording.AMOUNTS_OF_CELL in groups[
         0
     ].heading
 
@@ -242,7 +240,7 @@ def test_models_in_python_are_run_only_if_asked(tmp_path: Path) -> None:
     store.connection.executemany("INSERT INTO bundle (sweep, path, content) VALUES (?, ?, ?)", rows)
     store.close()
     signed(store.path)
-    assert "modules are not allowed here; add --run-modules" in report(store.path)
+    assert wording.MODULES_ARE_NOT_ALLOWED_HERE in report(store.path)
     assert not mark.exists()
     # In a process of its own, as the module would stay in this one.
     page_file = tmp_path / "own.html"
@@ -272,7 +270,7 @@ def test_files_outside_the_store_s_folder_are_not_written(tmp_path: Path) -> Non
                 "INSERT INTO bundle (sweep, path, content) VALUES (?, ?, ?)", rows
             )
         signed(store.path)
-        with pytest.raises(NoExperimentError, match="leads out of the folder"):
+        with pytest.raises(NoExperimentError, match=wording.LEADS_OUT_OF_THE_FOLDER):
             experiments(store, read_results(store, 1), [0])
         assert not (tmp_path / "out.yaml").exists()
 
@@ -331,6 +329,6 @@ def test_python_writes_the_page_of_a_sweep(
     assert (tmp_path / "a.html").read_text(encoding="utf-8") == "page"
     ((store, results, run_modules, _, beside),) = asked
     assert Path(store.path) == plate_sizes and results.count("done") == 12 and run_modules
-    assert beside.sentences[1:] == ("All averages are the same.",)
-    with pytest.raises(ValueError, match="compare goes with a page only"):
+    assert beside.sentences[1:] == (wording.ALL_AVERAGES_ARE_THE_SAME,)
+    with pytest.raises(ValueError, match=wording.COMPARE_GOES_WITH_A_PAGE):
         bp.sweep_report(plate_sizes, form="text", compare=plate_sizes)

@@ -16,6 +16,7 @@ from ballplate.extensions.sweeps.report.tables import MOST_BEST, MOST_ROWS, repo
 from ballplate.extensions.sweeps.store import Store
 from ballplate.presentation.formats import FORMATS
 
+from tests.extensions.sweeps import wording
 from tests.extensions.sweeps.stores import axis, done, failed, made_up
 
 GOLDEN = Path(__file__).parent / "golden"
@@ -107,7 +108,7 @@ def test_many_cells_are_rows_and_end_with_a_sentence(tmp_path: Path) -> None:
     assert [row.headings[0] for row in best.blocks[0].rows] == [str(k) for k in range(MOST_BEST)]
     assert {column.partition(" ")[0] for column in best.columns} == {"U4"}
     assert table.size == MOST_ROWS and table.headings == ("cell", "level")
-    assert table.notes[0] == "50 cells more are not shown here; ballplate sweep --export gives all."
+    assert table.notes[0] == wording.CELLS_MORE_ARE_NOT_SHOWN_HERE_BALLPLATE
 
 
 def test_what_one_distance_stands_for_is_no_ordinary_value(tmp_path: Path) -> None:
@@ -172,9 +173,9 @@ def test_wrong_usage_is_told(
     assert main(["sweep", "--report", str(small.path), "-o", str(small.path)]) == 2
     assert "would overwrite" in capsys.readouterr().err
     assert main(["sweep", "--report", str(small.path), "--sweep", "7", "--format", "text"]) == 3
-    assert "there is no such sweep; it has 1" in capsys.readouterr().err
+    assert wording.THERE_IS_NO_SUCH_SWEEP in capsys.readouterr().err
     assert main(["sweep", "--report", str(tmp_path / "none.sqlite"), "--format", "text"]) == 3
-    assert "there is no such store" in capsys.readouterr().err
+    assert wording.THERE_IS_NO_SUCH_STORE in capsys.readouterr().err
     assert (
         main(
             [

@@ -15,6 +15,7 @@ from ballplate.simulator.experiment import structure
 from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.inputs.messages import ExperimentError
 
+from tests.extensions.sweeps import wording
 from tests.extensions.sweeps.support import ROOT, small_sweep
 from tests.reference.copies import copy_tree
 
@@ -44,7 +45,7 @@ def test_a_wrong_cell_is_wrong_each_time(tmp_path: Path) -> None:
             experiment_of(sweep, 5)
         told.append(str(error.value))
         experiment_of(sweep, 0)
-    assert told[0] == told[1] and "above the measuring volume" in told[0]
+    assert told[0] == told[1] and wording.ABOVE_THE_MEASURING_VOLUME in told[0]
 
 
 def test_what_is_shared_goes_with_the_file(tmp_path: Path) -> None:

@@ -12,6 +12,7 @@ from ballplate.extensions.sweeps.model import Sweep
 from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.inputs.messages import ExperimentError
 
+from tests.extensions.sweeps import wording
 from tests.reference.copies import copy_file
 
 HEAD = "title: a test\nbase: quickstart.yaml\n"
@@ -135,14 +136,10 @@ def test_variants_are_an_axis(written: Written, tmp_path: Path) -> None:
     sweep = load_sweep(written(f"axes:\n  design: {{variants: all}}\n  {levels}\n"))
     assert labels(sweep)[1] == "design few, level 200 mm"
     assert [len(experiment_of(sweep, k).layouts["plate"].names) for k in (1, 2)] == [16, 49]
-    assert (
-        refusal(written(f"axes:\n  {levels}\n"))[0]
-        == "s.yaml:2:7: base: has the variants few, many; choose one with variant: NAME, or add an"
-        " axis {variants: all}"
-    )
+    assert refusal(written(f"axes:\n  {levels}\n"))[0] == wording.HAS_THE_VARIANTS_FEW
     assert len(load_sweep(written(f"variant: many\naxes:\n  {levels}\n")).cells) == 2
     assert refusal(written(f"variant: mny\naxes:\n  {levels}\n"))[0].startswith(
-        's.yaml:3:10: variant: no variant "mny" in quickstart.yaml; did you mean "many"?'
+        wording.NO_VARIANT_IN_QUICKSTART_YAML
     )
 
 
@@ -158,7 +155,7 @@ def test_subsets_are_of_each_variants_own_list(written: Written, tmp_path: Path)
     levels = [experiment_of(sweep, k).positions[0].pose.origin[2] for k in range(len(sweep.cells))]
     assert levels == [0.1] * 5 + [0.3] * 5
     assert refusal(written("axes:\n  a: {variants: all}\n  b: {variants: [low]}\n")) == [
-        's.yaml:5:3: axes.b: the axis "a" chooses the variant already; name all variants there'
+        wording.THE_AXIS_CHOOSES_THE_VARIANT_ALREADY
     ]
 
 
@@ -271,7 +268,7 @@ def test_what_is_wrong_is_said(written: Written, text: str, expected: list[str])
 def test_a_base_file_that_is_a_list(written: Written, tmp_path: Path) -> None:
     path = written(f"axes:\n  size: {{paths: {SIZE}, values: [500 mm]}}\n")
     (tmp_path / "quickstart.yaml").write_text("- 1\n- 2\n")
-    assert "the experiment is a list; write its sections" in "\n".join(refusal(path))
+    assert wording.THE_EXPERIMENT_IS in "\n".join(refusal(path))
 
 
 def test_a_wrong_base_file_is_refused(written: Written, tmp_path: Path) -> None:

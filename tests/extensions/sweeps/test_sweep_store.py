@@ -23,6 +23,7 @@ from ballplate.results.checked_designs import predict
 from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.inputs.messages import ExperimentError, Message
 
+from tests.extensions.sweeps import wording
 from tests.extensions.sweeps.odd_stores import signed
 from tests.extensions.sweeps.support import (
     ROOT,
@@ -213,7 +214,7 @@ def test_a_change_while_a_sweep_runs_is_noticed(
 
     monkeypatch.setattr("ballplate.extensions.sweeps.local.compute", changing)
     assert sweep(path) == 3
-    assert "were changed while it ran" in capsys.readouterr().err
+    assert wording.WERE_CHANGED_WHILE_IT_RAN in capsys.readouterr().err
     # What was computed before the change is there, and nothing else.
     assert rows(tmp_path / "small.sqlite")["cell"].tolist() == [0]
     monkeypatch.undo()
@@ -359,7 +360,7 @@ def test_export(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["sweep", "--export", str(store), "-o", str(tmp_path / "no" / "t.csv")]) == 3
     assert main(["sweep", "--export", str(store), "--sweep", "5", "-o", "-"]) == 3
     assert main(["sweep", "--export", str(tmp_path / "none.sqlite"), "-o", "-"]) == 3
-    assert "there is no such store" in capsys.readouterr().err
+    assert wording.THERE_IS_NO_SUCH_STORE in capsys.readouterr().err
 
 
 MODEL = """
@@ -424,7 +425,7 @@ def test_what_a_users_model_raises_is_the_rows_reason(tmp_path: Path) -> None:
         done = run("sweep", path, "--workers", workers, "--store", tmp_path / f"{workers}.sqlite")
         assert done.returncode == 1 and "2 cells, 1 done, 1 failed" in done.stdout, done.stderr
         place = re.search(r"raises_late\.py:[0-9]+: in error, code of your own: (.*)", done.stderr)
-        assert place and place[1] == "ValueError: no more than thirty"
+        assert place and place[1] == wording.NO_MORE_THAN_THIRTY
     assert_same(rows(tmp_path / "1.sqlite"), rows(tmp_path / "2.sqlite"))
 
 

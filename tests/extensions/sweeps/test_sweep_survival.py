@@ -22,6 +22,7 @@ from ballplate.cli import main
 
 from tests.cli.cuts import COMMIT, remains
 from tests.cli.test_outputs import BALLS, DESIGN
+from tests.extensions.sweeps import wording
 from tests.extensions.sweeps.support import (
     ROOT,
     assert_same,
@@ -217,7 +218,7 @@ def test_a_worker_that_dies_each_time_fails_its_cell_alone(tmp_path: Path) -> No
     assert done.returncode == 1, done.stderr
     assert "2 cells, 1 done, 1 failed" in done.stdout
     assert (
-        "the process that computed it was ended" in done.stderr and "Traceback" not in done.stderr
+        wording.THE_PROCESS_THAT_COMPUTED_IT_WAS in done.stderr and "Traceback" not in done.stderr
     )
 
 
@@ -230,7 +231,7 @@ def test_interrupted_and_resumed(
     process.send_signal(signal.SIGINT)
     out, err = process.communicate(timeout=60)
     assert process.returncode == 130, err
-    assert "the same command continues from there" in err and "Traceback" not in err
+    assert wording.THE_SAME_COMMAND_CONTINUES_FROM_THERE in err and "Traceback" not in err
     assert 2 < stored(store) < 80
 
 
@@ -246,7 +247,7 @@ def test_interrupted_while_workers_start(
     os.killpg(process.pid, signal.SIGINT)
     _, err = process.communicate(timeout=60)
     assert process.returncode == 130
-    assert err.startswith("interrupted; finished cells are in") and err.count("\n") == 1, err
+    assert err.startswith(wording.INTERRUPTED_FINISHED_CELLS) and err.count("\n") == 1, err
 
 
 def test_one_writer_at_a_time(
@@ -256,7 +257,7 @@ def test_one_writer_at_a_time(
     process = started(path, "--workers", "1")
     assert wait_until(lambda: stored(store) > 0, process)
     second = run("sweep", path)
-    assert second.returncode == 3 and "another process is computing into it" in second.stderr
+    assert second.returncode == 3 and wording.ANOTHER_PROCESS_IS_COMPUTING_INTO in second.stderr
     # Reading goes on meanwhile.
     assert run("sweep", "--export", store, "-o", tmp_path / "t.csv").returncode == 0
 

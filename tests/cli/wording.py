@@ -1,0 +1,177 @@
+"""The wording that the tests of cli expect: a rewording is entered here alone."""
+
+ALPHA_DEPARTURE_OF_THE_AXES = "alpha (departure of the axes from squareness)"
+AN_ANGLE_IS_EXPECTED = "an angle is expected"
+AN_ELEVATION_IS_OUTSIDE_DEG = (
+    "11:57: artefacts.high.directions: an elevation is outside -90 deg to 90 deg; give "
+    "one of that range"
+)
+ARGUMENT_FORMAT_INVALID_CHOICE = (
+    "argument --format: invalid choice: 'juint'; did you mean \"junit\"?"
+)
+A_BRYAN_GAUGE_ONLY_CARRIES = (
+    "7:9: artefacts.role: a Bryan gauge only carries its radius and is no plate; remove its role"
+)
+A_PLATE_IN_TWO = "design: a plate in two positions"
+A_TURN_OF_DEGREES_LIES_BETWEEN = (
+    'a turn of 180 degrees lies between "straight" and "turned by 180"; turn the plate by about 90'
+)
+BALLS_AND_ARE_AT_THE_SAME = (
+    '10:57: artefacts.same.directions: balls "1" and "2" are at the same place; correct one of them'
+)
+BALL_IN_POSITION_FIRST = "4:1: ball 3 in position first is "
+BALL_IN_POSITION_LOW_IS_WHERE = (
+    "ball r1c1 in position z low is where ball r4c4 should be; correct its name"
+)
+BALL_IN_POSITION_LOW_IS_WHERE_BALL = (
+    "17:1: ball r4c2 in position z low is where ball r4c1 should be; swap the names of "
+    "the balls in lines 17 and 18"
+)
+BALL_IN_POSITION_TURNED = "9:1: ball 3 in position turned is "
+BALL_IS_REPEATED_IN_POSITION = (
+    '252:1: ball "r1c3" is repeated in position "z low" with probe "down" (first in line '
+    "4); remove the line, or state repeats: 2 for that position in the experiment"
+)
+CANNOT_BE_WRITTEN = (
+    "new.yaml: cannot be written (No such file or directory); check the folder, its "
+    "permissions and its room, and whether another program has the file open"
+)
+CANNOT_FOLLOW_AN_UNKNOWN_LENGTH = "cannot follow an unknown length (bar: length)"
+CELLS_DONE_FAILED_OF_THEM_BEFORE = "6 cells, 4 done, 2 failed (2 of them before)"
+CHOOSE_ONE_WITH_VARIANT = "choose one with --variant: A, B, C, D"
+CORRECT_OR_REMOVE = "correct or remove it"
+CORRECT_THE_NAMES_OF_THE_BALLS = "correct the names of the balls"
+DATA_SETS_OF = "data sets of 6.2.7[5 x 5]"
+DID_YOU_MEAN = 'did you mean "position"?'
+DID_YOU_MEAN_2 = 'did you mean "down"?'
+DID_YOU_MEAN_3 = '--trails=5; did you mean "--trials"?'
+DIRECTIONS_ARE_TOO_MANY = (
+    "12:57: artefacts.many.directions: 5040 directions are too many; at most 5000 are possible"
+)
+DISTANCES_AGAINST_THE_TRUE_MACHINES = "distances against the true machine's"
+DISTANCES_BETWEEN_CORRECTED_POINTS = "U6  distances between corrected points"
+ESTIMATORS_OF_DISTANCES_ALONE_CANNOT_FOLLOW = (
+    "artefacts: estimators of distances alone cannot follow a Bryan gauge's pivot; use --estimator"
+)
+ESTIMATOR_DISTANCES_LENGTHS_OF_STANDARDS_AGAINST = (
+    "estimator distances (12 lengths of standards) against"
+)
+EVERY_BAR_LIES_PARALLEL = "every bar lies parallel to the xy plane"
+EVERY_BAR_LIES_PARALLEL_TO_THE_XY = (
+    "reason: every bar lies parallel to the xy plane: nothing determines the scale of Z "
+    "nor its squareness"
+)
+EXX_POSITIONING_ERROR = "EXX (positioning error of X, quadratic)"
+FAR_OUTSIDE_THE_VOLUME = "far outside the volume; check the unit"
+FINISHED_CELLS_ARE_IN_NEW_SQLITE = "finished cells are in new.sqlite"
+FITS_THE_PROBE_LEFT = "fits the probe left, not right; correct the name of the probe"
+FROM_DEGREES_OF_FREEDOM_IS_ITSELF = "from 6 degrees of freedom is itself uncertain by 29 %; "
+GAMMA_DIFFERENCE_OF_THE_SCALES = "gamma (difference of the scales of x and y)"
+GOAL_NOT_MET = "goal not met: average U6"
+HAS_NO_BALL_BAR_OR_BRYAN = "has no ball bar or Bryan gauge whose lengths are read"
+HAS_NO_BALL_BAR_OR_BRYAN_GAUGE = "has no ball bar or Bryan gauge"
+HAS_NO_MEANING_WITH_RANDOM_DIRECTIONS = (
+    '8:57: artefacts.both.directions: "azimuths" has no meaning with random directions; remove it'
+)
+HAS_NO_UNIT = (
+    '6:37: artefacts.unit.radius: "300" has no unit; write for example "300 mm" or "300 um"'
+)
+HAS_NO_UNIT_2 = 'machine.repeatability: "0.2" has no unit; '
+INTERRUPTED_FINISHED_CELLS = "interrupted; finished cells are in"
+IN_POSITION_TURNED = "in position turned, line 9; correct or"
+IS_A_BRYAN_GAUGE_AND_HAS = (
+    '21:12: calibration[0].kind: "over" is a Bryan gauge and has a radius only; use kind: radius'
+)
+IS_A_PLATE_BUT_LENGTH_EQUATIONS = (
+    "artefacts.bar: is a plate, but length-equations needs length standards"
+)
+IS_MM_FROM_WHERE_IT_SHOULD = "is 10 mm from where it should be"
+IS_NOT_DEFINED_FOR_THIS_ARTEFACT = '"braced" is not defined for this artefact'
+IS_TURNED_BY_DEGREES = '"turned" is turned by 89.992480 degrees, clockwise, from "first"'
+LEAVES_OUT_WHAT_IS_NOT_READ = "leaves out what is not read in both positions: r2c2, r3c1"
+MM_IS_FAR_FROM_THE_MM = (
+    "23:71: calibration[2].value: 600 mm is far from the 500 mm of the artefact's "
+    "drawing; correct one of the two"
+)
+MODULES_ARE_NOT_ALLOWED_HERE = "modules are not allowed here"
+MODULES_ARE_NOT_ALLOWED_HERE_LEAVE = "modules are not allowed here; leave --no-modules out"
+MONOMIALS_GOES_WITH_ESTIMATOR_FULL = (
+    "--monomials goes with --estimator full, distances, cresto or kruth only; leave it out"
+)
+MONTE_CARLO_DATA_SETS = "Monte Carlo: 10 data sets of the true machine"
+MONTE_CARLO_DATA_SETS_OF_THE_TRUE = "Monte Carlo: 100 data sets of the true machine, seed 1"
+NEEDS_EITHER_AZIMUTHS_AND_ELEVATIONS = (
+    "6:54: artefacts.unit.directions: needs either azimuths and elevations, or random; "
+    "write {random: 60, lowest: 20 deg}"
+)
+NO_FILE_WAS_WRITTEN = "no file was written"
+NO_LENGTH_IS_KNOWN = (
+    "reason: no length is known (gauge: radius): the overall scale of the machine is undetermined"
+)
+NO_READING_OF_THE_BALLS = 'no reading of the balls "r1c2", "r1c3"'
+OF_THE_STATED_ONES = "of the stated ones"
+ONLY_A_BRYAN_GAUGE_HAS = (
+    '22:12: calibration[1].kind: only a Bryan gauge has a radius, and "bar" is not one; '
+    "use kind: distances"
+)
+ONLY_THE_ARM_OF_DROOPS = "only the arm of MH1, MH2 droops"
+ORIGIN_BALL_AXIS_THROUGH_BALL = "(origin: ball 1, x axis through ball 2)"
+PAIRS_OF_BALLS = "62 pairs of balls"
+PAIRS_OF_BALLS_2 = "300 pairs of balls"
+PLANNED_BUT_NOT_READ_LOW = "planned but not read (1): z low: ball r1c1 with down"
+POSITION_LOW_THE_READINGS_FIT = (
+    ": position y low: the readings fit the plate turned over; correct the names"
+)
+PRIORS_REFER_TO_THE_FILES_ERROR = (
+    "priors: priors refer to the file's error model; write scale: none there instead of --scale"
+)
+RADIUS_CHANGE_TOGETHER_WITHOUT_CHANGING_ANY = (
+    "gauge: radius (0.3 µm): change together without changing any observation"
+)
+RANK_DEFICIENCY_EXPECTED_FULL_RANK = "rank deficiency 2, expected full rank"
+READING_BALL_WITH_PROBE_PUTS = (
+    '18:5: positions[0]: reading ball "2" with probe "magnet" puts the scales at y = 900 '
+    "mm, 100 mm above the measuring volume, and 1 more reading; move the artefact, or "
+    "read it otherwise"
+)
+READ_BUT_NOT_PLANNED_LOW = "read but not planned (1): z low: ball r1c2 with right"
+STANDARD_OUTPUT_CANNOT_BE_WRITTEN = "standard output: cannot be written"
+STANDARD_OUTPUT_CANNOT_BE_WRITTEN_NO_SPACE = (
+    "standard output: cannot be written (No space left on device); give it room"
+)
+STARTS_OF_THE_SEARCH = "0/25 starts of the search"
+SWAP_THE_NAMES_OF_THE_BALLS = "swap the names of the balls in lines 60 and 71"
+SWAP_THE_NAMES_OF_THE_BALLS_IN_LINES = "swap the names of the balls in lines 5 and 9"
+THE_DESIGN_LEAVES_ERRORS_UNDETERMINED = "the design leaves errors undetermined"
+THE_ESTIMATE_HAS_DIVERGED = "the estimate has diverged; no results are reported"
+THE_FIGURES_ARE_THOSE = "interrupted: the figures are those of the data sets done so far"
+THE_FILE_THERE = "the file there is as it was"
+THE_LEAST_ELEVATION_MUST_BE_BELOW = (
+    "14:57: artefacts.zone.directions: the least elevation must be below the largest; "
+    "exchange or correct them"
+)
+THE_PIVOT_IS_THE_CENTRE = (
+    "warning: the pivot is the centre of a sphere, as if the machine had no errors"
+)
+THE_RADIUS_OF_IS_ALREADY = (
+    '25:5: calibration[4]: the radius of "over" is already in calibration[3]; remove one of the two'
+)
+THE_REVERSAL_NEEDS_A_MACHINE = (
+    '3:21: error_model.kind: the reversal needs a machine of kind "metric" in two dimensions'
+)
+THE_REVERSAL_NEEDS_TWO_DIMENSIONS = "the reversal needs two dimensions, not three"
+THE_REVERSAL_TAKES_ONE_ARTEFACT = "5:1: artefacts: the reversal takes one artefact"
+THE_REVERSAL_TAKES_TWO_POSITIONS = (
+    "8:1: positions: the reversal takes two positions, a quarter turn apart"
+)
+THE_SCALE_RESTS_ON_PROBE_OFFSETS = "warning: the scale rests on probe offsets"
+THREE_PARAMETERS_NO_OFFSETS = (
+    "three parameters, no offsets, scale difference: none (fitted, but not applied)"
+)
+TRUE_MACHINE_VALUES_EXX_THE_ERROR = "true_machine.values[EXX t^9]: the error model has no parameter"
+UNKNOWN_PARAMETER_DID_YOU_MEAN = (
+    '28:17: priors[0].parameter: unknown parameter "a: rotation z"; did you mean "a: origin z"?'
+)
+UNKNOWN_POSITION_DID_YOU_MEAN = 'unknown position "z lo"; did you mean "z low"?'
+UNKNOWN_PROBE_DID_YOU_MEAN = 'unknown probe "downn"; did you mean "down"?'
+WHATEVER_THE_FILES_ERROR_MODEL = "whatever the file's error model"

@@ -1,0 +1,93 @@
+"""The wording that the tests of experiment expect: a rewording is entered here alone."""
+
+A_DISTANCE_MUST_BE_ABOVE = (
+    "d.csv:3:1: calibration[0].values: a distance must be above zero; correct it"
+)
+BEYOND_WHAT_CAN_BE_COMPUTED = "beyond what can be computed with; write 0, or a length of"
+BRYAN_GAUGES_ARE_READ_TIMES = (
+    "8:1: positions: Bryan gauges are read 25000 times; at most 20000 lengths are possible"
+)
+CONTRADICT_ONE_ANOTHER = "contradict one another: r1c1–r5c5"
+DISTANCES_OF_HAVE_BALLS_IN_COMMON = (
+    '12:45: calibration[0].pairs: 3160 distances of "bar" have balls in common; at most '
+    "3000 such are possible: calibrate fewer of them"
+)
+DISTANCES_OF_READ_TIMES = (
+    '12:45: calibration[0].pairs: 79800 distances of "bar", read 1 times, are too many; '
+    "at most 20000 lengths are possible"
+)
+EXPECTED_A_MAPPING = (
+    "e.yaml:9:15: variants.A: expected a mapping, path: new value, found the number 5"
+)
+EXPECTED_A_MAPPING_NAME = (
+    "e.yaml:9:11: variants: expected a mapping, name: {path: new value}, found the number 5"
+)
+EXPECTED_A_MAPPING_THAT_BEGINS = "e.yaml:1:1: expected a mapping that begins with title: …, found "
+EXPECTED_A_TEXT_FOUND_THE_NUMBER = (
+    "e.yaml:1:8: title: expected a text, found the number 1; put it in quotes (one-line "
+    "description of the experiment)"
+)
+EXPECTED_A_WHOLE = (
+    'e.yaml:13:11: seed: expected a whole number, found the text "x" (seed of simulated '
+    "readings; default 1) (in variant B)"
+)
+GROWS_BY_PER_METRE_OF_LENGTH = '"0.2 um + L/1e-3" grows by 1000 m per metre of length'
+GROWS_TOO_SLOWLY = "grows too slowly; leave out what it grows by, or give 1e-18 m/m or more"
+HAS_NO_UNIT = (
+    'e.yaml:12:27: positions[0].level: "5" has no unit; write for example "5 mm" or "5 '
+    'um" (in variant B)'
+)
+HAS_NO_UNIT_WRITE = '"5e-6" has no unit; write for example "5e-6 ppm"'
+HAS_THE_UNKNOWN_UNIT = 'e.yaml:2:51: machine.repeatability: "1 mu" has the unknown unit "mu"'
+HAVE_BALLS_IN_COMMON = "have balls in common; at most 2 such"
+IS_BEYOND_WHAT_CAN_BE_COMPUTED = (
+    "is beyond what can be computed with; write 0, or a length of 1e-18 m to 1e+06 m"
+)
+IS_NOT_A = 'd.csv:2:11: "five" is not a number; write for example "500.0003"'
+IS_PART_OF_THE_SAME_2 = "e.yaml:12:5: variants.A[positions[0].level]: is part of the same place as"
+IS_PART_OF_THE_SAME_PLACE = (
+    "e.yaml:15:5: variants.B[positions[0].level]: is part of the same place as"
+)
+MISSING_ADD_POSITIONS = (
+    "1:1: positions: missing; add positions, or choose some from the pool with: ballplate plan FILE"
+)
+MM_IN = "r1c1–r1c5 750.0001 mm in calibration[1]"
+MM_IN_MM = "r1c1–r1c3 375 mm in calibration[0], r1c3–r1c1 375.001 mm in calibration[1]"
+MM_IS_FAR_FROM_THE_MM = (
+    "d.csv:4:1: calibration[0].values: 5 mm is far from the 500 mm of the artefact's "
+    "drawing; correct one of the two"
+)
+MM_IS_MM_BELOW_THE_MEASURING = (
+    "p.csv:3:1: evaluation.points.file: y = -1 mm is 1 mm below the measuring volume, as "
+    "1 further points are; move the point inside"
+)
+MORE_THAN_ERRORS = "balls.csv:502:1: more than 1000 errors; mend these first"
+MORE_THAN_ERRORS_MEND = ": more than 1000 errors; mend these first"
+MORE_THAN_VALUES = "more than 500000 values, aliases counted in full; put long lists in a CSV file"
+MOST_OF_ALL = 'most of all "down";'
+NESTED_MORE_THAN_DEEP = "f:3:49: nested more than 50 deep by this alias; write less of it"
+NO_CANDIDATE_IS_LEFT = (
+    "6:3: pool.candidates: no candidate is left: 8 outside the volume; widen the pool"
+)
+NO_CO_ORDINATES_FOR_ADD_THEM = (
+    "e.yaml:14:94: calibration[0].values: no co-ordinates for r3c1, r3c3; add them, or "
+    "leave them out of balls"
+)
+NO_POSITION_READS_BALLS = "6:3: artefacts.plate: no position reads balls r1c2"
+PER_METRE_OF_LENGTH = "per metre of length; give less than 100 um/m"
+POINTS_ARE_TOO_MANY = "eyx.csv:5:1: 3 points are too many; at most 2 are possible"
+PUTS_THE_SCALES = "puts the scales at"
+TAKE_MM_FROM_EVERY_POSITION = "take 100 mm from every position"
+THERE_ARE_READINGS_UP_TO_HERE = (
+    "16:7: pool.candidates[0]: there are 6440000 readings up to here, repeats counted; at most"
+)
+THERE_IS_NO_CANDIDATE = "5:1: pool.candidates: there is no candidate; add some, or positions"
+THE_DISTANCE_OF_AND_IS_GIVEN = (
+    'd.csv:4:1: calibration[0].values: the distance of "r1c3" and "r1c1" is given twice; '
+    "remove one of the two"
+)
+THE_TABLE_BEGINS_AT_MM = "eyx.csv:2:1: the table begins at 0 mm"
+THE_TABLE_ENDS_AT_MM = "eyx.csv:4:1: the table ends at 1900 mm"
+YAML_STATES_NO_ERROR_THAT_COULD = (
+    "e.yaml:3:36: error_model.file: m.yaml states no error that could be"
+)

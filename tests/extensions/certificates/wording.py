@@ -1,0 +1,13 @@
+"""The wording that the tests of certificates expect: a rewording is entered here alone."""
+
+ARE_THE_SAME_FILE = "are the same file; name another"
+AS_PREDICTED_AFTER_ADJUSTMENT = "as predicted after adjustment"
+BALLS_ARE_TOO_MANY_AT_MOST = "796 balls are too many .* at most 666"
+CERTIFICATE_VALUES_OF_QUICKSTART = "# certificate values of quickstart, drawn with seed 1"
+CO_ORDINATES_OF_UNDETERMINED_IN_THESE = "co-ordinates of .*r3c2.* undetermined in these axes"
+LENGTHS_ARE_THOSE = "lengths are those at 21 °C"
+NOTHING_TELLS_THEIR_UNCERTAINTY = "nothing tells their uncertainty"
+NOT_A_CALIBRATION_CERTIFICATE = "not a calibration certificate of an accredited laboratory"
+NO_VALUE_IS_STATED = "no value is stated of r3c2"
+NO_VALUE_OF_ADD = r"no value of calibration\[0\] r1c5, r5c5; add it"
+SOME_OF_THE_DISTANCES = "Some of the 28 distances"

@@ -1,0 +1,12 @@
+"""The wording that the tests of compensation expect: a rewording is entered here alone."""
+
+BACKLASH_IS_NOT_READ = "BACKLASH is not read"
+DOES_NOT_STATE_WHETHER = "t-y.csv: does not state whether"
+DOES_NOT_STATE_WHETHER_2 = "does not state whether"
+DOES_NOT_STATE_WHETHER_VALUES = "does not state whether values are corrections"
+DO_NOT_SAY_WHICH_SIGN = "do not say which sign"
+IS_NO_MACHINE_FILE = "is no machine file"
+STATES_ERRORS_OF_INDICATION = "states errors of indication, not corrections"
+STATES_NOT_WHAT_ANOTHER_FILE_DOES = "b.csv: states not what another file does"
+TILT_OF_THE_COLUMN = "tilt of the column by the arm depends on two axes"
+TURN_BY_UP_TO_RAD = "turn by up to 8.9 µrad"

@@ -1,0 +1,117 @@
+"""The wording that the tests of laboratory expect: a rewording is entered here alone."""
+
+ALONG_THE_PARTS_AXES_DISAGREE = "along the part's axes disagree, .* write the names"
+ARE_NOT_AMONG_THE_POINTS = '"2 7" are not among the 6 points of the set'
+ARE_NOT_IN_THE_EXPERIMENT = "are not in the experiment"
+AS_BALL_CENTRES = "as ball centres, but only to 50 mm as scale readings, the default"
+AS_SCALE_READINGS = "as scale readings, but only to 50 mm as ball centres, which is stated"
+A_DOCUMENT_TYPE_DOCTYPE = (
+    "a document type (<!DOCTYPE …>) is not read, nor any entity of it; remove it"
+)
+A_LINE_WITHOUT_CO_ORDINATES_AMONG = "a line without co-ordinates among the rows"
+A_TABLE_BESIDE_REPORTS_STATE_WHAT = "a table beside reports .* state what all"
+BALLS_MATCHED_BY_NUMBER_IN_READING = "balls matched by number in reading order"
+CENTRES_ARE_IN_A_PARTS_CO = "2 centres are in a part's co-ordinate system (PART)"
+CENTRES_IN_THE_MACHINES = "warning: centres in the machine's and in a part's system"
+CENTRE_IS_OF_POINTS = "1 centre is of points on the surface"
+COLUMNS_FOUND_MISSING = (
+    'columns found: "Lage", "Taster", "X [mm]", "Y [mm]", "Z [mm]"; missing: ball; name '
+    "them in the experiment file: readings: {columns: {ball: …}}"
+)
+COLUMNS_INSTEAD_OF = "9 columns instead of 6"
+CORRECT_THE_NAMES_OF_THE_BALLS = "correct the names of the balls"
+CORRECT_THE_SIGNS_OF_THE_OFFSETS = "correct the signs of the offsets"
+COULD_ALL_BE = "could all be x; say which"
+CO_ORDINATES_ARE_TAKEN_FOR_BALL = "co-ordinates are taken for ball centres, as reports have them"
+CO_ORDINATES_WHICH_IS_NO_MULTIPLE = "19 co-ordinates, which is no multiple of 3"
+DATES_WITHOUT_A = "dates without a zone, and others are times of a day"
+DIMENSION_FLATNESS_OF_PLANE = "left: 1 dimension (flatness of plane), 1 sphere (no row Z)"
+DIMENSION_POSITION_OF_SPHERE = "1 dimension (position of sphere), 1 dimension (location of plane)"
+DIVIDED_BY_ITS_COVERAGE_FACTOR = "divided by its coverage factor"
+DOES_NOT_SAY_WHICH_UNCERTAINTY = "does not say which uncertainty it is"
+EXCHANGE_THE_NAMES_OF_POSITIONS = "exchange the names of positions"
+GIVE_THEM_WITH_CERTIFICATE = "give them with --certificate"
+HAS_A_DECIMAL = '3:1: "2.25" has a decimal point, and others have decimal commas'
+HAS_MORE_THAN_MB = "f: has more than 0 MB; leave some of it out"
+HAS_SIGNS_BETWEEN_THOUSANDS = "has signs between thousands"
+IS_NOT_IN_THE_ENCODING = "is not in the encoding utf-8"
+IS_NO_TIME = "is no time of a clock"
+IS_NO_TIME_OF_A_CLOCK = '"12.5" is no time of a clock; write 10:05:30 or'
+IS_UM_IN_ALL_ROWS = "u is 0.35 um in all rows"
+IS_WHERE_BALL_SHOULD = "is where ball .* should be; correct its name"
+ITS_NUMBERS_ARE_NOT_BELOW = "report:4:1: its numbers are not below the 6 headings"
+ITS_NUMBERS_ARE_NOT_BELOW_THE_HEADINGS = "its numbers are not below the 6 headings"
+LEAVE_THE_COLUMN_OUT = "leave the column out"
+LENGTHS_ARE_IN = "lengths are in in, the experiment file mm"
+LOW_THE_READINGS_FIT_THE_PLATE = "z low: the readings fit the plate turned by 180"
+MAY_HAVE_BEEN_CUT_OFF = "may have been cut off"
+MM_IN_THE_MIDDLE = "22 mm in the middle"
+MORE_THAN_ELEMENTS = "f:1:12: more than 3 elements; leave some of them out"
+NOTHING_IS_FILLED = "nothing is filled in: x, y, z are empty"
+NOT_RECOGNISED_AS_QIF_RESULTS = (
+    "report: not recognised as QIF results, DMIS output, PC-DMIS report, Calypso table; "
+    "state its format with --from (qif, dmis, pcdmis, calypso)"
+)
+NO_CLOCK_TIMES = "no clock times, which 0.csv has"
+NO_DIGIT_BELOW = "no digit below 1 µm"
+NO_MEASUREMENT_RESULTS = "no measurement results; is it a plan, or a model?"
+NO_NAMES_OF_THE_EXPERIMENT = (
+    "f: no names of the experiment in KUGEL A, KUGEL B; its positions are z low, z high, "
+    "x low and 3 more, its balls r1c1, r1c2, r1c3 and 22 more; state the rule with "
+    "--name, such as {position}_{ball}"
+)
+NO_NAMES_OF_THE_EXPERIMENT_2 = "no names of the experiment in r1c1"
+NO_POINTS_WITH_THE_ID = 'no points with the id "13" in clear'
+NO_RULE_PARTS_THE_NAMES_INTO = "no rule parts the names P_1, P_1_2_3 into position"
+NO_TIME_AND_OTHER_ROWS_HAVE = "no time, and other rows have one"
+NO_UNITS_OF_THIS_DIMENSION = "no UNITS= of this dimension"
+NO_UNIT_IS_STATED = 'no unit is stated for the columns "x", "y", "z"'
+NO_WRITE_A = "lab.csv:6:1: no x; write a number, or remove the line"
+OTHERWISE_THE_NAMES_OF_BALLS = "otherwise the names of balls are wrong"
+PART_CO_ORDINATES_DO_NOT_TELL = "part co-ordinates do not tell whether they are"
+PLACED_BY_THE_NOMINAL_POSES = "placed by the nominal poses"
+PLANNED_BUT_NOT_READ = "planned but not read (3)"
+PLANNED_BUT_NOT_READ_2 = "planned but not read"
+POSITIONS_AND_HAVE_THE_SAME_READINGS = (
+    'positions "z low" and "z high" have the same readings to the last digit'
+)
+POSITIONS_MATCHED_BY_NAME_BUT = "positions matched by name but for case and signs: "
+POSITIONS_MATCHED_BY_NUMBER = "positions matched by number, and by place"
+POSITION_ABOVE_THE_HEADINGS = 'position "z low" above the headings'
+POSITION_BY_THE_NAME = 'position "Z_HIGH" by the name of the file'
+POSITION_BY_THE_NAME_OF_THE_FILE = 'position "z low" by the name of the file'
+PTMEAS_OF_A_PROGRAM_ARE_WHERE = "PTMEAS of a program are where to probe, not what was measured"
+PUT_IT_INTO_THE_FILES_NAME = "put it into the file's name"
+QIFDOCUMENT_IS_NO_DOCUMENT_OF_QIF = "<QIFDocument> is no document of QIF 2 or 3"
+RUN_BALLPLATE_IMPORT_FIRST = "run ballplate import first"
+SCALE_READINGS_ARE_STATED = "scale readings are stated; state ball centres"
+SPHERE_HAS_POINTS_ABOUT = "1 sphere (has points about in a plane)"
+STATE_THE_RULE_WITH_NAME = "state the rule with --name"
+SWAP_THE_NAMES_OF_THE_BALLS = "swap the names of the balls in lines 54 and 55"
+TABLE_OF_THE_NOMINAL_CENTRES = "table of the nominal centres of balls"
+THERE_IS_NO_COLUMN = 'there is no column "F"'
+THE_COLUMN_HAS_NAMES_OF_POSITIONS = 'the column "Ort" has names of positions'
+THE_CONTROL_CHARACTER_IS_NO_PART = "report:2:1: the control character U+0007 is no part of a text"
+THE_DEVIATION_IS_NOT_MEASURED_MINUS = (
+    "report:14:1: X: the deviation is not measured minus nominal; is the line damaged?"
+)
+THE_ERRORS_THAT_IT_LEAVES = "the errors that it leaves"
+THE_FILE_IS_NAMED_TWICE = "the file is named twice"
+THE_FILE_STATES_NO_UNIT = "the file states no unit of length; state it with --unit mm"
+THE_HEADING_OCCURS_MORE_THAN_ONCE = (
+    't.csv:1:1: the heading "X" occurs more than once, and could be x'
+)
+THE_NAMES_CAN_BE_READ = (
+    "f: the names can be read as {position}_{ball}_{probe} and {position}_{probe}_{ball}; "
+    "state the one that is right with --name"
+)
+THE_NAMES_OF_BALLS = (
+    "the names of balls r2c2 and r2c1 in position P3 were swapped (lines 54 and 55)"
+)
+THE_NAME_CAN_BE_PARTED = 'the name "z_low_r1c1" can be parted as {position}_{ball} in several ways'
+THE_NAME_OF_THE_FILE = 't.csv:1:1: "t", the name of the file, was taken for the position'
+THIS_IS_A = "report: this is a table, which needs no import; ballplate fit reads it"
+THIS_IS_A_DMIS = "this is a DMIS program, not what was measured"
+THIS_IS_A_REPORT = "this is a report of a measuring program (DMIS output), and no table"
+TOO_FEW_BALLS_WERE_READ = "too few balls were read in z high"
+TO_THE_LAST_DIGIT = "to the last digit"

@@ -1,0 +1,66 @@
+"""The wording that the tests of repair expect: a rewording is entered here alone."""
+
+ADD_OF_THE_POOL = 'add "turned" of the pool (1.5 h)'
+ADD_OF_THE_POOL_MIN = 'add "aside" of the pool (30 min)'
+ASK_FOR_COEFFICIENT_OF_ROTATIONAL = "ask for 1 coefficient of rotational"
+A_COMMENT_HERE_WOULD = "a comment here would be lost"
+A_NEW_PROBE = "a new probe too"
+CANNOT_BE_WRITTEN_AS_IT_WAS = "cannot be written as it was made"
+DIFF_DOES_NOT_GO_WITH_FORMAT = "--diff does not go with --format json"
+EMPTY_ADD_POSITIONS = "positions: empty; add positions, or choose some from the pool"
+EVEN_ALL_CANDIDATES_TOGETHER_LEAVE_DIRECTIONS = (
+    "even all 8 candidates together leave 2 directions undetermined (EAZ, ECZ, EYZ)"
+)
+EVERY_BAR_IS_AT_DEG = "every bar is at 60 deg to z"
+EVERY_BAR_IS_AT_DEG_TO_NOTHING = (
+    "every bar is at 60 deg to z: nothing determines a combination of the scale of X, the "
+    "scale of Y and the scale of Z; add for example a bar along x"
+)
+EVERY_BAR_LIES_PARALLEL = (
+    "every bar lies parallel to the xy plane: nothing determines the squareness of Z to X "
+    "and Z to Y; add for example a bar in the xz plane at 45 deg and one in the yz plane "
+    "at 45 deg"
+)
+EVERY_BAR_LIES_PARALLEL_TO_THE_PLANE = (
+    "every bar lies parallel to the plane perpendicular to (0.707, -0.707, 0): nothing "
+    "determines 3 combinations"
+)
+EVERY_BAR_LIES_PARALLEL_TO_THE_XZ = (
+    "every bar lies parallel to the xz plane: nothing determines the scale of Y nor its "
+    "squareness to X and Z; add for"
+)
+EVERY_DIRECTION_OF_THE_BAR_LIES = "every direction of the bar lies parallel to the "
+FULL_RANK_AND_NOTHING_IS_WEAKLY = "full rank, and nothing is weakly determined; average U6 0.2"
+NOTHING_DETERMINES_THE_SCALE = "nothing determines the scale of Z; add for example a bar along z"
+NOTHING_DETERMINES_THE_SCALE_OF_NOR = (
+    "nothing determines the scale of Y nor its squareness to X and Z nor a combination of "
+    "the scale of X and the scale of Z;"
+)
+NOTHING_DETERMINES_THE_SQUARENESS = (
+    ": nothing determines the squareness of Y to X; read the ball for example all round "
+    "at an elevation of"
+)
+NO_CHANGES_WERE_FOUND = "no changes were found"
+NO_CHANGES_WERE_FOUND_THAT_DETERMINE = "repair: no changes were found that determine everything; "
+NO_SELECTION_DETERMINES_ANY = "no selection determines any of it"
+REPAIR_IN_THE_FILE = "repair 1, in the file: positions[straight]: "
+REPAIR_IN_THE_FILE_POSITIONS = (
+    "repair 1, in the file: positions[z low]: {name: z low, plane: z, level: 100 mm, corner: "
+)
+REPAIR_TURN_POSITION_BY_ONE_QUARTER = (
+    'repair 1: turn position "z low" by one quarter-turn; and calibrate the dist'
+)
+SCALE_RESTS_ON_PROBE_OFFSETS = "scale rests on probe offsets"
+SMALLEST_SINGULAR_VALUE = "smallest singular value 0.0"
+TAKING_THE_OTHERS_AS_ZERO = "taking the others as zero"
+THE_FILE_EXPECTS = "the file expects that"
+THE_FILE_HAS_CHANGED_MEANWHILE = "the file has changed meanwhile; nothing was written"
+THE_FILE_THERE = "the file there is as it was"
+THE_SCALE_OF_NOR_ITS_SQUARENESS = (
+    "the scale of Y nor its squareness to X nor a combination of the scale of X and the scale of Z"
+)
+THE_SCALE_RESTS_ON_PROBE_2 = "warning: the scale rests on probe offsets"
+THE_SCALE_RESTS_ON_PROBE_OFFSETS = "the scale rests on probe offsets"
+WERE_NOT_LOOKED_FOR_IN_SO = "were not looked for in so large a design"
+WHAT_WOULD_DETERMINE = "what would determine it"
+WITH_A_NEW_PROBE = "with a new probe too"
