@@ -218,10 +218,10 @@ def test_a_sweep_goes_on_where_it_ended(tmp_path: Path, capsys: pytest.CaptureFi
         connection.execute("UPDATE result SET figures = '{}' WHERE rowid = 1")
     damaged = bp.stored(store)
     assert damaged.summary.done == 1 and damaged.summary.left == 1
-    assert "1 cell could not be read" in damaged.remarks[0]
+    assert "1 unreadable cell" in damaged.remarks[0]
     mended = bp.sweep(file)
     assert mended.summary.before == 1 and mended.summary.done == 2
-    assert "computed anew" in mended.remarks[0] and mended.remarks[0] in str(mended)
+    assert "replaced in this run" in mended.remarks[0] and mended.remarks[0] in str(mended)
     assert main(["sweep", "--export", str(store), "-o", str(tmp_path / "table.csv")]) == 0
     exported = read_table(tmp_path / "table.csv")
     assert exported["U6_average_m"].tolist() == found.table["U6_average_m"].tolist()

@@ -20,8 +20,8 @@ from pathlib import Path
 
 import pytest
 from ballplate.extensions.sweeps.bundle import bundle_of, definition
-from ballplate.extensions.sweeps.frame import frame
 from ballplate.extensions.sweeps.load import load_sweep
+from ballplate.extensions.sweeps.running import stored_result
 from ballplate.extensions.sweeps.store import add_rows, add_sweep, open_store
 from ballplate.extensions.sweeps.task import CellTask, compute
 
@@ -52,7 +52,7 @@ def test_share_of_computation(tmp_path: Path, workers: int) -> None:
     subprocess.run(command, cwd=ROOT, check=True, capture_output=True)
     wall = time.perf_counter() - begun
     store = open_store(tmp_path / "many.sqlite")
-    table = frame(store)
+    table = stored_result(store).table
     store.close()
     assert len(table) == 2000 and (table["status"] == "done").all()
     share = table["duration_s"].sum() / (workers * wall)
@@ -78,7 +78,7 @@ def test_a_large_store(tmp_path: Path) -> None:
     made = time.perf_counter() - begun
     begun = time.perf_counter()
     store = open_store(tmp_path / "large.sqlite")
-    table = frame(store)
+    table = stored_result(store).table
     store.close()
     read = time.perf_counter() - begun
     assert table.shape[0] == 100_000

@@ -1,4 +1,4 @@
-"""Axes of a sweep file: what each changes, and the values it takes."""
+"""Axes of a sweep file: the paths that they change and their values."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ from .values import entry_names, label, numeric, of_range, subset_count, subsets
 
 MOST_VALUES = 100_000
 
-# Ways to say what an axis takes its values from.
+# Sources of an axis's values.
 SOURCES = ("values", "start", "together", "subsets", "variants")
 
 
@@ -39,51 +39,47 @@ def read_axis(
     variant: str | None,
     problems: Problems,
 ) -> SweepAxis | None:
-    """An axis of the sweep file `root`; what is wrong with it goes to `problems`."""
+    """Return an axis of the sweep file `root`; errors go to `problems`."""
     here: Steps = ("axes", name)
-    given = [key for key in SOURCES if getattr(settings, key) is not None]
-    if len(given) != 1:
-        known = "values, from … to …, together, subsets or variants"
+    sources = [key for key in SOURCES if getattr(settings, key) is not None]
+    if len(sources) != 1:
+        fact = "has several sources of values" if sources else "has no values"
         problems.add(
-            here,
-            f"{'does not say' if not given else 'says more than once'} what it varies; give one of"
-            f" {known}",
+            here, f"{fact}; give one of values, from … to …, together, subsets or variants"
         )
         return None
-    needless = _needless(settings, given[0])
+    needless = _needless(settings, sources[0])
     if needless:
         problems.add(
-            (*here, needless), f"does not go with {_key(given[0])}; remove it", of_key=True
+            (*here, needless), f"does not apply to {_key(sources[0])}; remove it", of_key=True
         )
         return None
     before = len(problems.messages)
-    choices = _choices(here, given[0], settings, root, trees, variant, problems)
+    choices = _choices(here, sources[0], settings, root, trees, variant, problems)
     if len(problems.messages) > before:
         return None
     counts = Counter(choice.label for choice in choices)
-    twice = next((one for one, times in counts.items() if times > 1), None)
-    if twice is not None:
+    repeated = next((text for text, times in counts.items() if times > 1), None)
+    if repeated is not None:
         problems.add(
-            here, f'has the value "{twice}" twice; remove one, or name the values differently'
+            here, f'has the value "{repeated}" twice; remove one, or name the values differently'
         )
         return None
     _check_paths(here, choices, trees, problems)
-    return _with_numbers(name, choices, given[0] in ("values", "start"))
+    return _with_numbers(name, choices, sources[0] in ("values", "start"))
 
 
 def _with_numbers(name: str, choices: list[Choice], is_simple: bool) -> SweepAxis:
-    """The axis, with the choices' values as numbers where all of them are quantities of one
-    kind.
-    """
-    found: list[tuple[float, Unit]] = []
+    """Return the axis, with numbers if all choices are quantities in one unit."""
+    values: list[tuple[float, Unit]] = []
     if is_simple:
-        found = [numeric(to_python(choice.changes[0][1])) for choice in choices]
-    if len({unit for _, unit in found}) != 1 or not found[0][1]:
+        values = [numeric(to_python(choice.changes[0][1])) for choice in choices]
+    if len({unit for _, unit in values}) != 1 or not values[0][1]:
         return SweepAxis(name, tuple(choices), "")
     numbers = [
-        replace(choice, value=value) for choice, (value, _) in zip(choices, found, strict=True)
+        replace(choice, value=value) for choice, (value, _) in zip(choices, values, strict=True)
     ]
-    return SweepAxis(name, tuple(numbers), found[0][1])
+    return SweepAxis(name, tuple(numbers), values[0][1])
 
 
 def _key(source: str) -> str:
@@ -91,7 +87,7 @@ def _key(source: str) -> str:
 
 
 def _needless(settings: AxisSettings, source: str) -> str | None:
-    """A key that has no meaning beside the source of the values."""
+    """Return a key that the source of the values does not use."""
     goes_with = {
         "values": {"path", "paths"},
         "start": {"path", "paths", "to", "count", "step", "spacing"},
@@ -99,8 +95,8 @@ def _needless(settings: AxisSettings, source: str) -> str | None:
         "subsets": {"path"},
         "variants": set(),
     }[source]
-    written_keys = {one for one in settings.model_fields_set if one != source}
-    return next((_key(one) for one in sorted(written_keys) if one not in goes_with), None)
+    written_keys = {key for key in settings.model_fields_set if key != source}
+    return next((_key(key) for key in sorted(written_keys) if key not in goes_with), None)
 
 
 def _choices(
@@ -118,14 +114,14 @@ def _choices(
         return _choices_together(here, settings, root, problems)
     paths = settings.paths or ((settings.path,) if settings.path is not None else ())
     if not paths or (settings.path is not None and settings.paths is not None):
-        problems.add(here, "what the values replace is not clear; give path, or paths")
+        problems.add(here, "has no path, or both path and paths; give one")
         return []
     if source == "subsets":
         return _subset_choices(here, settings, root, trees, variant, problems)
     if source == "start":
         mark = mark_of(root, (*here, "from"))
         try:
-            found = of_range(
+            values = of_range(
                 settings.start,
                 settings.to,
                 settings.count,
@@ -136,14 +132,14 @@ def _choices(
         except ValueError as error:
             problems.add(here, str(error))
             return []
-        nodes: list[tuple[str, Node]] = [(str(value), Scalar(mark, value)) for value in found]
+        nodes: list[tuple[str, Node]] = [(str(value), Scalar(mark, value)) for value in values]
     else:
         nodes = _nodes(root, (*here, "values"), problems)
     return [Choice(text, tuple((path, node, node.mark) for path in paths)) for text, node in nodes]
 
 
 def _nodes(root: Node, steps: Steps, problems: Problems) -> list[tuple[str, Node]]:
-    """Values of an axis as nodes with their labels."""
+    """Return values of an axis as nodes with their labels."""
     node = written(root, *steps)
     if isinstance(node, Sequence):
         return [(label(item), item) for item in node.items]
@@ -190,12 +186,15 @@ def _choices_together(
         return []
     choices = []
     for k in range(count):
-        own = [column[k] for column in columns.values()]
-        text = names[k] if names else " / ".join(one[0] for one in own)
+        row = [column[k] for column in columns.values()]
+        text = names[k] if names else " / ".join(labelled[0] for labelled in row)
         choices.append(
             Choice(
                 text,
-                tuple((path, one[1], one[1].mark) for path, one in zip(columns, own, strict=True)),
+                tuple(
+                    (path, labelled[1], labelled[1].mark)
+                    for path, labelled in zip(columns, row, strict=True)
+                ),
             )
         )
     return choices
@@ -243,18 +242,18 @@ def _subset_choices(
     if count > MOST_VALUES:
         problems.add(
             (*here, "subsets"),
-            f"{count} subsets; {MOST_VALUES} are the limit, so take fewer of them",
+            f"{count} subsets; {MOST_VALUES} are the limit; reduce sizes or among",
         )
         return []
     mark = mark_of(root, (*here, "subsets"))
-    found = subsets(names, wanted.always, among, wanted.sizes)
-    return [Choice(text, (), kept=(path, kept, mark)) for text, kept in found]
+    labelled = subsets(names, wanted.always, among, wanted.sizes)
+    return [Choice(text, (), kept=(path, names_kept, mark)) for text, names_kept in labelled]
 
 
 def _check_paths(
     here: Steps, choices: list[Choice], trees: dict[str | None, Node], problems: Problems
 ) -> None:
-    """Refuse paths that lead nowhere in every variant."""
+    """Refuse a path that no variant has."""
     for path in dict.fromkeys(path for choice in choices[:1] for path, _, _ in choice.changes):
         errors = []
         for tree in trees.values():

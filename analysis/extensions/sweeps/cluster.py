@@ -21,30 +21,28 @@ from ballplate.simulator.inputs import OPENED, UnusableError
 from .bundle import Bundle, unpack
 from .execute import Runner
 from .load import load_sweep
-from .local import told
+from .local import with_relative_paths
 from .model import Sweep
 from .task import CellResult, CellTask, compute, lost
 
-# Tasks that a thread of a worker has waiting, so that it never waits itself.
+# Tasks in the queue of each thread of a worker, so that it never idles.
 WAITING = 4
-# Tries of a task that is lost with a worker, beyond those of dask itself.
+# Tries of a task that is lost with a worker, in addition to dask's own.
 TRIES = 10
-# Of the folders that files are unpacked in.
+# Prefix of the folders with unpacked files.
 PREFIX = "ballplate-sweep-"
-# Seconds until a scheduler answers, and until a worker comes.
+# Seconds to wait for a scheduler's answer, and for a worker.
 CONNECTION_TIMEOUT = 10.0
 PATIENCE = 30.0
 
 LOGGERS = ("distributed", "tornado", "asyncio")
 
-RESTART = (
-    "install the same wherever a worker runs; finished cells are stored, and the same command"
-    " continues from there"
-)
+REMEDY = "install the same ballplate on every worker"
+RESTART = "finished cells are stored, and the same command continues from there"
 
 
 class ClusterError(UnusableError):
-    """No cluster can be used."""
+    """The cluster cannot be used."""
 
 
 class OtherVersionError(Exception):
@@ -53,11 +51,10 @@ class OtherVersionError(Exception):
 
 @contextmanager
 def cluster_runner(address: str, sweep: Sweep, bundle: Bundle) -> Iterator[Runner]:
-    """A runner on the cluster of a scheduler such as tcp://127.0.0.1:8786, for as long as it is
-    needed.
+    """Return a runner on the cluster of a scheduler such as tcp://127.0.0.1:8786.
 
-    :raises ClusterError: dask is not installed, there is no scheduler at the address or not any
-        longer, or its workers have another version of ballplate, or none.
+    :raises ClusterError: dask is not installed, the scheduler does not answer (any more), or a
+        worker has another version of ballplate, or none.
     """
     with _quiet():
         yield from _runner(address, sweep, bundle)
@@ -81,7 +78,7 @@ def _runner(address: str, sweep: Sweep, bundle: Bundle) -> Iterator[Runner]:
     try:
         client = Client(address, timeout=CONNECTION_TIMEOUT, set_as_default=False)
     except Exception as error:
-        # Of an address that makes no sense there may come anything.
+        # A senseless address may raise anything.
         text = (
             f"{address}: there is no scheduler ({type(error).__name__}); start one with: dask"
             " scheduler"
@@ -99,21 +96,19 @@ def _runner(address: str, sweep: Sweep, bundle: Bundle) -> Iterator[Runner]:
                 )
             else:
                 text = f"the scheduler at {address} has ended"
-            raise ClusterError(
-                f"{text}; finished cells are stored, and the same command continues from there"
-            ) from None
+            raise ClusterError(f"{text}; {RESTART}") from None
 
     try:
         _check_versions(client)
         yield run
     finally:
         with suppress(Exception):
-            # Of a scheduler that is gone there may come anything.
+            # A dead scheduler may raise anything.
             client.close(timeout=5)
 
 
 def _is_there(client: Any) -> bool:
-    """Whether the scheduler still answers."""
+    """Return whether the scheduler still answers."""
     if client.status != "running":
         return False
     try:
@@ -125,7 +120,7 @@ def _is_there(client: Any) -> bool:
 
 @contextmanager
 def _quiet() -> Iterator[None]:
-    """Keep to ourselves what dask logs, tracebacks among it: errors are reported in words."""
+    """Silence dask's logs, which include tracebacks: errors are reported as ClusterError."""
     with suppress(ImportError):
         import distributed  # noqa: F401
     # Each of dask's loggers has a level of its own, once dask is loaded.
@@ -142,51 +137,48 @@ def _quiet() -> Iterator[None]:
 
 
 def _check_versions(client: Any) -> None:
-    """Check that all workers there are, and the scheduler, have this version of ballplate, before
-    anything is sent.
+    """Check that all present workers have this version of ballplate, before anything is sent.
 
-    :raises ClusterError: they have not, or no worker comes.
+    :raises ClusterError: one has not, or there is no worker.
     """
-    own = importlib.metadata.version("ballplate")
+    own = f"ballplate {importlib.metadata.version('ballplate')}"
     _wait(client)
-    # By functions of Python itself, which are there whatever a worker has.
-    found = client.run(importlib.metadata.version, "ballplate", on_error="return")
-    _refuse({name: _version(answer) for name, answer in found.items()}, f"ballplate {own}")
-    code = code_digest()
+    # A worker without ballplate can still run a function of Python itself.
+    versions = client.run(importlib.metadata.version, "ballplate", on_error="return")
+    _refuse(
+        {
+            name: f"ballplate {answer}" if isinstance(answer, str) else "no ballplate"
+            for name, answer in versions.items()
+        },
+        own,
+    )
+    code, other = code_digest(), f"other code of {own}"
     digests = client.run(code_digest, on_error="return")
-    told = {
-        name: "" if answer == code else f"other code of ballplate {own}"
-        for name, answer in digests.items()
-    }
-    _refuse({name: text or f"ballplate {own}" for name, text in told.items()}, f"ballplate {own}")
+    _refuse({name: own if digest == code else other for name, digest in digests.items()}, own)
 
 
-def _version(answer: object) -> str:
-    return f"ballplate {answer}" if isinstance(answer, str) else "no ballplate"
-
-
-def _refuse(found: dict[str, str], own: str) -> None:
-    others = [(name, text) for name, text in found.items() if text != own]
-    if others:
-        name, text = others[0]
-        more = f", and {len(others) - 1} more differ" if len(others) > 1 else ""
-        remedy = "install the same wherever a worker runs, and start it again"
+def _refuse(versions: dict[str, str], own: str) -> None:
+    different = [(name, text) for name, text in versions.items() if text != own]
+    if different:
+        name, text = different[0]
+        more = f", and {len(different) - 1} more differ" if len(different) > 1 else ""
+        remedy = f"{REMEDY}, and start it again"
         raise ClusterError(f"the worker {name} has {text}, and this is {own}{more}; {remedy}")
 
 
 @cache
 def code_digest() -> str:
-    """A hash of the code of ballplate: versions under development have the same number."""
-    found = hashlib.blake2b(digest_size=20)
+    """Return a hash of the code of ballplate: versions under development have the same number."""
+    total = hashlib.blake2b(digest_size=20)
     # In a checkout the parts of the package are not in one folder.
     for package in (ballplate, ballplate.simulator):
         folder = Path(str(package.__file__)).parent
         for path in sorted(folder.rglob("*.py")):
             name = path.relative_to(folder)
             if name.parts[0] not in ("simulator", "designs"):
-                found.update(f"{package.__name__} {name.as_posix()}\n".encode())
-                found.update(path.read_bytes().replace(b"\r\n", b"\n"))
-    return found.hexdigest()
+                total.update(f"{package.__name__} {name.as_posix()}\n".encode())
+                total.update(path.read_bytes().replace(b"\r\n", b"\n"))
+    return total.hexdigest()
 
 
 def _rows(
@@ -197,7 +189,7 @@ def _rows(
     code = code_digest()
     sent = [_sent(client, bundle)]
     room = WAITING * max(sum(client.nthreads().values()), 1)
-    left, under_way, tries = iter(tasks), {}, Counter[tuple[int, int]]()
+    remaining, under_way, tries = iter(tasks), {}, Counter[tuple[int, int]]()
 
     def submit(task: CellTask) -> object:
         future = client.submit(_on_worker, sent[0], code, task, pure=False, retries=0)
@@ -205,7 +197,7 @@ def _rows(
         return future
 
     completed = as_completed(
-        [submit(task) for _, task in zip(range(room), left, strict=False)], loop=client.loop
+        [submit(task) for _, task in zip(range(room), remaining, strict=False)], loop=client.loop
     )
     for future in completed:
         task = under_way.pop(future.key)
@@ -214,13 +206,12 @@ def _rows(
         except KilledWorker:
             row = lost(sweep, task)
         except OtherVersionError:
-            raise ClusterError(
-                f"a worker that came later has other code than this; {RESTART}"
-            ) from None
+            text = "a later worker has other code than this process"
+            raise ClusterError(f"{text}; {REMEDY}; {RESTART}") from None
         except CancelledError:
             if client.status != "running":
                 raise
-            # The files went with the last worker that held them.
+            # The files were lost with the last worker that held them.
             tries[task.number, task.block] += 1
             if tries[task.number, task.block] > TRIES:
                 row = lost(sweep, task)
@@ -229,13 +220,10 @@ def _rows(
                 completed.add(submit(task))
                 continue
         except (ImportError, AttributeError, TypeError) as error:
-            # A worker that came later cannot even read what it is sent.
-            text = (
-                f"a worker that came later cannot compute ({type(error).__name__}: {error}),"
-                " perhaps for lack of"
-            )
-            raise ClusterError(f"{text} ballplate; {RESTART}") from None
-        following = next(left, None)
+            # Without ballplate, a later worker cannot even read the task.
+            text = f"a later worker cannot compute ({type(error).__name__}: {error})"
+            raise ClusterError(f"{text}; {REMEDY}; {RESTART}") from None
+        following = next(remaining, None)
         if following is not None:
             completed.add(submit(following))
         yield row
@@ -243,9 +231,9 @@ def _rows(
 
 
 def _sent(client: Any, bundle: Bundle) -> Any:
-    """The files, with all workers.
+    """Send the files to all workers.
 
-    :raises ClusterError: no worker comes.
+    :raises ClusterError: there is no worker.
     """
     _wait(client)
     return client.scatter([bundle], broadcast=True)[0]
@@ -264,7 +252,7 @@ def _on_worker(bundle: Bundle, code: str, task: CellTask) -> CellResult:
     if code != code_digest():
         raise OtherVersionError
     folder, source = _unpacked(bundle)
-    return told(compute(_loaded(source, Path(folder.name)), task), source)
+    return with_relative_paths(compute(_loaded(source, Path(folder.name)), task), source)
 
 
 @cache
@@ -274,12 +262,12 @@ def _loaded(source: Path, folder: Path) -> Sweep:
 
 @cache
 def _unpacked(bundle: Bundle) -> tuple[tempfile.TemporaryDirectory[str], Path]:
-    """A folder with the files, which lasts as long as the worker, and the sweep file in it."""
+    """Return a folder with the files, kept as long as the worker, and the sweep file in it."""
     from distributed import get_worker
 
     # In the worker's own folder, which dask deletes also where the worker was killed.
     folder = tempfile.TemporaryDirectory(prefix=PREFIX, dir=get_worker().local_directory)
-    # Modules of an earlier sweep would be taken for those of this one.
+    # Otherwise Python would reuse the modules of an earlier sweep.
     for name, module in list(sys.modules.items()):
         if PREFIX in (getattr(module, "__file__", None) or ""):
             del sys.modules[name]

@@ -1,4 +1,4 @@
-"""Conditions on the values of an axis, by which cells are left out or kept."""
+"""Conditions on the values of an axis, which skip or select cells."""
 
 from __future__ import annotations
 
@@ -11,21 +11,17 @@ from .values import numeric
 
 
 def holds(condition: Any, axis: SweepAxis, choice: Choice) -> bool:
-    """Whether a condition holds for a choice: a value, one of a list, or bounds.
+    """Return whether a choice meets a condition: a value, one of a list, or bounds.
 
-    A value is compared as a quantity where it and the axis are such, and otherwise as it is
-    written.
+    Quantities in the axis's unit compare by size, other values as written.
 
-    :raises ValueError: bounds of an axis without numbers, or of another unit.
+    :raises ValueError: bounds for an axis without numbers, or in another unit.
     """
     if isinstance(condition, BoundsSettings):
-        above, below = (
-            _bound(condition.above, axis, -math.inf),
-            _bound(condition.below, axis, math.inf),
-        )
-        return above < choice.value < below
+        above = _bound(condition.above, axis, -math.inf)
+        return above < choice.value < _bound(condition.below, axis, math.inf)
     if isinstance(condition, tuple):
-        return any(holds(one, axis, choice) for one in condition)
+        return any(holds(alternative, axis, choice) for alternative in condition)
     text = "true" if condition is True else "false" if condition is False else str(condition)
     value, unit = numeric(condition)
     if axis.unit and unit == axis.unit:

@@ -1,4 +1,4 @@
-"""Standard uncertainty of the error map through the volume, and of distances corrected by it."""
+"""Standard uncertainty of the error map through the volume, and of corrected distances."""
 
 from __future__ import annotations
 
@@ -21,9 +21,7 @@ LEVELS = ("low", "middle", "high")
 
 @dataclass(frozen=True, eq=False)
 class Slice:
-    """A level of the volume; `values` (y, x) in metres, NaN where the observations leave the error
-    open.
-    """
+    """A level of the volume; `values` (y, x) in metres, NaN if undetermined."""
 
     name: str
     level: float | None
@@ -32,12 +30,12 @@ class Slice:
 
 @dataclass(frozen=True, eq=False)
 class ErrorMap:
-    """Standard uncertainty of the error function at a grid of x and y in metres, one or three
+    """Standard uncertainty of the error function at a grid of x and y in metres, in one or three
     slices.
 
     A value is the root mean square over the co-ordinates, so that it compares with U4. `within` is
-    the share of the distances between points of the grid that are within the target uncertainty,
-    None without one.
+    the share of the distances between points of the grid within the target uncertainty, None
+    without one.
     """
 
     x: Array
@@ -48,33 +46,33 @@ class ErrorMap:
 
 @single_threaded
 def error_map(experiment: Experiment, nodes: int = POINTS) -> ErrorMap:
-    """The error map's uncertainty at `nodes` points along x and y, with the probe with which the
-    experiment is evaluated, at zero machine error.
+    """Return the error map's uncertainty at `nodes` points along x and y, at zero machine error.
+
+    The probe is the one with which the experiment is evaluated.
     """
     at = linearise(lay_out(experiment))
-    found, target = point_map(at, nodes), experiment.target_uncertainty
+    drawn, target = point_map(at, nodes), experiment.target_uncertainty
     if target is None:
-        return found
+        return drawn
     pairs = point_pairs(_on_grid(at, nodes), target.standard)[1]
-    return replace(found, within=pairs.within / pairs.count)
+    return replace(drawn, within=pairs.within / pairs.count)
 
 
 def point_map(at: Linearisation, nodes: int) -> ErrorMap:
-    """The error map's uncertainty for a design that is linearised already, without the distances
-    between its points.
-    """
+    """Return the error map's uncertainty for a linearised design, without distances."""
     on_grid = _on_grid(at, nodes)
     values = displacements(on_grid, evaluation_points(on_grid.design)).uncertainties
     x, y, levels = _sides(at.design, nodes)
     of_levels = np.sqrt((values**2).mean(axis=1)).reshape(len(levels), len(y), len(x))
     slices = [
-        Slice(name, level, found) for (name, level), found in zip(levels, of_levels, strict=True)
+        Slice(name, level, slice_values)
+        for (name, level), slice_values in zip(levels, of_levels, strict=True)
     ]
     return ErrorMap(x, y, tuple(slices), None)
 
 
 def _sides(design: Design, nodes: int) -> tuple[Array, Array, list[tuple[str, float | None]]]:
-    """The grid's x and y, and its levels with their names."""
+    """Return the grid's x and y, and its levels with their names."""
     volume = design.machine.volume
     x, y = (np.linspace(volume.lower[k], volume.upper[k], nodes) for k in (0, 1))
     if design.dimension == 2:
@@ -84,8 +82,8 @@ def _sides(design: Design, nodes: int) -> tuple[Array, Array, list[tuple[str, fl
 
 
 def _on_grid(at: Linearisation, nodes: int) -> Linearisation:
-    """The same linearisation, evaluated at the grid: what readings determine does not depend on
-    where they are evaluated.
+    """Return the linearisation evaluated at the grid, which does not change what readings
+    determine.
     """
     x, y, levels = _sides(at.design, nodes)
     sides = [y, x] if at.design.dimension == 2 else [np.array([z for _, z in levels]), y, x]

@@ -7,14 +7,12 @@ from dataclasses import replace
 from .model import Sweep
 from .task import CellResult, CellTask, compute
 
-# Data sets by which the others are judged.
+# Data sets that are timed, from which the time of the others is extrapolated.
 SOME = 256
 
 
 def seconds_of(sweep: Sweep) -> tuple[float, list[CellResult]]:
-    """Seconds that all cells take in one process, and the rows of the cells that were tried: first,
-    middle and last.
-    """
+    """Return seconds of all cells in one process, and the rows of the first, middle and last."""
     last = len(sweep.cells) - 1
     numbers = sorted({0, last // 2, last})
     total, rows = 0.0, []

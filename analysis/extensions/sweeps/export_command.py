@@ -1,4 +1,4 @@
-"""`ballplate sweep --export`: a sweep's results as one table for other programs."""
+"""`ballplate sweep --export`: write a sweep's results as one table for other programs."""
 
 from __future__ import annotations
 
@@ -19,11 +19,13 @@ if TYPE_CHECKING:
 
 BAD_FILE = 3
 
+REPLACE = "to compute and replace, run ballplate sweep again"
+
 
 DESCRIPTION = (
-    "Write a row for each cell of a store and a column for each figure, in metres and"
-    " radians, with the unit in the column's name. From a damaged store, the cells that"
-    " can be read are written, and the exit status is 3."
+    "Write one row per cell of a store and one column per value, in metres and radians,"
+    " with the unit in the column's name. From a damaged store, write the readable cells."
+    " Exit status: 3 if the store is damaged."
 )
 
 
@@ -43,7 +45,7 @@ def add_options(parser: ArgumentParser) -> None:
 
 
 def add_store(parser: ArgumentParser) -> None:
-    """Add the store and the choice of a sweep in it."""
+    """Add the options that choose a store and a sweep in it."""
     parser.add_argument(
         "store", metavar="STORE", type=Path, help="store written by ballplate sweep"
     )
@@ -56,18 +58,21 @@ def add_store(parser: ArgumentParser) -> None:
 
 
 def warn_of_other_methods(path: Path, keys: Iterable[str]) -> None:
-    """Tell of rows that this version would compute by another method."""
+    """Warn of rows that another method computed."""
     from .store import of_other_methods
 
     for text in of_other_methods(keys):
-        complain(f"{path}: {text}; run ballplate sweep again to compute them anew")
+        complain(f"{path}: {text}; to replace them, run ballplate sweep again")
 
 
 def warn_of_damage(path: Path, results: StoredResults) -> bool:
-    """Tell what of a store could not be read; whether there is anything."""
+    """Warn of unreadable cells, and return whether there are any."""
     from .store import damaged_cells
+    from .store_file import RECOMPUTE
 
-    text = damaged_cells(path, results, "ballplate sweep computes them anew")
+    # `sweep` replaces damaged rows, but refuses a file that SQLite finds damaged.
+    remedy = f"restore a copy, or {RECOMPUTE}" if results.file_fault else REPLACE
+    text = damaged_cells(path, results, remedy)
     if text:
         complain(text)
     return bool(text)
@@ -85,10 +90,10 @@ def run(options: Namespace) -> int:
         raise UsageError(f"{options.output} should end in .csv or .parquet")
     with closing(open_store(options.store)) as store:
         number, defined = chosen_sweep(store, options.sweep)
-        found = results(store, number, len(defined["cells"]))
-        is_damaged = warn_of_damage(store.path, found)
-        table = frame_of(found, defined)
-        warn_of_other_methods(store.path, found.keys)
+        stored = results(store, number, len(defined["cells"]))
+        is_damaged = warn_of_damage(store.path, stored)
+        table = frame_of(stored, defined)
+        warn_of_other_methods(store.path, stored.keys)
     if suffix != ".parquet":
         # A label or a reason may begin like a formula.
         table = table.map(lambda cell: cell_of_text(cell) if isinstance(cell, str) else cell)

@@ -1,5 +1,5 @@
-"""Fingerprints of validated experiments: equal where the same is computed, whatever the file looks
-like.
+"""Fingerprints of validated experiments: equal if the computation is equal, however the file is
+written.
 """
 
 from __future__ import annotations
@@ -17,9 +17,8 @@ from ballplate.simulator.experiment import Experiment
 from ballplate.simulator.machines import PythonSettings, module_source
 from pydantic import BaseModel
 
-# The methods that figures and verdicts have been computed by, and what each corrected of the one
-# before. A new one begins whenever any experiment comes to other figures or another verdict; its
-# number is part of every cell's key.
+# Methods of computation, each with its corrections of the one before. A new method begins whenever
+# any experiment gets other results; its number is part of every cell's key.
 METHODS = {
     1: "",
     2: (
@@ -34,8 +33,8 @@ METHODS = {
 }
 METHOD = max(METHODS)
 
-# What says nothing about the result: names, and where things stand; and what was made of a file
-# whose content counts.
+# Without influence on the result: names, positions in files, and data read from files whose content
+# counts.
 LEFT_OUT = (
     "title",
     "description",
@@ -51,8 +50,8 @@ LEFT_OUT = (
     "_trust",
     "_found",
 )
-# The same, of single classes: how the laboratory's tables are read; and functions in Python, which
-# the text of their module and their options tell.
+# The same, for single classes: the reading of the laboratory's tables; and functions in Python,
+# whose module text and options count instead.
 LEFT_OUT_OF = {
     "Experiment": ("readings", "extensions"),
     "Prior": ("data",),
@@ -62,8 +61,8 @@ LEFT_OUT_OF = {
 # Names of fields in the fingerprints that stores hold, where the field has another name today.
 EARLIER_NAMES = {"target_uncertainty": "target_accuracy"}  # earlier name second
 
-# Keys that files did not have at first, by what has them: where they are left out, all is as it was
-# without them.
+# Keys added since the first stores, by class: with its default, such a key does not change a
+# fingerprint.
 LATER_KEYS = {
     "Experiment": ("influences", "noise", "stars", "sections"),
     "ArtefactSettings": ("reads", "flatness"),
@@ -76,17 +75,17 @@ LATER_KEYS = {
     "TrueMachineFileSettings": ("level",),
 }
 
-# Settings that decide only how a fit of real readings is told: the axes of a plate.
-TOLD_LATER = ("axes",)
+# Keys that matter only when real readings are reported: the axes of a plate.
+REPORT_ONLY = ("axes",)
 
 
 def with_method(text: str) -> str:
-    """A cell's key: the number of the method, and a text that tells what is computed."""
+    """Return a cell's key: the number of the method, and a text that identifies the computation."""
     return f"{METHOD} {text}"
 
 
 def method_of(key: str) -> int:
-    """The number of the method that a key's row was computed by; the first had none in its keys.
+    """Return the number of the method of a key; keys of the first method have no number.
 
     >>> method_of("2 0f3a"), method_of("0f3a"), method_of("invalid 0f3a")
     (2, 1, 1)
@@ -98,29 +97,26 @@ def method_of(key: str) -> int:
 
 
 def without_method(key: str) -> str:
-    """What a key tells of what is computed, by whatever method."""
+    """Return a key without the number of its method."""
     return key.partition(" ")[2] if key.partition(" ")[0].isdigit() and " " in key else key
 
 
 def fingerprint(experiment: Experiment, *more: object) -> str:
-    """A hash of everything that the figures of an experiment depend on, and of `more`.
+    """Return a hash of everything that influences the results of an experiment, and of `more`.
 
-    Files that the experiment names count by their content, a user's own error model by the text of
-    its module.
+    Named files count by content, a user's own error model by the text of its module.
 
-    :raises TypeError: a value of a kind that is not known here, so that nothing is passed over.
+    :raises TypeError: a value of an unknown type, which must not be ignored.
     """
     pieces: list[bytes] = []
     _add(pieces, replace(experiment, name=None))
-    for one in more:
-        _add(pieces, one)
+    for value in more:
+        _add(pieces, value)
     return hashlib.blake2b(b"".join(pieces), digest_size=20).hexdigest()
 
 
 def _add(pieces: list[bytes], value: Any) -> None:
-    """Add a value with its type and length, so that neighbours cannot be mistaken for one
-    another.
-    """
+    """Add a value with its type and length, so that neighbours remain distinct."""
     if value is None or isinstance(value, (bool, int, str)):
         pieces.append(_text(f"{type(value).__name__} {value!r}"))
     elif isinstance(value, (tuple, list)):
@@ -146,10 +142,10 @@ def _add(pieces: list[bytes], value: Any) -> None:
     elif is_dataclass(value) and not isinstance(value, type):
         pieces.append(_text(f"object {type(value).__name__}"))
         left_out = (*LEFT_OUT, *LEFT_OUT_OF.get(type(value).__name__, ()))
-        for name, found in _entries(value):
-            if name not in left_out and not _is_as_before(value, name, found):
+        for name, item_value in _entries(value):
+            if name not in left_out and not _is_later_default(value, name, item_value):
                 pieces.append(_text(EARLIER_NAMES.get(name, name)))
-                _add(pieces, found)
+                _add(pieces, item_value)
         if isinstance(value, PythonCalibration):
             pieces.append(_text(module_text(value.object, value.source)))
     else:
@@ -157,36 +153,39 @@ def _add(pieces: list[bytes], value: Any) -> None:
 
 
 def _entries(value: Any) -> Iterator[tuple[str, Any]]:
-    """Fields of a data class with their values; probes are two mappings, as they were at first."""
+    """Return the fields of a data class with their values; probes remain two mappings, as in the
+    first stores.
+    """
     for field in fields(value):
-        found = getattr(value, field.name)
+        content = getattr(value, field.name)
         if isinstance(value, Experiment) and field.name == "probes":
-            found = {name: probe.offset for name, probe in value.probes.items()}
-        yield field.name, found
+            content = {name: probe.offset for name, probe in value.probes.items()}
+        yield field.name, content
         if isinstance(value, Experiment) and field.name == "priors":
-            estimated = {k: one for k, one in value.probes.items() if one.is_estimated}
-            yield (
-                "offset_uncertainties",
-                {name: probe.standard_uncertainty for name, probe in estimated.items()},
-            )
+            uncertainties = {
+                name: probe.standard_uncertainty
+                for name, probe in value.probes.items()
+                if probe.is_estimated
+            }
+            yield "offset_uncertainties", uncertainties
 
 
 @cache
 def _later_keys(kinds: tuple[Any, ...]) -> frozenset[str]:
-    """Keys of a class and of those that it is made from that files did not have at first."""
-    return frozenset(name for one in kinds for name in LATER_KEYS.get(one.__name__, ()))
+    """Return the later keys of a class and of its bases."""
+    return frozenset(name for kind in kinds for name in LATER_KEYS.get(kind.__name__, ()))
 
 
-def _is_as_before(value: Any, name: str, found: Any) -> bool:
-    """Whether this is the default of a key that files did not have at first."""
+def _is_later_default(value: Any, name: str, content: Any) -> bool:
+    """Return whether a value is the default of a later key."""
     if name not in _later_keys(tuple(type(value).__mro__)):
         return False
     if isinstance(value, BaseModel):
         of_settings = type(value).model_fields[name]
-        return bool(found == of_settings.get_default(call_default_factory=True))
+        return bool(content == of_settings.get_default(call_default_factory=True))
     default = next(field for field in fields(value) if field.name == name)
-    made = default.default_factory
-    return bool(found == (default.default if made is MISSING else made()))
+    factory = default.default_factory
+    return bool(content == (default.default if factory is MISSING else factory()))
 
 
 # The same names and counts come again and again, in a cell and from cell to cell.
@@ -199,10 +198,10 @@ def _text(text: str) -> bytes:
 def _settings(pieces: list[bytes], value: BaseModel) -> None:
     pieces.append(_text(f"settings {type(value).__name__}"))
     for name in type(value).model_fields:
-        found = getattr(value, name)
-        if name not in TOLD_LATER and not _is_as_before(value, name, found):
+        content = getattr(value, name)
+        if name not in REPORT_ONLY and not _is_later_default(value, name, content):
             pieces.append(_text(EARLIER_NAMES.get(name, name)))
-            _add(pieces, found)
+            _add(pieces, content)
     for name, item in sorted((value.__pydantic_private__ or {}).items()):
         if name not in LEFT_OUT:
             pieces.append(_text(name))
@@ -212,10 +211,12 @@ def _settings(pieces: list[bytes], value: BaseModel) -> None:
 
 
 def module_text(made_by: str, folder: Path | None) -> str:
-    """The text of the module with a user's own error model or calibration, `made_by` an object
-    there; empty where Python has none of it.
+    """Return the text of the module of a user's own error model or calibration; empty if there is
+    none.
+
+    `made_by` names an object in the module.
     """
-    place = module_source(made_by, folder)
-    if place is None or place.suffix != ".py" or not place.is_file():
+    path = module_source(made_by, folder)
+    if path is None or path.suffix != ".py" or not path.is_file():
         return ""
-    return place.read_text(encoding="utf-8", errors="replace")
+    return path.read_text(encoding="utf-8", errors="replace")

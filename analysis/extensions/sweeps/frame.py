@@ -1,5 +1,5 @@
-"""A sweep's results as one table: a row for each cell, a column for each figure, with its unit in
-the name.
+"""A sweep's results as one table: one row per cell, one column per value, with its unit in the
+name.
 """
 
 from __future__ import annotations
@@ -8,33 +8,22 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from .store import Store, chosen_sweep, results
 from .stored import StoredResults
 
 if TYPE_CHECKING:
     import pandas
 
-# Whole numbers up to this are exact in the double precision that a definition keeps them in.
+# Whole numbers up to this are exact in double precision.
 MOST_WHOLE = 2.0**53
 
 
-def frame(store: Store, sweep: int | None = None) -> pandas.DataFrame:
-    """The cells of a sweep, the newest of the store by default, in their order; those not done are
-    not in it.
-
-    Columns: `cell` from 0, a column for each axis (in metres or radians, with the unit in its name,
-    or texts), `status`, `reason`, the figures by name, `data_set_seed`, `fingerprint`,
-    `duration_s`, and the versions. Figures that a cell lacks are NaN. Cells that cannot be read are
-    not in it either.
-
-    :raises StoreError: there is no such sweep, or the store cannot be read.
-    """
-    number, defined = chosen_sweep(store, sweep)
-    return frame_of(results(store, number, len(defined["cells"])), defined)
-
-
 def frame_of(results: StoredResults, defined: dict[str, Any]) -> pandas.DataFrame:
-    """The table of `frame`."""
+    """Return the cells of a sweep in their order, without unfinished and unreadable ones.
+
+    Columns: `cell` from 0, one for each axis (in metres or radians, with the unit in its name, or
+    texts), `status`, `reason`, the results by name (NaN if a cell lacks one), `data_set_seed`,
+    `fingerprint`, `duration_s`, and the versions.
+    """
     import pandas
 
     axes = defined["axes"]

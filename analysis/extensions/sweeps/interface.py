@@ -1,7 +1,7 @@
-"""Sweeps and their stores from Python: what `ballplate sweep` does.
+"""Sweeps and their stores from Python, as `ballplate sweep` computes them.
 
-Every function raises `ballplate.StoreError` for a store that cannot be used, and otherwise what
-those of `ballplate.api` raise.
+Every function raises `ballplate.StoreError` for a store that it cannot use, otherwise the errors of
+`ballplate.api`.
 """
 
 from __future__ import annotations
@@ -38,12 +38,11 @@ def sweep(
     folders: Sequence[PathLike] = (),
     report: Report = unreported,
 ) -> SweepResult:
-    """A family of experiments, computed into a store, which continues where it stopped.
+    """Compute a family of experiments into a store, or continue an interrupted sweep.
 
-    The store is the sweep file's name with .sqlite, unless another is named. A sweep other than the
-    one that it holds is refused, or entered `beside` that. `folders` are those, besides those of
-    the sweep file and of its base, whose files the sweep may name; with `fail_fast` it ends when a
-    cell fails.
+    The default store is the sweep file's name with .sqlite. A store that holds another sweep is
+    refused, unless `beside` adds this one. The sweep may name files in its own folder, that of its
+    base, and `folders`; `fail_fast` stops it when a cell fails.
 
     :raises StoreError: the store cannot be used.
     :raises OtherSweepError: it holds another sweep.
@@ -65,21 +64,22 @@ def sweep(
     ensure_type(bool, "True or False", retry_failed=retry_failed, beside=beside)
     ensure_type(bool, "True or False", fail_fast=fail_fast)
     ensure_report(report)
-    given = load_sweep(path, folders=tuple(Path(os.path.abspath(one)) for one in folders))
-    bundle = bundle_of(given)
+    loaded = load_sweep(path, folders=tuple(Path(os.path.abspath(folder)) for folder in folders))
+    bundle = bundle_of(loaded)
     with writable_store(
         Path(path).with_suffix(".sqlite") if store is None else Path(store)
     ) as opened:
-        entered = enter(opened, given, bundle, beside)
-        runner = nullcontext(local_runner(given, bundle, workers))
-        summary = compute_sweep(opened, given, entered, runner, retry_failed, fail_fast, report)
-        return result_of(opened, given, entered, summary)
+        entered = enter(opened, loaded, bundle, beside)
+        runner = nullcontext(local_runner(loaded, bundle, workers))
+        summary = compute_sweep(opened, loaded, entered, runner, retry_failed, fail_fast, report)
+        return result_of(opened, loaded, entered, summary)
 
 
 def stored(store: PathLike, sweep: int | None = None) -> SweepResult:
-    """A sweep of a store, the newest unless its number is given, as far as it is computed.
+    """Return a sweep of a store, the newest unless its number is given, with the cells computed so
+    far.
 
-    What of a damaged store cannot be read is in the result's `remarks`, and its cells are left out.
+    Of a damaged store, unreadable cells are missing; the result's `remarks` list them.
 
     >>> import tempfile
     >>> with tempfile.TemporaryDirectory() as folder:
@@ -107,12 +107,12 @@ def sweep_report(
     report: Report = unreported,
     compare: PathLike | None = None,
 ) -> str:
-    r"""A sweep of a store as an HTML page, or its tables in another form.
+    r"""Return a sweep of a store as an HTML page, or its tables in another form.
 
-    Drawings of designs whose error models are in Python need `run_modules`. On a page the newest
-    sweep of a store to `compare` with is set beside it.
+    Designs with error models in Python are drawn only with `run_modules`. A page can `compare` the
+    sweep with the newest one of another store.
 
-    :raises ImportError: what pages need is not installed.
+    :raises ImportError: a library for pages is not installed.
     :raises ValueError: the two sweeps cannot be compared.
 
     >>> import tempfile
@@ -126,7 +126,11 @@ def sweep_report(
     """
     from contextlib import closing
 
+    from ballplate.presentation import FORMATS
+
     from .report.results import read_results
+    from .report.sweep_page import sweep_page
+    from .report.tables import report_tables
     from .store import open_store
 
     ensure_path("store", store)
@@ -135,18 +139,12 @@ def sweep_report(
     if compare is not None:
         ensure_path("compare", compare)
         if form != "html":
-            raise ValueError("compare goes with a page only; leave it out")
+            raise ValueError("compare applies to pages only; leave it out")
     ensure_type(bool, "True or False", run_modules=run_modules)
     ensure_report(report)
     if form == "html":
-        from .report.sweep_page import sweep_page
-
-        beside = None if compare is None else Path(compare)
-        return sweep_page(Path(store), sweep, run_modules, beside, report)
+        reference = None if compare is None else Path(compare)
+        return sweep_page(Path(store), sweep, run_modules, reference, report)
     with closing(open_store(Path(store))) as opened:
         results = read_results(opened, sweep)
-        from ballplate.presentation import FORMATS
-
-        from .report.tables import report_tables
-
         return FORMATS[form](results.title, report_tables(results))

@@ -1,4 +1,4 @@
-"""Loading of a sweep file: its axes and cells, or all errors in it."""
+"""Loading of a sweep file into axes and cells."""
 
 from __future__ import annotations
 
@@ -16,6 +16,7 @@ from ballplate.simulator.experiment import (
     is_same_place,
     node_at,
     override,
+    python_models,
     variant_trees,
     with_present_keys,
 )
@@ -38,7 +39,7 @@ from ballplate.simulator.inputs import (
 )
 
 from .axes import read_axis
-from .bundle import bundle_of, code_digest, has_code
+from .bundle import bundle_of, code_digest
 from .conditions import holds
 from .model import Sweep, SweepAxis
 from .store_columns import is_reserved
@@ -54,11 +55,11 @@ def load_sweep(
     folders: tuple[Path, ...] = (),
     trust: Trust = OPENED,
 ) -> Sweep:
-    """Load a sweep file and the experiment file that it starts from, or `base` in its place.
+    """Load a sweep file and the experiment file that it starts from, or `base` instead.
 
     Files that it names must be below its folder, that of its base, or one of `folders`.
 
-    :raises ExperimentError: one of the two is wrong; holds everything that was found.
+    :raises ExperimentError: all errors in the two files.
     """
     source = Path(path)
     root = read_tree(source)
@@ -78,24 +79,8 @@ def load_sweep(
         problems.take(error, ("base",))
         raise ExperimentError(sorted(problems.messages)) from None
     _check_variant(settings, trees, problems)
-    axes: list[SweepAxis] = []
-    for name, one in settings.axes.items():
-        found = read_axis(name, one, root, trees, settings.variant, problems)
-        axes += [found] if found is not None else []
-    if not problems.messages:
-        _check_apart(axes, next(iter(trees.values())), problems)
-    _check_names(axes, problems)
-    _check_conditions(settings, axes, problems)
-    if problems.messages:
-        raise ExperimentError(sorted(problems.messages))
-    total = math.prod(len(axis.choices) for axis in axes)
-    if total > MOST_CELLS:
-        problems.add(
-            ("axes",),
-            f"{total} combinations of values; {MOST_CELLS} are the limit, so take fewer values",
-        )
-        raise ExperimentError(problems.messages)
-    cells = tuple(_kept(settings, axes))
+    axes = _axes(settings, root, trees, problems)
+    cells = tuple(_selected_cells(settings, axes))
     if not cells:
         problems.add(
             ("skip",) if settings.skip else ("only",), "leaves no cell; relax the conditions"
@@ -117,14 +102,38 @@ def load_sweep(
     )
     _check_base(sweep)
     bundle = bundle_of(sweep)
-    code = code_digest(bundle) if any(map(has_code, trees.values())) else ""
+    has_code = any(True for tree in trees.values() for _ in python_models(tree))
+    code = code_digest(bundle) if has_code else ""
     return replace(sweep, digest=bundle.digest, code=code)
 
 
-def experiment_of(sweep: Sweep, number: int) -> Experiment:
-    """The experiment of a cell.
+def _axes(
+    settings: SweepSettings, root: Node, trees: dict[str | None, Node], problems: Problems
+) -> list[SweepAxis]:
+    read_axes = [
+        read_axis(name, axis_settings, root, trees, settings.variant, problems)
+        for name, axis_settings in settings.axes.items()
+    ]
+    axes = [axis for axis in read_axes if axis is not None]
+    if not problems.messages:
+        _check_apart(axes, next(iter(trees.values())), problems)
+    _check_names(axes, problems)
+    _check_conditions(settings, axes, problems)
+    total = math.prod(len(axis.choices) for axis in axes)
+    if not problems.messages and total > MOST_CELLS:
+        problems.add(
+            ("axes",),
+            f"{total} combinations of values; {MOST_CELLS} are the limit; give fewer values",
+        )
+    if problems.messages:
+        raise ExperimentError(sorted(problems.messages))
+    return axes
 
-    :raises ExperimentError: a cell that makes no valid experiment.
+
+def experiment_of(sweep: Sweep, number: int) -> Experiment:
+    """Return the experiment of a cell.
+
+    :raises ExperimentError: the cell makes no valid experiment.
     """
     choices = sweep.choices(number)
     variant = next(
@@ -148,20 +157,26 @@ def experiment_of(sweep: Sweep, number: int) -> Experiment:
     return experiment
 
 
-def _subset(tree: Node, path: str, kept: tuple[str, ...], mark: Mark) -> tuple[str, Node, Mark]:
-    """The list at a path with some of its entries only.
+def _subset(
+    tree: Node, path: str, names_kept: tuple[str, ...], mark: Mark
+) -> tuple[str, Node, Mark]:
+    """Return the list at a path with only some entries.
 
-    :raises ExperimentError: an entry that this variant does not have.
+    :raises ExperimentError: the variant lacks an entry.
     """
     try:
         place = node_at(tree, path)
     except ValueError as error:
         raise mark.refused(str(error), path) from None
     names = (entry_names(place) if place is not None else None) or []
-    absent = next((name for name in kept if name not in names), None)
+    absent = next((name for name in names_kept if name not in names), None)
     if absent is not None or not isinstance(place, Sequence):
         raise mark.refused(f'no entry "{absent}" in this variant; {hint(str(absent), names)}', path)
-    return path, Sequence(place.mark, tuple(place.items[names.index(name)] for name in kept)), mark
+    return (
+        path,
+        Sequence(place.mark, tuple(place.items[names.index(name)] for name in names_kept)),
+        mark,
+    )
 
 
 def _settings(root: Node, problems: Problems) -> SweepSettings | None:
@@ -173,9 +188,9 @@ def _settings(root: Node, problems: Problems) -> SweepSettings | None:
 
 
 def _trees(base: Path) -> dict[str | None, Node]:
-    """Trees of the base file by variant, or of the whole under None.
+    """Return the trees of the base file by variant, or the whole file under None.
 
-    :raises ExperimentError: the file cannot be read, or its variants cannot be made.
+    :raises ExperimentError: the file cannot be read, or a variant is invalid.
     """
     root = with_present_keys(read_tree(base))
     problems = Problems(root)
@@ -206,27 +221,26 @@ def _check_variant(
 
 
 def _check_apart(axes: list[SweepAxis], tree: Node, problems: Problems) -> None:
-    """Refuse axes that change the same place, told by one of the variants."""
+    """Refuse axes that change the same node."""
 
-    def clash(one: str, other: str) -> bool:
+    def is_clash(earlier: str, path: str) -> bool:
         try:
-            return is_same_place(tree, one, other)
+            return is_same_place(tree, earlier, path)
         except ValueError:
-            return one == other
+            # Only another variant has the path.
+            return earlier == path
 
     paths = [(axis.name, path) for axis in axes for path in axis.choices[0].paths]
     for k, (name, path) in enumerate(paths):
-        other = next((one for one in paths[:k] if clash(one[1], path)), None)
-        if other is not None:
-            text = (
-                f'{path} is part of the same place as {other[1]} of the axis "{other[0]}"; change'
-                " it once"
-            )
-            problems.add(("axes", name), text)
+        for earlier_name, earlier in paths[:k]:
+            if is_clash(earlier, path):
+                text = f'{path} overlaps {earlier} of the axis "{earlier_name}"; change it once'
+                problems.add(("axes", name), text)
+                break
 
 
 def _check_names(axes: list[SweepAxis], problems: Problems) -> None:
-    """Refuse axes that would share a column with another one, or with what is recorded."""
+    """Refuse axes with the same column, or with the name of a recorded column."""
     columns: dict[str, str] = {}
     for axis in axes:
         if is_reserved(axis.column):
@@ -248,6 +262,7 @@ def _check_names(axes: list[SweepAxis], problems: Problems) -> None:
 
 def _check_conditions(settings: SweepSettings, axes: list[SweepAxis], problems: Problems) -> None:
     by_name = {axis.name: axis for axis in axes}
+    # An axis with errors of its own is in the file but not in `axes`.
     for key, entries in (("skip", settings.skip), ("only", settings.only)):
         for k, entry in enumerate(entries):
             for name, condition in entry.items():
@@ -255,12 +270,10 @@ def _check_conditions(settings: SweepSettings, axes: list[SweepAxis], problems: 
                     text = f'there is no axis "{name}"; {hint(name, settings.axes)}'
                     problems.add((key, k, name), text, of_key=True)
                 elif name in by_name:
+                    axis = by_name[name]
                     try:
-                        if not any(
-                            holds(condition, by_name[name], choice)
-                            for choice in by_name[name].choices
-                        ):
-                            values = listing(choice.label for choice in by_name[name].choices)
+                        if not any(holds(condition, axis, choice) for choice in axis.choices):
+                            values = listing(choice.label for choice in axis.choices)
                             problems.add(
                                 (key, k, name), f"holds for no value of the axis; it has {values}"
                             )
@@ -268,47 +281,41 @@ def _check_conditions(settings: SweepSettings, axes: list[SweepAxis], problems: 
                         problems.add((key, k, name), str(error))
 
 
-def _kept(settings: SweepSettings, axes: list[SweepAxis]) -> Iterator[tuple[int, ...]]:
-    """Cells that the conditions leave."""
-    place = {axis.name: k for k, axis in enumerate(axes)}
+def _selected_cells(settings: SweepSettings, axes: list[SweepAxis]) -> Iterator[tuple[int, ...]]:
+    """Return the cells that the conditions select."""
 
-    def sets(entries: tuple[dict[str, Any], ...]) -> list[list[tuple[int, frozenset[int]]]]:
+    # Each condition is evaluated once for each value of its axis, not for each cell.
+    def allowed(entry: dict[str, Any]) -> list[set[int]]:
         return [
-            [
-                (
-                    place[name],
-                    frozenset(
-                        k
-                        for k, choice in enumerate(axes[place[name]].choices)
-                        if holds(condition, axes[place[name]], choice)
-                    ),
-                )
-                for name, condition in entry.items()
-            ]
-            for entry in entries
+            {
+                k
+                for k, choice in enumerate(axis.choices)
+                if axis.name not in entry or holds(entry[axis.name], axis, choice)
+            }
+            for axis in axes
         ]
 
-    skip, only = sets(settings.skip), sets(settings.only)
+    def is_in(cell: tuple[int, ...], entries: list[list[set[int]]]) -> bool:
+        return any(all(map(set.__contains__, entry, cell)) for entry in entries)
+
+    skip, only = list(map(allowed, settings.skip)), list(map(allowed, settings.only))
     for cell in product(*(range(len(axis.choices)) for axis in axes)):
-        if any(all(cell[k] in chosen for k, chosen in entry) for entry in skip):
-            continue
-        if only and not any(all(cell[k] in chosen for k, chosen in entry) for entry in only):
-            continue
-        yield cell
+        if not is_in(cell, skip) and (not only or is_in(cell, only)):
+            yield cell
 
 
 def _check_base(sweep: Sweep) -> None:
-    """Refuse a sweep whose base file is wrong in itself, where its first cell is wrong as well.
+    """Refuse a sweep with an invalid base file if its first cell is invalid, too.
 
-    :raises ExperimentError: what is wrong with the base file.
+    :raises ExperimentError: the errors in the base file.
     """
     try:
         experiment_of(sweep, 0)
     except ExperimentError:
         messages: set[Message] = set()
         for name, tree in sweep.trees.items():
-            experiment, found = build(tree, sweep.base, name, sweep.trust)
+            experiment, errors = build(tree, sweep.base, name, sweep.trust)
             if experiment is not None:
                 return
-            messages |= set(found)
+            messages |= set(errors)
         raise ExperimentError(sorted(messages)) from None

@@ -1,6 +1,4 @@
-"""Execution of a sweep's tasks in processes of this machine; a process that is killed costs only
-time.
-"""
+"""Execution of a sweep's tasks in processes of this machine; a killed process costs only time."""
 
 from __future__ import annotations
 
@@ -22,22 +20,20 @@ from .load import load_sweep
 from .model import Sweep
 from .task import CellResult, CellTask, compute, lost
 
-# Deaths of processes, without a result in between, after which the tasks at the front are tried one
-# by one.
+# Deaths of processes, without a result in between, after which each of the next tasks gets its own
+# process.
 DEATHS = 3
 # Tries of a task in a process of its own.
 TRIES = 2
 
 
 class ChangedError(Exception):
-    """The files of a sweep are no longer those that it was started with."""
+    """Files of a sweep have changed since its start."""
 
 
 @dataclass(frozen=True)
 class _Source:
-    """What a process loads a sweep from: its file, further folders whose files it may take along,
-    and the trust in them.
-    """
+    """Source of a sweep for another process: its file, further folders, the trust in them."""
 
     file: Path
     folders: tuple[Path, ...]
@@ -45,10 +41,9 @@ class _Source:
 
 
 def local_runner(sweep: Sweep, bundle: Bundle, workers: int) -> Runner:
-    """A runner in processes of this machine; with one worker in this process.
+    """Return a runner in processes of this machine; with one worker in this process.
 
-    It raises ChangedError instead of a row that was computed from files other than those of the
-    bundle.
+    It raises ChangedError instead of returning a row from changed files.
     """
     source = _Source(Path(os.path.abspath(sweep.source)), sweep.folders, sweep.trust)
     digest = bundle.digest
@@ -69,22 +64,22 @@ def _in_workers(
 ) -> Iterator[CellResult]:
     from joblib.externals.loky.process_executor import TerminatedWorkerError
 
-    left = {(task.number, task.block): task for task in tasks}
+    remaining = {(task.number, task.block): task for task in tasks}
     deaths = 0
-    while left:
+    while remaining:
         if deaths >= DEATHS:
-            # One of those under way ends its process each time; each gets a process of its own.
-            for task in list(left.values())[: 2 * workers]:
-                del left[task.number, task.block]
+            # One of the current tasks kills its process each time: separate them.
+            for task in list(remaining.values())[: 2 * workers]:
+                del remaining[task.number, task.block]
                 row = _alone(source, digest, task)
                 yield row if row is not None else lost(sweep, task)
             deaths = 0
-        arguments = ((source, digest, task) for task in list(left.values()))
+        arguments = ((source, digest, task) for task in list(remaining.values()))
         try:
             for row in in_processes(
                 compute_unchanged, arguments, workers, ordered=False, batch_size="auto"
             ):
-                del left[row.number, row.block]
+                del remaining[row.number, row.block]
                 deaths = 0
                 yield row
         except TerminatedWorkerError:
@@ -92,7 +87,7 @@ def _in_workers(
 
 
 def _alone(source: _Source, digest: str, task: CellTask) -> CellResult | None:
-    """The row of a task in a process of its own; None if the process ends each time."""
+    """Return the row of a task in a process of its own; None if the process dies each time."""
     context = multiprocessing.get_context("spawn")
     for _ in range(TRIES):
         with ProcessPoolExecutor(
@@ -106,18 +101,16 @@ def _alone(source: _Source, digest: str, task: CellTask) -> CellResult | None:
 
 
 def compute_unchanged(source: _Source, digest: str, task: CellTask) -> CellResult:
-    """Do a task of a sweep file, which is loaded once in each process.
+    """Compute a task of a sweep file, which each process loads once.
 
-    :raises ChangedError: its files are not those of the bundle with this digest.
+    :raises ChangedError: its files differ from those of the bundle with this digest.
     """
     return _row(_loaded(source, digest), task)
 
 
 @dataclass(frozen=True)
 class _Watched:
-    """A sweep with what tells that one of its files is written to: their paths, and the signature
-    they had.
-    """
+    """A sweep with the paths and the signature of its files, by which changes are detected."""
 
     sweep: Sweep
     paths: list[Path]
@@ -127,10 +120,10 @@ class _Watched:
 def _watched(sweep: Sweep, digest: str) -> _Watched:
     try:
         paths = files_of(sweep)
-        # Before the files are read, so that nothing can change in between.
-        found = _Watched(sweep, paths, _signature(paths))
+        # Signed before they are read, so that no change goes undetected.
+        watched = _Watched(sweep, paths, _signature(paths))
         if bundle_of(sweep).digest == digest:
-            return found
+            return watched
     except ExperimentError:
         pass
     raise ChangedError
@@ -140,11 +133,11 @@ def _row(watched: _Watched, task: CellTask) -> CellResult:
     row = compute(watched.sweep, task)
     if _signature(watched.paths) != watched.signature:
         raise ChangedError
-    return told(row, watched.sweep.source)
+    return with_relative_paths(row, watched.sweep.source)
 
 
-def told(row: CellResult, source: Path) -> CellResult:
-    """The row with files told from the sweep file's folder, wherever that is."""
+def with_relative_paths(row: CellResult, source: Path) -> CellResult:
+    """Return the row, with files in its reason relative to the sweep file's folder."""
     if not row.reason or source.parent == Path("."):
         return row
     return replace(row, reason=row.reason.replace(f"{source.parent}{os.sep}", ""))
@@ -160,9 +153,9 @@ def _loaded(source: _Source, digest: str) -> _Watched:
 
 
 def _signature(paths: Sequence[Path]) -> object:
-    """What tells that files were written to."""
+    """Return times, sizes and inodes of files."""
     try:
-        found = [os.stat(path) for path in paths]
+        statuses = [os.stat(path) for path in paths]
     except OSError:
         return None
-    return [(one.st_mtime_ns, one.st_size, one.st_ino) for one in found]
+    return [(status.st_mtime_ns, status.st_size, status.st_ino) for status in statuses]

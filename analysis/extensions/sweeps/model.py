@@ -1,4 +1,4 @@
-"""A sweep: an experiment, axes, and the cells that their combinations are."""
+"""A sweep: an experiment, its axes, and the cells, which are combinations of their values."""
 
 from __future__ import annotations
 
@@ -13,13 +13,11 @@ Unit = Literal["m", "rad", "1", ""]
 
 @dataclass(frozen=True, eq=False)
 class Choice:
-    """One value of an axis: `changes` are paths with the nodes to be put there, or `variant` a
-    variant to begin with.
+    """One value of an axis: `changes` are paths with their new nodes, or `variant` replaces the
+    variant.
 
-    `kept` are the names of the entries that are kept of the list at a path.
-
-    `value` is a number in metres, radians or without unit where the axis has such values, otherwise
-    NaN.
+    `kept` is the path of a list with the names of the entries to keep. `value` is a number in
+    metres, radians or without unit if the axis has such values, otherwise NaN.
     """
 
     label: str
@@ -30,7 +28,7 @@ class Choice:
 
     @property
     def paths(self) -> tuple[str, ...]:
-        """Paths at which something is changed."""
+        """Changed paths."""
         return (
             *(path for path, _, _ in self.changes),
             *([] if self.kept is None else [self.kept[0]]),
@@ -39,7 +37,7 @@ class Choice:
 
 @dataclass(frozen=True, eq=False)
 class SweepAxis:
-    """What varies. `unit` is that of the choices' values, empty where they are no numbers."""
+    """Axis of a sweep; `unit` is that of the choices' values, empty unless they are numbers."""
 
     name: str
     choices: tuple[Choice, ...]
@@ -47,7 +45,7 @@ class SweepAxis:
 
     @property
     def column(self) -> str:
-        """Name of the axis in a table, with the unit where there is one."""
+        """Name of the axis in a table, with the unit if there is one."""
         return f"{self.name}_{self.unit}" if self.unit in ("m", "rad") else self.name
 
 
@@ -56,9 +54,9 @@ class Sweep:
     """A sweep. `trees` are the base file's variants by name, or the whole file under None.
 
     `cells` are indices of choices, one for each axis, in the order of the file with the last axis
-    fastest. `digest` is a hash of all files that the sweep depends on, `code` of those that an
-    error model written in Python may use, empty without one. `folders` are those, besides its own
-    and that of its base, whose files it may take along, and `trust` is that in all of them.
+    fastest. `digest` is a hash of all files of the sweep, `code` of those that an error model in
+    Python may read, empty without one. Named files must be in the sweep's folder, its base's, or
+    `folders`; all have the same `trust`.
     """
 
     source: Path
@@ -77,11 +75,11 @@ class Sweep:
     trust: Trust = OPENED
 
     def choices(self, number: int) -> tuple[Choice, ...]:
-        """The choices that make up a cell."""
+        """Choices of a cell."""
         return tuple(axis.choices[k] for axis, k in zip(self.axes, self.cells[number], strict=True))
 
     def label(self, number: int) -> str:
-        """A cell in words."""
+        """Axes of a cell with their values."""
         return ", ".join(
             f"{axis.name} {choice.label}"
             for axis, choice in zip(self.axes, self.choices(number), strict=True)

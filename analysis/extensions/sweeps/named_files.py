@@ -24,13 +24,13 @@ MEND = "move it there, or allow its folder with --folder"
 
 
 def named_files(sweep: Sweep) -> list[Path]:
-    """Absolute paths of all files that the experiments of a sweep name and that are there.
+    """Return the absolute paths of all existing files that the experiments of a sweep name.
 
-    A file that is named by its place from the root of the file system is left out: it must be there
-    wherever the sweep is computed.
+    A file named from the root of the file system is not included: it must exist on every machine
+    that computes.
 
-    :raises ExperimentError: a file that is not, links resolved, below the folder of the sweep file,
-        of its base, or of one of the sweep's further folders.
+    :raises ExperimentError: a file that, links resolved, is not below the folder of the sweep file,
+        of its base, or one of the sweep's further folders.
     """
     base = Path(os.path.abspath(sweep.base))
     allowed = [
@@ -43,27 +43,27 @@ def named_files(sweep: Sweep) -> list[Path]:
     nodes: list[tuple[str, Node]] = [("", root) for root in sweep.trees.values()]
     for axis in sweep.axes:
         nodes += [(path, node) for choice in axis.choices for path, node, _ in choice.changes]
-    found: dict[Path, Scalar] = {}
+    naming: dict[Path, Scalar] = {}
     for start, node in nodes:
         for key, scalar in keyed_paths(node, start):
             # Cells fit no readings.
             if _READINGS.search(key):
                 continue
             for path in existing_file(base.parent, str(scalar.value)):
-                found.setdefault(path, scalar)
+                naming.setdefault(path, scalar)
                 # A machine file names tables beside it.
-                for one in files_of_machine(path) if is_allowed(path) else ():
-                    found.setdefault(one, scalar)
+                for table in files_of_machine(path) if is_allowed(path) else ():
+                    naming.setdefault(table, scalar)
     for folder, scalar in model_modules(nodes, base.parent):
         for path in module_files(folder, str(scalar.value).partition(":")[0]):
-            found.setdefault(path, scalar)
+            naming.setdefault(path, scalar)
     messages = [
         scalar.mark.message(
             "", f"names {path}, outside the folders of the sweep and its base; {MEND}"
         )
-        for path, scalar in sorted(found.items(), key=lambda item: item[0])
+        for path, scalar in sorted(naming.items(), key=lambda item: item[0])
         if not is_allowed(path)
     ]
     if messages:
         raise ExperimentError(messages)
-    return sorted(found)
+    return sorted(naming)

@@ -1,4 +1,4 @@
-"""`ballplate sweep --report`: a page of a sweep's results, or their tables."""
+"""`ballplate sweep --report`: write a page of a sweep's results, or their tables."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 from ballplate.cli import PAGE, UsageError, add_force, add_output, complain, write
 
 from .export_command import add_store, warn_of_damage, warn_of_other_methods
+from .interface import FORMS
 
 if TYPE_CHECKING:
     from .report.results import ReportedSweep
@@ -31,8 +32,8 @@ SUFFIXES = {
 DESCRIPTION = (
     "Write the results of a sweep as one HTML page that needs no network: tables,"
     " plots, rank, the best and the worst design; with --format text, markdown, csv or"
-    " latex, the tables alone. From a damaged store, the cells that can be read are"
-    " reported, and the exit status is 3."
+    " latex, only the tables. From a damaged store, report the readable cells. Exit"
+    " status: 3 if the store is damaged."
 )
 
 
@@ -49,20 +50,20 @@ def add_options(parser: ArgumentParser) -> None:
     add_force(parser)
     parser.add_argument(
         "--format",
-        choices=("html", "text", "markdown", "csv", "latex"),
+        choices=FORMS,
         help="default: by the ending of FILE, or html",
     )
     parser.add_argument(
         "--run-modules",
         action="store_true",
-        help="run the sweep's error models in Python, which drawings of its designs need",
+        help="run the sweep's error models in Python, to draw its designs",
     )
 
     parser.add_argument(
         "--compare",
         metavar="STORE",
         type=Path,
-        help="a store of a sweep over the same axes, to compare with on the page",
+        help="compare with a store of a sweep over the same axes, on the page",
     )
 
 
@@ -103,8 +104,8 @@ def run(options: Namespace) -> int:
 
             text = FORMATS[form](results.title, report_tables(results))
         if not results.count("done") and not is_damaged:
-            told = f"none of its {len(results.cells)} cells is done; ballplate sweep continues"
-            complain(f"{store.path}: {told}")
+            text_of_count = f"0 of {len(results.cells)} cells done"
+            complain(f"{store.path}: {text_of_count}; to continue, run ballplate sweep again")
     if output is None:
         sys.stdout.write(text)
     else:
@@ -114,9 +115,9 @@ def run(options: Namespace) -> int:
 
 
 def _comparison(results: ReportedSweep, path: Path | None) -> StoreComparison | None:
-    """The comparison with the newest sweep of another store; None where none is asked for.
+    """Return the comparison with the newest sweep of another store; None without one.
 
-    :raises UsageError: it has nothing that can be compared.
+    :raises UsageError: the two have no quantity in common.
     """
     if path is None:
         return None
@@ -125,9 +126,9 @@ def _comparison(results: ReportedSweep, path: Path | None) -> StoreComparison | 
     from .store import open_store
 
     with closing(open_store(path)) as store:
-        other = read_results(store, None)
-        warn_of_damage(store.path, other.found)
+        reference = read_results(store, None)
+        warn_of_damage(store.path, reference.found)
         try:
-            return compared(results, other, path.name)
+            return compared(results, reference, path.name)
         except IncomparableError as error:
             raise UsageError(error) from None

@@ -1,11 +1,11 @@
-"""A sweep from its file into its store: what the command and the face for Python share."""
+"""A sweep from its file into its store, for the command and for Python."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import AbstractContextManager, contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -16,7 +16,7 @@ from filelock import FileLock, Timeout
 
 from .bundle import Bundle, changes, definition
 from .execute import Runner, Summary, run_sweep
-from .frame import frame, frame_of
+from .frame import frame_of
 from .model import Sweep
 from .store import (
     Store,
@@ -31,6 +31,7 @@ from .store import (
     statuses,
 )
 from .store_file import StoreError, check_place
+from .stored import StoredRow
 
 if TYPE_CHECKING:
     import pandas
@@ -38,22 +39,20 @@ if TYPE_CHECKING:
 # Changes between two sweeps that are listed.
 MOST_CHANGES = 20
 
-# How columns end that stand for a cell where a table is printed; the others are in the data frame.
+# Columns of a printed table; the data frame has all.
 AVERAGE = re.compile(r"U\d+(_lengths)?_average_\w+")
 
-# Reasons of failures that are told.
+# Reasons of failures that are listed.
 MOST_REASONS = 10
 
 
 class OtherSweepError(UnusableError):
-    """The store holds another sweep; the text says what is different, a line for each."""
+    """The store holds another sweep; the text lists the differences, one per row."""
 
 
 @dataclass(frozen=True)
 class Entered:
-    """A sweep in its store: its number there, whether there are others, and what is to be said of
-    what it found.
-    """
+    """A sweep in its store: its number, whether there are others, notes on unusable rows."""
 
     number: int
     has_others: bool
@@ -62,11 +61,10 @@ class Entered:
 
 @dataclass(frozen=True, repr=False)
 class SweepResult(Result):
-    """A sweep as far as it is computed: a row of the store for each cell.
+    """A sweep as computed so far: a row of the store for each cell.
 
-    `remarks` say what the store held that could not be used, and is computed anew, and
-    `shortcomings` why cells have failed, and that versions differ. `number` is the sweep's in its
-    store.
+    `remarks` are notes on stored rows that could not be used; `shortcomings` are reasons of failed
+    cells and differences of versions. `number` is the sweep's in its store.
     """
 
     label: str
@@ -83,16 +81,16 @@ class SweepResult(Result):
         return self.shortcomings
 
     def page_text(self, run_modules: bool, compare: str | Path | None, report: Report) -> str:
-        """The page of the sweep, with another store to `compare` with beside it."""
+        """Return the sweep's page, compared with the newest sweep of another store if given."""
         from .report.sweep_page import sweep_page
 
-        beside = None if compare is None else Path(compare)
-        return sweep_page(self.store, self.number, run_modules, beside, report)
+        reference = None if compare is None else Path(compare)
+        return sweep_page(self.store, self.number, run_modules, reference, report)
 
     def headline(self) -> str:
-        one = self.summary
-        left = f", {one.left} left" if one.left else ""
-        return f"{one.cells} cells, {one.done} done, {one.failed} failed{left}"
+        summary = self.summary
+        remaining = f", {summary.left} left" if summary.left else ""
+        return f"{summary.cells} cells, {summary.done} done, {summary.failed} failed{remaining}"
 
     def lines(self) -> list[str]:
         names = list(self.table.columns)
@@ -103,8 +101,8 @@ class SweepResult(Result):
         return [self.heading, self.headline(), *self.remarks, "", *table]
 
     def data(self) -> dict[str, Any]:
-        one = self.summary
-        counts = {"cells": one.cells, "done": one.done, "failed": one.failed, "left": one.left}
+        summary = self.summary
+        counts = {name: getattr(summary, name) for name in ("cells", "done", "failed", "left")}
         return {
             "sweep": self.label,
             "title": self.title,
@@ -115,8 +113,8 @@ class SweepResult(Result):
         }
 
     def rows(self) -> list[dict[str, Any]]:
-        """One row for each cell, with its values of the axes and its figures; None where there is
-        none.
+        """Return one mapping per cell, with its axes' values and its results; None for missing
+        ones.
         """
         table = self.table.astype(object)
         return [
@@ -130,10 +128,10 @@ class SweepResult(Result):
 
 @contextmanager
 def writable_store(path: Path) -> Iterator[Store]:
-    """The store at a path, made where there is none, for one process alone.
+    """Open the store at a path for this process alone; a missing store is made.
 
-    :raises StoreError: no store, one that cannot be written, or one that another process is writing
-        to.
+    :raises StoreError: no store, one that cannot be written, or one that another process has
+        opened.
     """
     check_place(path, create=True)
     try:
@@ -150,10 +148,10 @@ def writable_store(path: Path) -> Iterator[Store]:
 
 
 def enter(store: Store, sweep: Sweep, bundle: Bundle, beside: bool) -> Entered:
-    """Find a sweep in its store, or enter it; `beside` others that are there.
+    """Find a sweep in its store, or enter it; with `beside`, in addition to others.
 
     :raises OtherSweepError: the store holds another one with results.
-    :raises StoreError: what it holds cannot be read.
+    :raises StoreError: the store cannot be read.
     """
     new = definition(sweep, bundle)
     stored = definitions(store)
@@ -164,14 +162,14 @@ def enter(store: Store, sweep: Sweep, bundle: Bundle, beside: bool) -> Entered:
             f"  {in_one_line(line)}" for line in changes(stored[max(stored)], new)[:MOST_CHANGES]
         ]
         first = in_one_line(f"{store.path}: holds another sweep; what has changed:")
-        last = "name another store with --store, or keep both in this one with --beside"
+        last = "name another store with --store, or add the sweep to this one with --beside"
         raise OtherSweepError("\n".join([first, *differences, last]))
     if number is None:
         number = add_sweep(store, new, bundle.files)
-    found = results(store, number, len(sweep.cells))
-    remarks = [damaged_cells(store.path, found, "they are computed anew")]
-    for text in of_other_methods(found.keys):
-        remarks.append(in_one_line(f"{store.path}: {text}, and computes these cells anew"))
+    rows = results(store, number, len(sweep.cells))
+    remarks = [damaged_cells(store.path, rows, "replaced in this run")]
+    for text in of_other_methods(rows.keys):
+        remarks.append(in_one_line(f"{store.path}: {text}; replaced in this run"))
     has_others = len({*stored, number}) > 1
     return Entered(number, has_others, tuple(filter(None, remarks)))
 
@@ -185,10 +183,10 @@ def compute_sweep(
     fail_fast: bool = False,
     report: Report = unreported,
 ) -> Summary:
-    """Compute what is left of a sweep that is entered.
+    """Compute the remaining cells of a sweep that is entered.
 
-    :raises StoreError: the store cannot be written, or is not in its place any more.
-    :raises ChangedError: files of the sweep have been changed meanwhile.
+    :raises StoreError: the store cannot be written, or was moved.
+    :raises ChangedError: files of the sweep have changed meanwhile.
     """
     with runner as working:
         summary = run_sweep(store, entered.number, sweep, working, retry_failed, fail_fast, report)
@@ -196,60 +194,55 @@ def compute_sweep(
     return summary
 
 
-def shortcomings(store: Store, number: int, cells: int) -> tuple[str, ...]:
-    """What is to be said of the rows of a sweep: that versions differ, and why cells have
-    failed.
-    """
-    found, told = results(store, number, cells), []
-    versions = {tuple(row.versions.items()) for row in found.rows}
+def shortcomings(path: Path, rows: Sequence[StoredRow]) -> tuple[str, ...]:
+    """Return notes on the rows of a sweep: different versions, and reasons of failed cells."""
+    notes = []
+    versions = {tuple(row.versions.items()) for row in rows}
     if len(versions) > 1:
         text = f"the rows were computed with {len(versions)} different sets of versions"
-        told.append(in_one_line(f"{store.path}: {text}"))
+        notes.append(in_one_line(f"{path}: {text}"))
     reasons: dict[str, list[int]] = {}
-    for row in found.rows:
+    for row in rows:
         if row.status == "failed":
             reasons.setdefault(row.reason, []).append(row.number)
     for reason, failed in list(reasons.items())[:MOST_REASONS]:
         more = f" and {len(failed) - 1} more" if len(failed) > 1 else ""
-        told.append(f"cell {failed[0]}{more} failed: {reason}")
+        notes.append(f"cell {failed[0]}{more} failed: {reason}")
     if len(reasons) > MOST_REASONS:
-        told.append(f"and {len(reasons) - MOST_REASONS} reasons more; see ballplate sweep --export")
-    return tuple(told)
+        more_reasons = len(reasons) - MOST_REASONS
+        notes.append(f"and {more_reasons} reasons more; see ballplate sweep --export")
+    return tuple(notes)
 
 
 def result_of(store: Store, sweep: Sweep, entered: Entered, summary: Summary) -> SweepResult:
-    """The rows of a sweep in its store."""
-    table = frame(store, entered.number)
-    return SweepResult(
-        sweep.source.stem,
-        sweep.title,
-        Path(store.path),
-        summary,
-        table,
-        entered.number,
-        entered.remarks,
-        shortcomings(store, entered.number, summary.cells),
+    """Return a sweep that has been computed, with its rows in the store."""
+    return replace(
+        stored_result(store, entered.number),
+        label=sweep.source.stem,
+        title=sweep.title,
+        summary=summary,
+        remarks=entered.remarks,
     )
 
 
 def stored_result(store: Store, sweep: int | None = None) -> SweepResult:
-    """A sweep of a store, by default the newest, as far as it is computed.
+    """Return a sweep of a store, by default the newest, as computed so far.
 
     :raises StoreError: there is no such sweep, or its definition cannot be read.
     """
     number, defined = chosen_sweep(store, sweep)
     cells = len(defined["cells"])
-    found = results(store, number, cells)
-    status = [row.status for row in found.rows]
+    stored = results(store, number, cells)
+    status = [row.status for row in stored.rows]
     summary = Summary(cells, len(status), status.count("done"), status.count("failed"))
-    damage = damaged_cells(store.path, found, "they are left out")
+    damage = damaged_cells(store.path, stored, "not in this result")
     return SweepResult(
         Path(store.path).stem,
         str(defined["title"]),
         Path(store.path),
         summary,
-        frame_of(found, defined),
+        frame_of(stored, defined),
         number,
         (damage,) if damage else (),
-        shortcomings(store, number, cells),
+        shortcomings(store.path, stored.rows),
     )

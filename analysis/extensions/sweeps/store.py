@@ -1,8 +1,8 @@
 """The store of a sweep: one SQLite file, written by one process, that survives interruptions.
 
-Every row is on disk before it is reported. The key of a result is the fingerprint of what was
-computed, and the replicate block; so a cell that was computed once is never computed again,
-whichever sweep file asks for it, unless a later version computes by another method.
+Every row is on disk before it is reported. A result's key is the fingerprint of the computation,
+with the replicate block. So no sweep computes a cell again that the store has, unless a later
+version uses another method.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from ballplate.montecarlo import Accumulator, QuantityAccumulator
 from ballplate.simulator.inputs import in_one_line, number_of
 
 from .fingerprint import METHOD, METHODS, method_of
-from .store_file import ANEW, StoreError, connected, in_words
+from .store_file import RECOMPUTE, StoreError, connected, store_error
 from .stored import (
     DamagedError,
     StoredResults,
@@ -48,9 +48,7 @@ INSERT = (
 
 @dataclass
 class Store:
-    """An open store; `texts` are those known by number, and `place` states the file from another in
-    its place.
-    """
+    """An open store. `texts` caches numbers of texts; `place` has device and inode of the file."""
 
     path: Path
     connection: sqlite3.Connection
@@ -62,45 +60,44 @@ class Store:
 
 
 def open_store(path: Path, create: bool = False) -> Store:
-    """Open a store for reading or, with `create`, for writing: it is made where there is none.
+    """Open a store for reading or, with `create`, for writing; then a missing store is made.
 
-    :raises StoreError: no such store, a file that is none, or one that is damaged and to be written
-        to.
+    :raises StoreError: no such store, a file that is no store, or a damaged one to be written to.
     """
     try:
         connection = connected(path, create)
-        place = os.stat(path)
+        status = os.stat(path)
     except sqlite3.Error as error:
-        raise in_words(path, error) from None
+        raise store_error(path, error) from None
     except UnicodeDecodeError:
-        # Of what SQLite says about names that are no text.
-        raise StoreError(f"{path}: is damaged; {ANEW}") from None
-    return Store(path, connection, (place.st_dev, place.st_ino))
+        # SQLite's message quotes invalid text.
+        raise StoreError(f"{path}: is damaged; {RECOMPUTE}") from None
+    return Store(path, connection, (status.st_dev, status.st_ino))
 
 
 def ensure_in_place(store: Store) -> None:
-    """Check that the file that is written to is the one that has the store's name.
+    """Check that the open file still has the store's name.
 
     :raises StoreError: it was deleted, moved or replaced since it was opened.
     """
     with suppress(OSError):
-        found = os.stat(store.path)
-        if store.place == (found.st_dev, found.st_ino):
+        status = os.stat(store.path)
+        if store.place == (status.st_dev, status.st_ino):
             return
-    # SQLite leaves to its log what it wrote to a file that has moved.
+    # The last rows are only in the log, whose name did not move with the file.
     with suppress(sqlite3.Error):
         store.connection.execute("PRAGMA wal_checkpoint(TRUNCATE)")
     raise StoreError(
-        f"{store.path}: has been deleted, moved or replaced while the sweep ran, which ends here;"
-        " if it was moved, it has the rows computed until then, and --store continues with it"
+        f"{store.path}: was deleted, moved or replaced while the sweep ran, which ends here; to"
+        " continue with a moved store, name it with --store"
     )
 
 
 @contextmanager
 def _transaction(store: Store) -> Iterator[sqlite3.Connection]:
-    """All or nothing, on disk at the end, in the file that has the store's name.
+    """Write all or nothing, on disk at the end, in the file that has the store's name.
 
-    :raises StoreError: the disk is full, the file cannot be written, or it is no longer there.
+    :raises StoreError: the disk is full, or the file is missing or cannot be written.
     """
     ensure_in_place(store)
     try:
@@ -113,25 +110,22 @@ def _transaction(store: Store) -> Iterator[sqlite3.Connection]:
         store.connection.execute("COMMIT")
     except sqlite3.Error as error:
         store.texts.clear()
-        raise in_words(store.path, error) from None
+        raise store_error(store.path, error) from None
 
 
 @contextmanager
 def _reading(store: Store) -> Iterator[sqlite3.Connection]:
-    """What SQLite says while a store is read, in words.
-
-    :raises StoreError: the store cannot be read.
-    """
+    """Read, with SQLite's errors as StoreError."""
     try:
         yield store.connection
     except sqlite3.Error as error:
-        raise in_words(store.path, error) from None
+        raise store_error(store.path, error) from None
 
 
 def add_sweep(store: Store, definition: dict[str, Any], files: Iterable[tuple[str, bytes]]) -> int:
     """Enter a sweep's definition and files, and return its number.
 
-    :raises StoreError: the store cannot be written, or a file has a name that is no text.
+    :raises StoreError: the store cannot be written, or the name of a file is no text.
     """
     files = tuple(files)
     for name, _ in files:
@@ -154,100 +148,93 @@ def add_sweep(store: Store, definition: dict[str, Any], files: Iterable[tuple[st
 
 
 def definitions(store: Store) -> dict[int, dict[str, Any]]:
-    """Definitions of the sweeps of a store by number, with their words in lines.
+    """Return the definitions of the sweeps of a store by number, without control characters.
 
-    :raises StoreError: the store cannot be read, or a definition is not as it was stored.
+    :raises StoreError: the store cannot be read, or a definition is damaged.
     """
     with _reading(store) as connection:
         rows = connection.execute("SELECT id, definition, digest FROM sweep ORDER BY id").fetchall()
     for number, text, digest in rows:
-        with _as_stored(store, f"the definition of sweep {number}"):
-            check_digest(digest, number, text)
+        _check(store, f"the definition of sweep {number}", digest, number, text)
     return {number: plain(json.loads(text)) for number, text, _ in rows}
 
 
-@contextmanager
-def _as_stored(store: Store, what: str) -> Iterator[None]:
+def _check(store: Store, name: str, digest: object, *values: object) -> None:
     try:
-        yield
+        check_digest(digest, *values)
     except DamagedError as error:
-        raise StoreError(f"{store.path}: is damaged: {what}: {error}; {ANEW}") from None
+        raise StoreError(f"{store.path}: is damaged: {name}: {error}; {RECOMPUTE}") from None
 
 
 def chosen_sweep(store: Store, number: int | None) -> tuple[int, dict[str, Any]]:
-    """The number and the definition of a sweep of the store: the one asked for, or the newest.
+    """Return number and definition of a sweep of the store, the newest by default.
 
     :raises StoreError: there is no such sweep.
     """
-    known = definitions(store)
-    if not known or (number is not None and number not in known):
+    defined = definitions(store)
+    if not defined or (number is not None and number not in defined):
         raise StoreError(
-            f"{store.path}: there is no such sweep; it has {', '.join(map(str, known)) or 'none'}"
+            f"{store.path}: there is no such sweep; it has {', '.join(map(str, defined)) or 'none'}"
         )
-    number = max(known) if number is None else number
-    return number, known[number]
+    number = max(defined) if number is None else number
+    return number, defined[number]
 
 
 def files(store: Store, sweep: int) -> tuple[tuple[str, bytes], ...]:
-    """Files of a sweep by their path from the common folder.
+    """Return the files of a sweep by their path from the common folder.
 
-    :raises StoreError: they cannot be read, or are not as they were stored.
+    :raises StoreError: they cannot be read, or are damaged.
     """
     query = "SELECT path, content, digest FROM bundle WHERE sweep = ? ORDER BY path"
     with _reading(store) as connection:
         rows = connection.execute(query, [sweep]).fetchall()
     for name, content, digest in rows:
-        with _as_stored(store, f"the file {name} in it"):
-            check_digest(digest, sweep, name, content)
+        _check(store, f"the file {name} in it", digest, sweep, name, content)
     return tuple((name, content) for name, content, _ in rows)
 
 
 def keys(store: Store, sweep: int) -> dict[int, str]:
-    """Keys of the cells that are known, by number."""
+    """Return the known keys of cells by number."""
     with _reading(store) as connection:
         rows = connection.execute("SELECT number, key, digest FROM cell WHERE sweep = ?", [sweep])
         return {k: key for k, key, digest in rows if digest == digest_of(sweep, k, key)}
 
 
-def of_other_methods(found: Iterable[str]) -> list[str]:
-    """Words for rows with these keys that this version would compute by another method; none where
-    there are none.
-    """
-    told = []
-    for method, count in sorted(Counter(map(method_of, found)).items()):
+def of_other_methods(result_keys: Iterable[str]) -> list[str]:
+    """Return notes on rows that another method computed, judged by their keys."""
+    notes = []
+    for method, count in sorted(Counter(map(method_of, result_keys)).items()):
         if method == METHOD:
             continue
-        since = [text for number, text in METHODS.items() if method < number <= METHOD and text]
-        why = f"before corrections to {'; '.join(since)}" if since else "of a later version"
+        later = [text for number, text in METHODS.items() if method < number <= METHOD]
+        reason = f"before corrections to {'; '.join(later)}" if later else "of a later version"
         rows = f"{count} row{' was' if count == 1 else 's were'} computed by method {method}"
-        told.append(f"{rows}, {why}; this version computes by method {METHOD}")
-    return told
+        notes.append(f"{rows}, {reason}; this version computes by method {METHOD}")
+    return notes
 
 
 def statuses(store: Store) -> dict[tuple[str, int], str]:
-    """Status by key and block of every result that is as it was stored."""
+    """Return the status of every sound result by key and block."""
     with _reading(store) as connection:
         return {(key, block): status for key, block, status in whole_results(connection)}
 
 
-def add_keys(store: Store, sweep: int, found: dict[int, str]) -> None:
-    """Enter what cells' keys are."""
+def add_keys(store: Store, sweep: int, cell_keys: dict[int, str]) -> None:
+    """Enter keys of cells."""
     with _transaction(store) as connection:
         connection.executemany(
             "INSERT OR REPLACE INTO cell (sweep, number, key, digest) VALUES (?, ?, ?, ?)",
-            [(sweep, number, key, digest_of(sweep, number, key)) for number, key in found.items()],
+            [(sweep, cell, key, digest_of(sweep, cell, key)) for cell, key in cell_keys.items()],
         )
 
 
 def add_rows(store: Store, sweep: int, rows: Iterable[CellResult]) -> None:
-    """Write rows: on disk when this returns. A result that is there already stays, unless it had
-    failed.
-    """
+    """Write rows, on disk when this returns. A finished result that is there already remains."""
     with _transaction(store) as connection:
         for row in rows:
             of_names, of_versions = json.dumps(list(row.figures)), json.dumps(dict(row.versions))
             names, versions = _text(store, of_names), _text(store, of_versions)
-            # Of a file's name there may be characters that no text on disk can have.
+            # Names of files may have characters that UTF-8 cannot encode.
             reason = row.reason.encode("utf-8", "backslashreplace").decode()
             figures = np.array(list(row.figures.values()), "<f8").tobytes()
             details = json.dumps(row.details, ensure_ascii=True, sort_keys=True)
@@ -263,28 +250,26 @@ def add_rows(store: Store, sweep: int, rows: Iterable[CellResult]) -> None:
                 [sweep, row.number, row.key, digest_of(sweep, row.number, row.key)],
             )
             if row.block == 0 and row.status == "done":
-                # The sums over blocks have been used, but for the time that they took.
-                spent = "SELECT coalesce(sum(seconds), 0) FROM result WHERE key = ? AND block > 0"
-                update = (
-                    f"UPDATE result SET seconds = seconds + ({spent}) WHERE key = ? AND block = 0"
-                )
-                connection.execute(update, [row.key, row.key])
+                # The sums over blocks are used up, except for their computing time.
+                seconds = "SELECT coalesce(sum(seconds), 0) FROM result WHERE key = ? AND block > 0"
+                update = f"UPDATE result SET seconds = seconds + ({seconds})"
+                connection.execute(f"{update} WHERE key = ? AND block = 0", [row.key, row.key])
                 connection.execute("DELETE FROM result WHERE key = ? AND block > 0", [row.key])
 
 
 def _text(store: Store, value: str) -> int:
     if value not in store.texts:
-        found = store.connection.execute("SELECT id FROM text WHERE value = ?", [value]).fetchone()
-        if found is None:
-            found = [
+        row = store.connection.execute("SELECT id FROM text WHERE value = ?", [value]).fetchone()
+        if row is None:
+            row = [
                 store.connection.execute("INSERT INTO text (value) VALUES (?)", [value]).lastrowid
             ]
-        store.texts[value] = int(found[0])
+        store.texts[value] = int(row[0])
     return store.texts[value]
 
 
 def block_tally(store: Store, key: str, block: int) -> Accumulator | None:
-    """The sums of a replicate block; None where the cell has no replicates for a reason."""
+    """Return the sums of a replicate block; None if the cell cannot have replicates."""
     with _reading(store) as connection:
         row = connection.execute(
             "SELECT tally FROM result WHERE key = ? AND block = ?", [key, block]
@@ -293,10 +278,10 @@ def block_tally(store: Store, key: str, block: int) -> Accumulator | None:
 
 
 def _packed(accumulator: Accumulator) -> bytes:
-    """Sums as bytes: a line of JSON, then all arrays as 64-bit numbers."""
+    """Return sums as bytes: a line of JSON, then all arrays as 64-bit numbers."""
     arrays = [accumulator.residual]
-    for one in accumulator.quantities:
-        arrays += [one.errors, one.squares, one.numbers, one.numbers_squared]
+    for quantity in accumulator.quantities:
+        arrays += [quantity.errors, quantity.squares, quantity.numbers, quantity.numbers_squared]
     head = {
         "count": accumulator.count,
         "failed": list(accumulator.failed),
@@ -308,7 +293,7 @@ def _packed(accumulator: Accumulator) -> bytes:
 
 
 def _unpacked(content: bytes) -> Accumulator:
-    """The sums that `_packed` made bytes of."""
+    """Return the sums from the bytes of `_packed`."""
     line, _, body = content.partition(b"\n")
     head = json.loads(line)
     first, *arrays = np.split(np.frombuffer(body, "<f8"), np.cumsum(head["sizes"])[:-1])
@@ -318,7 +303,7 @@ def _unpacked(content: bytes) -> Accumulator:
 
 
 def results(store: Store, sweep: int, count: int) -> StoredResults:
-    """Results of a sweep of so many cells; those that are not done yet are left out.
+    """Return the results of a sweep of `count` cells, without unfinished cells.
 
     :raises StoreError: the store cannot be read.
     """
@@ -326,12 +311,12 @@ def results(store: Store, sweep: int, count: int) -> StoredResults:
         return read_results(connection, sweep, count)
 
 
-def damaged_cells(path: Path, results: StoredResults, what_next: str) -> str:
-    """Words for the cells of a store that are damaged; empty where none is."""
+def damaged_cells(path: Path, results: StoredResults, consequence: str) -> str:
+    """Return a message on the unreadable cells of a store; empty without any."""
     if not results.damaged:
         return ""
     cells = sorted(results.damaged)
     more = f" and {len(cells) - 10} more" if len(cells) > 10 else ""
-    counted = f"{number_of(len(cells), 'cell')} could not be read"
+    counted = number_of(len(cells), "unreadable cell")
     text = f"{', '.join(map(str, cells[:10]))}{more} ({results.damaged[cells[0]]})"
-    return in_one_line(f"{path}: {counted}: {text}; {what_next}")
+    return in_one_line(f"{path}: {counted}: {text}; {consequence}")

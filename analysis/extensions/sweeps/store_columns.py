@@ -6,49 +6,46 @@ import re
 
 from ballplate.uncertainty import RECORDED
 
-# Besides those of quantities, versions and sums of squares.
+# In addition to columns of quantities, versions and sums of squares.
 NAMES = (
-    *(
-        "cell",
-        "status",
-        "reason",
-        "data_set_seed",
-        "fingerprint",
-        "duration_s",
-        "parameters",
-        "observations",
-    ),
-    *(
-        "rank_deficiency",
-        "as_expected",
-        "weakly_determined",
-        "smallest_singular_value_per_um",
-        "gap",
-        "trials",
-    ),
-    *("not_converged", "degrees_of_freedom"),
+    "cell",
+    "status",
+    "reason",
+    "data_set_seed",
+    "fingerprint",
+    "duration_s",
+    "parameters",
+    "observations",
+    "rank_deficiency",
+    "as_expected",
+    "weakly_determined",
+    "smallest_singular_value_per_um",
+    "gap",
+    "trials",
+    "not_converged",
+    "degrees_of_freedom",
 )
 
 
-# What marks the symbol of a further artefact in Monte Carlo.
+# Mark of a further artefact's symbols in Monte Carlo.
 MORE = "'"
 
 
 def is_reserved(column: str) -> bool:
-    """Whether a column may be recorded, so that no axis can have its name.
+    """Return whether results may have a column of this name, so that no axis can.
 
     >>> is_reserved("U4_average_m"), is_reserved("size_m")
     (True, False)
     """
-    own = "|".join(RECORDED)
+    symbols = "|".join(RECORDED)
     return (
         column in NAMES
-        or re.fullmatch(rf"({own})([ _].*)?|.*_version|sum_of_squares.*", column) is not None
+        or re.fullmatch(rf"({symbols})([ _].*)?|.*_version|sum_of_squares.*", column) is not None
     )
 
 
 def symbol_column(symbol: str) -> str:
-    """A quantity as it stands in names of columns.
+    """Return a quantity's symbol in the form for names of columns.
 
     >>> symbol_column("U2 lengths"), symbol_column("U5'")
     ('U2_lengths', 'U5_more')
@@ -57,7 +54,7 @@ def symbol_column(symbol: str) -> str:
 
 
 def unit_suffix(unit: str) -> str:
-    """A unit at the end of a column's name.
+    """Return a unit in the form for the end of a column's name.
 
     >>> unit_suffix("m, rad"), unit_suffix("1")
     ('m_or_rad', 'ratio')

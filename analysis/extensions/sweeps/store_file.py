@@ -1,7 +1,6 @@
-"""The file of a store: its kind, the form of its tables, and SQLite's errors in words.
+"""The file of a store: format, tables, and remedies for SQLite's errors.
 
-A store is input like any file: it may be cut off, of another program, of a later version, or no
-file at all.
+A store is untrusted input: it may be truncated, of another program or version, or no file.
 """
 
 from __future__ import annotations
@@ -15,12 +14,12 @@ from ballplate.simulator.inputs import UnusableError, in_one_line
 
 FORMAT = "ballplate sweep store 2"
 
-# Seconds to wait for another process that writes.
+# Seconds to wait for another writing process.
 PATIENCE = 20.0
 
 MAGIC = b"SQLite format 3\0"
-MEND = "name a store that ballplate sweep has made"
-ANEW = "ballplate sweep with --store and a new name computes anew, and leaves this file as it is"
+MEND = "name a store made by ballplate sweep"
+RECOMPUTE = "to recompute, name a new file with ballplate sweep --store; this one stays unchanged"
 
 TABLES = """
 CREATE TABLE about (name TEXT PRIMARY KEY, value TEXT NOT NULL) WITHOUT ROWID;
@@ -40,39 +39,40 @@ CREATE TABLE result (
 );
 """
 
-# What SQLite's result codes mean to the person whose store it is, by the beginning of their names.
+# Remedies by the beginning of the names of SQLite's result codes.
 WORDS = {
-    "SQLITE_FULL": "cannot be written ({}); make room, then start again: nothing done is lost",
-    "SQLITE_IOERR": "cannot be written ({}); make room, then start again: nothing done is lost",
+    "SQLITE_FULL": "cannot be written ({}); make room and restart: finished cells are stored",
+    "SQLITE_IOERR": "cannot be written ({}); make room and restart: finished cells are stored",
     "SQLITE_BUSY": "another process is writing to it; wait for it, or end it",
     "SQLITE_READONLY": "cannot be written ({}); check its permissions and those of its folder",
     "SQLITE_CANTOPEN": "cannot be opened ({}); check its permissions and those of its folder",
-    "SQLITE_CORRUPT": f"is damaged ({{}}); restore a copy, or {ANEW}",
+    "SQLITE_CORRUPT": f"is damaged ({{}}); restore a copy, or {RECOMPUTE}",
 }
 
 
 class StoreError(UnusableError):
-    """A store cannot be used; the text says why, and what would help."""
+    """A store cannot be used; the text states the reason and the remedy."""
 
     def __init__(self, text: str) -> None:
         super().__init__(in_one_line(text))
 
 
-def in_words(path: Path, error: sqlite3.Error) -> StoreError:
-    """What SQLite says of a store, and what would help."""
+def store_error(path: Path, error: sqlite3.Error) -> StoreError:
+    """Return SQLite's error with its remedy."""
     name = getattr(error, "sqlite_errorname", None) or ""
-    other = f"is no store of ballplate sweep, or damaged ({{}}); {MEND}"
-    words = next((words for start, words in WORDS.items() if name.startswith(start)), other)
+    otherwise = f"is no store of ballplate sweep, or damaged ({{}}); {MEND}"
+    words = next((words for start, words in WORDS.items() if name.startswith(start)), otherwise)
     return StoreError(f"{path}: {words.format(error)}")
 
 
 def connected(path: Path, create: bool) -> sqlite3.Connection:
-    """A connection to a store, of whose tables those can be read that are whole; with `create`, to
-    one that is sound, made where there is none.
+    """Return a connection to a store: for reading its sound tables or, with `create`, to a sound
+    store.
 
-    Without `create` it only reads, also where nothing can be written.
+    With `create`, a missing store is made. Without, even a store on a full or write-protected disk
+    can be read.
 
-    :raises StoreError: no file that is, or may become, a store; with `create`, a damaged one.
+    :raises StoreError: the file is no store and cannot become one; with `create`, a damaged one.
     :raises sqlite3.Error: SQLite cannot open it.
     """
     check_place(path, create)
@@ -82,17 +82,17 @@ def connected(path: Path, create: bool) -> sqlite3.Connection:
         if create:
             _prepare(path, connection)
             return connection
-        # So SQLite looks at a file from which pages are missing.
+        # Otherwise SQLite refuses a file that lacks pages.
         connection.execute("PRAGMA writable_schema = ON")
         try:
             connection.execute("SELECT count(*) FROM sqlite_master").fetchone()
         except sqlite3.OperationalError as error:
             log = Path(f"{path}-wal")
-            closed = "SQLITE_CANTOPEN", "SQLITE_READONLY", "SQLITE_IOERR"
+            unwritable = "SQLITE_CANTOPEN", "SQLITE_READONLY", "SQLITE_IOERR"
             is_in_use = log.exists() and log.stat().st_size > 0
-            if is_in_use or not error.sqlite_errorname.startswith(closed):
+            if is_in_use or not error.sqlite_errorname.startswith(unwritable):
                 raise
-            # In a place that cannot be written, or is full, as long as nobody else writes to it.
+            # SQLite reads without a lock if its log cannot be made, and no other process writes.
             connection.close()
             connection = _opened(f"{address}?immutable=1")
         connection.execute("PRAGMA query_only = ON")
@@ -104,7 +104,7 @@ def connected(path: Path, create: bool) -> sqlite3.Connection:
 
 
 def address_of(path: PurePath) -> str:
-    """The address by which SQLite opens the file of an absolute path.
+    """Return the URI by which SQLite opens the file of an absolute path.
 
     >>> from pathlib import PurePosixPath, PureWindowsPath
     >>> address_of(PurePosixPath("/a b/c"))
@@ -118,19 +118,18 @@ def address_of(path: PurePath) -> str:
 
 def _opened(address: str) -> sqlite3.Connection:
     connection = sqlite3.connect(address, uri=True, isolation_level=None, timeout=PATIENCE)
-    # Text that is none is a matter of its row, not of the whole store.
+    # Invalid text damages its row, not the whole store.
     connection.text_factory = lambda content: content.decode("utf-8", "replace")
-    # Nothing that the file defines is computed, and damage is noticed where it is met.
+    # SQLite runs no code from the file, and detects damage when it reads.
     connection.execute("PRAGMA trusted_schema = OFF")
     connection.execute("PRAGMA cell_size_check = ON")
     return connection
 
 
 def check_place(path: Path, create: bool) -> None:
-    """Refuse what is no file that is a store as its beginning tells or, with `create`, could become
-    one.
+    """Refuse a file that is no store by its first bytes or, with `create`, cannot become one.
 
-    :raises StoreError: it is not.
+    :raises StoreError: the reason.
     """
     if path.exists() and not path.is_file():
         raise StoreError(f"{path}: is no file; {MEND}")
@@ -154,7 +153,7 @@ def check_place(path: Path, create: bool) -> None:
         path.parent, os.W_OK | os.X_OK, effective_ids=os.access in os.supports_effective_ids
     ):
         raise StoreError(
-            f"{path}: its folder cannot be written; name another with --store, or see to its"
+            f"{path}: its folder cannot be written; name another with --store, or change its"
             " permissions"
         )
     if start != MAGIC and (start or not create):
@@ -162,41 +161,42 @@ def check_place(path: Path, create: bool) -> None:
 
 
 def check_tables(path: Path, connection: sqlite3.Connection) -> None:
-    """Refuse a database with other tables than those of a store, or with views or triggers, which
-    could make reading and writing do anything.
+    """Refuse a database with tables other than a store's, or with views or triggers, which may run
+    code.
 
-    :raises StoreError: it has.
+    :raises StoreError: it has some.
     :raises sqlite3.Error: SQLite cannot read it.
     """
     query = "SELECT sql FROM sqlite_master WHERE type <> 'index' AND name NOT LIKE 'sqlite!_%'"
     statements = {str(text) for (text,) in connection.execute(f"{query} ESCAPE '!'")}
-    made = ""
+    stored_format = ""
     if any(text.startswith("CREATE TABLE about ") for text in statements):
-        found = connection.execute("SELECT value FROM about WHERE name = 'format'").fetchone()
-        made = str(found[0]) if found else ""
-    if made != FORMAT and made.startswith(FORMAT[:-1]):
-        text = f"was made by another version of ballplate (format {made[len(FORMAT) - 1 :]})"
-        raise StoreError(f"{path}: {text}; use that version, or {ANEW}")
-    if made != FORMAT or statements != {text.strip() for text in TABLES.split(";")[:-1]}:
+        row = connection.execute("SELECT value FROM about WHERE name = 'format'").fetchone()
+        stored_format = str(row[0]) if row else ""
+    if stored_format != FORMAT and stored_format.startswith(FORMAT[:-1]):
+        number = stored_format[len(FORMAT) - 1 :]
+        text = f"was made by another version of ballplate (format {number}); use that version"
+        raise StoreError(f"{path}: {text}; {RECOMPUTE}")
+    if stored_format != FORMAT or statements != {text.strip() for text in TABLES.split(";")[:-1]}:
         raise StoreError(f"{path}: is no store of ballplate sweep but another database; {MEND}")
 
 
 def _prepare(path: Path, connection: sqlite3.Connection) -> None:
-    """Make the tables of an empty store, and check those of another one.
+    """Make the tables of an empty store, or check those of an existing one.
 
-    :raises StoreError: it is none, or damaged.
+    :raises StoreError: it is no store, or damaged.
     """
     has_tables = connection.execute("SELECT count(*) FROM sqlite_master").fetchone()[0]
     if has_tables:
         check_tables(path, connection)
-        wrong = damage(connection)
-        if wrong:
+        fault = damage(connection)
+        if fault:
             raise StoreError(
-                f"{path}: is damaged ({wrong}); ballplate sweep --export and --report give the"
-                f" whole cells, and {ANEW}"
+                f"{path}: is damaged ({fault}); ballplate sweep --export and --report read the"
+                f" undamaged cells; {RECOMPUTE}"
             )
     connection.execute("PRAGMA journal_mode = WAL")
-    # What is written is on disk when the call returns.
+    # Rows are on disk when a call returns.
     connection.execute("PRAGMA synchronous = FULL")
     if not has_tables:
         connection.execute("BEGIN IMMEDIATE")
@@ -207,7 +207,7 @@ def _prepare(path: Path, connection: sqlite3.Connection) -> None:
 
 
 def damage(connection: sqlite3.Connection) -> str:
-    """What SQLite's integrity check finds wrong with a database; empty where it is sound."""
+    """Return the first fault that SQLite's integrity check finds; empty in a sound database."""
     try:
         (text,) = connection.execute("PRAGMA integrity_check(1)").fetchone()
     except sqlite3.DatabaseError as error:

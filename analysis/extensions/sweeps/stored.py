@@ -1,4 +1,4 @@
-"""Rows of a store. Each has a digest: those that are not as they were stored are left out."""
+"""Rows of a store. Each has a digest, by which damaged rows are detected and left out."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from ballplate.simulator.machines import Array, Integers
 
 from .store_file import damage
 
-# Results with the texts that they refer to: what their digests are of, the duration and the digest.
+# Results with their texts: the values of their digests, the duration and the digest.
 RESULTS = (
     "SELECT result.key, block, status, reason, seed, names.value, figures, details, versions.value,"
     " tally, CAST(seconds AS REAL), digest FROM result"
@@ -26,11 +26,11 @@ RESULTS = (
 
 
 class DamagedError(Exception):
-    """A row is not as it was stored; the text says why."""
+    """A row is damaged; the text states the reason."""
 
 
 def digest_of(*values: object) -> bytes:
-    """A hash of a row's values, with their types and lengths, by which damage is noticed.
+    """Return a hash of a row's values, with their types and lengths.
 
     >>> digest_of("ab", 1) == digest_of("a", "b1")
     False
@@ -44,16 +44,16 @@ def digest_of(*values: object) -> bytes:
 
 
 def check_digest(digest: object, *values: object) -> None:
-    """Check that values are as they were stored.
+    """Check that values are those that were stored.
 
     :raises DamagedError: they are not.
     """
     if digest != digest_of(*values):
-        raise DamagedError("its content is not what was stored")
+        raise DamagedError("its content has changed since it was stored")
 
 
 def plain(value: Any) -> Any:
-    """Data of JSON with their texts in lines without control characters."""
+    """Return JSON data, in which texts are lines without control characters."""
     if isinstance(value, dict):
         return {in_lines(name): plain(item) for name, item in value.items()}
     if isinstance(value, list):
@@ -68,7 +68,7 @@ def _of_json(text: str) -> Any:
 
 @dataclass(frozen=True)
 class StoredRow:
-    """A result as it is stored; `figures` are 64-bit numbers, one for each of the `names`."""
+    """A stored result; `figures` are 64-bit numbers, one for each of the `names`."""
 
     number: int
     key: str
@@ -83,13 +83,13 @@ class StoredRow:
 
 
 def whole_row(number: int, values: tuple[Any, ...]) -> StoredRow:
-    """A row of `RESULTS`.
+    """Return a row of `RESULTS`.
 
-    :raises DamagedError: it is not as it was stored.
+    :raises DamagedError: it is damaged.
     """
-    *kept, seconds, digest = values
-    check_digest(digest, *kept)
-    key, _, status, reason, seed, names, figures, details, versions, _ = kept
+    *content, seconds, digest = values
+    check_digest(digest, *content)
+    key, _, status, reason, seed, names, figures, details, versions, _ = content
     texts = tuple(_of_json(names)), _of_json(versions)
     more = plain(json.loads(details))
     return StoredRow(number, key, status, in_lines(reason), seed, seconds, *texts, figures, more)
@@ -97,17 +97,19 @@ def whole_row(number: int, values: tuple[Any, ...]) -> StoredRow:
 
 @dataclass(frozen=True)
 class StoredResults:
-    """Results of a sweep in the order of their cells; those not done yet are left out.
+    """Results of a sweep in the order of their cells, without unfinished ones.
 
-    `damaged` says of other cells why they are not among them.
+    `damaged` has the faults of unreadable cells; `file_fault` is SQLite's, if the whole file is
+    damaged.
     """
 
     rows: list[StoredRow]
     damaged: dict[int, str] = field(default_factory=dict)
+    file_fault: str = ""
 
     @property
     def cells(self) -> Integers:
-        """Cells (rows,), which count from 0."""
+        """Cells (rows,), counted from 0."""
         return np.array([row.number for row in self.rows], np.int64)
 
     @property
@@ -116,7 +118,7 @@ class StoredResults:
 
     @property
     def figures(self) -> dict[str, Array]:
-        """Figures by name, (rows,) each, NaN where a row has no such figure."""
+        """Values by name, (rows,) each, NaN if a row lacks one."""
         figures: dict[str, Array] = {}
         # Rows with the same names make a matrix.
         of_names: dict[tuple[str, ...], list[int]] = {}
@@ -131,14 +133,14 @@ class StoredResults:
 
 
 def read_results(connection: sqlite3.Connection, sweep: int, count: int) -> StoredResults:
-    """The rows of a sweep of so many cells. Each is looked for by itself, so that a damaged place
-    costs no other.
+    """Return the rows of a sweep of `count` cells.
 
     :raises sqlite3.OperationalError: the store cannot be read.
     """
     rows: list[StoredRow] = []
     damaged: dict[int, str] = {}
     missing: list[int] = []
+    # One query for each cell, so that a damaged page costs only its own rows.
     for number in range(count):
         try:
             key = _key(connection, sweep, number)
@@ -151,10 +153,10 @@ def read_results(connection: sqlite3.Connection, sweep: int, count: int) -> Stor
             raise
         except (sqlite3.DatabaseError, DamagedError) as error:
             damaged[number] = str(error)
-    # A cell that seems not to be done may have been.
-    wrong = damage(connection) if missing else ""
-    damaged |= dict.fromkeys(missing, wrong) if wrong else {}
-    return StoredResults(rows, damaged)
+    fault = damage(connection) if missing or damaged else ""
+    # In a damaged file, the result of a missing cell may be lost.
+    damaged |= dict.fromkeys(missing, fault) if fault else {}
+    return StoredResults(rows, damaged, fault)
 
 
 def _key(connection: sqlite3.Connection, sweep: int, number: int) -> str | None:
@@ -167,10 +169,10 @@ def _key(connection: sqlite3.Connection, sweep: int, number: int) -> str | None:
 
 
 def whole_results(connection: sqlite3.Connection) -> Iterator[tuple[str, int, str]]:
-    """Key, block and status of every result that is as it was stored.
+    """Return key, block and status of every sound result.
 
     :raises sqlite3.Error: the store cannot be read.
     """
-    for key, block, status, *others, _, digest in connection.execute(RESULTS):
-        if digest == digest_of(key, block, status, *others):
+    for key, block, status, *content, _, digest in connection.execute(RESULTS):
+        if digest == digest_of(key, block, status, *content):
             yield key, block, status

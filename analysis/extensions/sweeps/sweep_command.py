@@ -1,4 +1,4 @@
-"""`ballplate sweep`: a family of experiments, into a store that survives interruptions."""
+"""`ballplate sweep`: compute a family of experiments into a store that survives interruptions."""
 
 from __future__ import annotations
 
@@ -23,10 +23,10 @@ BAD_FILE = 3
 
 
 DESCRIPTION = (
-    "Compute every cell of a sweep file: rank, U1 to U6 and, if the file asks for"
-    " trials, Monte Carlo. Each finished cell is stored on disk; when started again, the"
-    " command continues where it stopped. The exit status is 0 if all cells are done, 1"
-    " if some have failed."
+    "Compute every cell of a sweep file: rank, U1 to U6 and, if the file sets trials,"
+    " Monte Carlo. Each finished cell is stored on disk; after an interruption, the same"
+    " command computes the remaining cells. Exit status: 0 if all cells are done, 1 if"
+    " some have failed."
 )
 
 
@@ -39,7 +39,7 @@ def add_options(parser: ArgumentParser) -> None:
         help="store; default: the sweep file's name with .sqlite",
     )
     parser.add_argument(
-        "--dry-run", action="store_true", help="list the cells and estimate the time; store nothing"
+        "--dry-run", action="store_true", help="only list the cells and estimate the time"
     )
     add_workers(parser)
     parser.add_argument(
@@ -52,7 +52,7 @@ def add_options(parser: ArgumentParser) -> None:
     parser.add_argument(
         "--beside",
         action="store_true",
-        help="add a changed sweep beside the one in the store",
+        help="add a changed sweep to a store that holds another",
     )
     parser.add_argument(
         "--folder",
@@ -61,14 +61,14 @@ def add_options(parser: ArgumentParser) -> None:
         action="append",
         default=[],
         help=(
-            "further folder whose files the sweep may name, besides those of the sweep file and"
-            " of its base; the store keeps copies of these files; may be repeated"
+            "further folder whose files the sweep may name and the store copies; default: the"
+            " folders of the sweep file and of its base; may be repeated"
         ),
     )
 
 
 def run(options: Namespace) -> int:
-    """Run a sweep; 1 if cells have failed."""
+    """Run a sweep and return 1 if cells have failed."""
     from .bundle import bundle_of
     from .load import load_sweep
     from .running import writable_store
@@ -120,12 +120,12 @@ def _run(sweep: Sweep, bundle: Bundle, store: Store, options: Namespace) -> int:
             options.interruption.answer()
     except ChangedError:
         text = (
-            "the files of the sweep were changed while it ran; finished cells are stored; start"
-            " it again"
+            "files of the sweep have changed while it ran; start it again: finished cells are"
+            " stored"
         )
         complain(f"{options.file}: {text}")
         return BAD_FILE
-    _tell(
+    _report(
         store, f" of sweep {entered.number}" if entered.has_others else "", entered.number, summary
     )
     return 1 if summary.failed or summary.left else 0
@@ -142,20 +142,18 @@ def _runner(sweep: Sweep, bundle: Bundle, options: Namespace) -> AbstractContext
     return nullcontext(local_runner(sweep, bundle, options.workers or processors()))
 
 
-def _tell(store: Store, which: str, number: int, summary: Summary) -> None:
+def _report(store: Store, which: str, number: int, summary: Summary) -> None:
     from ballplate.simulator.inputs import in_one_line, number_of
 
     from .running import shortcomings
+    from .store import results
 
     before = f" ({summary.before} of them before)" if summary.before else ""
-    left = f", {summary.left} left" if summary.left else ""
-    counted = number_of(summary.cells, "cell")
-    told = (
-        f"{store.path}: {counted}{which}, {summary.done} done, {summary.failed}"
-        f" failed{before}{left}"
-    )
-    print(in_one_line(told))
-    for text in shortcomings(store, number, summary.cells):
+    remaining = f", {summary.left} left" if summary.left else ""
+    counted = f"{number_of(summary.cells, 'cell')}{which}"
+    counts = f"{summary.done} done, {summary.failed} failed{before}{remaining}"
+    print(in_one_line(f"{store.path}: {counted}, {counts}"))
+    for text in shortcomings(store.path, results(store, number, summary.cells).rows):
         complain(text)
 
 
@@ -170,7 +168,7 @@ def _dry_run(sweep: Sweep, options: Namespace) -> int:
         print(f"{number}: {sweep.label(number)}")
     workers = options.workers or processors()
     seconds, rows = seconds_of(sweep)
-    words = f"with {number_of(workers, 'worker')}, judged by {len(rows)} of them"
+    words = f"with {number_of(workers, 'worker')}, estimated from {len(rows)}"
     cells = number_of(len(sweep.cells), "cell")
     print(f"{cells}, about {duration(seconds / workers)} {words}", file=sys.stderr)
     failed = [row for row in rows if row.status == "failed"]

@@ -11,5 +11,5 @@ from .sweep_settings import SweepSettings
 
 def schema() -> dict[str, Any]:
     """Return the JSON Schema (draft 2020-12) of a sweep file."""
-    found: dict[str, Any] = tidied(SweepSettings.model_json_schema())
-    return {"$schema": DRAFT, **found, "title": "ballplate sweep"}
+    properties: dict[str, Any] = tidied(SweepSettings.model_json_schema())
+    return {"$schema": DRAFT, **properties, "title": "ballplate sweep"}

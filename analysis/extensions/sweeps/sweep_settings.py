@@ -1,6 +1,4 @@
-"""The keys of a sweep file: forms and ranges. What they refer to is checked where the sweep is
-loaded.
-"""
+"""Keys of a sweep file: forms and ranges. `load_sweep` checks their references."""
 
 from __future__ import annotations
 
@@ -27,12 +25,12 @@ Values = Forms[SomeValues, SomeValues, Annotated[dict[Name, Any], Field(min_leng
 VariantNames = NonEmpty[Name]
 
 
-# Synthetic data sets of a cell, which are done in blocks, each of which is kept.
+# Synthetic data sets of a cell.
 MOST_TRIALS = 10_000_000
 
 
 class SubsetSettings(Settings):
-    """Which entries of a list are kept, in the order of the list."""
+    """Subsets of a list, in its order."""
 
     sizes: NonEmpty[Annotated[int, Field(ge=1)]] = Field(
         description="how many entries, those of always included"
@@ -44,10 +42,10 @@ class SubsetSettings(Settings):
 
 
 class AxisSettings(Settings):
-    """One axis of a sweep: what it changes, and the values it takes."""
+    """One axis of a sweep: the paths that it changes and their values."""
 
     path: Path | None = Field(
-        None, description="path of what the values replace, as in error messages"
+        None, description="path that the values replace, written as in error messages"
     )
     paths: NonEmpty[Path] | None = Field(
         None, description="several paths that take the same values"
@@ -90,9 +88,9 @@ Condition = Forms[Scalar, NonEmpty[Any], BoundsSettings]
 
 
 class SweepSettings(Settings):
-    """A sweep file: an experiment, what varies in it, and what is recorded."""
+    """A sweep file: an experiment, its axes, and the quantities to record."""
 
-    title: Line = Field(description="one line that says what the sweep is about")
+    title: Line = Field(description="subject of the sweep in one line")
     base: Annotated[str, Field(min_length=1)] = Field(
         description="experiment file, from this file's folder"
     )
@@ -115,7 +113,7 @@ class SweepSettings(Settings):
     trials: Annotated[int, Field(ge=2, le=MOST_TRIALS)] | None = Field(
         None, description="synthetic data sets of each cell; default: none"
     )
-    seed: Seed = Field(1, description="of the data sets; each cell has its own made of it")
+    seed: Seed = Field(1, description="of the data sets; each cell derives its own")
     record: NonEmpty[Quantity] = Field(
         RECORDED, description=f"quantities that are kept, {KEPT} and {MORE}; default: all of {KEPT}"
     )

@@ -29,23 +29,22 @@ from .load import experiment_of
 from .model import Sweep
 from .store_columns import symbol_column, unit_suffix
 
-# Replicates of a block, a multiple of a batch's; a cell with no more is computed at one go.
+# Replicates of a block, a multiple of a batch's; a cell with more is computed in several blocks.
 BLOCK = 8192
 
 
-# What helps a cell that found no memory.
-WITH_MEMORY = "with fewer --workers there is more for each, and --retry-failed tries it again"
+WITH_MEMORY = "use fewer --workers, and --retry-failed to compute it again"
 
-# Block of a task that is to tell the cell's key only.
+# Block of a task that computes only the cell's key.
 KEY_ONLY = -1
 
 
 @dataclass(frozen=True)
 class CellTask:
-    """Work on cell `number`: replicate block `block`, counted from 1, or, with 0, everything that
-    is left, or the cell's key alone.
+    """Work on cell `number`: replicate block `block`, counted from 1; 0 for the rest, KEY_ONLY for
+    the key.
 
-    `total` are the sums over all blocks, where the replicates are in several.
+    `total` has the sums over all blocks if there are several.
     """
 
     number: int
@@ -58,9 +57,9 @@ class CellResult:
     """Result of a task. `figures` by name, in SI units with the unit in the name; `details` are
     texts.
 
-    `key` is the number of the method and the fingerprint of the cell, or a hash of its choices
-    where these make no valid experiment. A failed row has its `reason`. `seconds` is the time that
-    it took, `tally` the sums of a replicate block.
+    `key` is the number of the method and the fingerprint of the cell, or a hash of its choices if
+    they make no valid experiment. A failed row has a `reason`. `seconds` is the computing time,
+    `tally` the sums of a replicate block.
     """
 
     number: int
@@ -77,13 +76,13 @@ class CellResult:
 
 
 def blocks_of(sweep: Sweep) -> int:
-    """Number of replicate blocks that are tasks of their own; none where one task does all."""
+    """Return the number of replicate blocks with tasks of their own; 0 if one task computes all."""
     return -(-sweep.trials // BLOCK) if sweep.trials is not None and sweep.trials > BLOCK else 0
 
 
 @single_threaded
 def compute(sweep: Sweep, task: CellTask) -> CellResult:
-    """Do a task; whatever goes wrong with the cell is told by its row."""
+    """Compute a task; its row states any failure of the cell."""
     start = time.perf_counter()
     row = _computed(sweep, task)
     return replace(row, seconds=time.perf_counter() - start, versions=versions())
@@ -105,13 +104,12 @@ def _computed(sweep: Sweep, task: CellTask) -> CellResult:
             return CellResult(number, block, key, "done", seed=seed, tally=tally)
         return _whole(sweep, experiment, task, key, seed)
     except Exception as error:
-        # Of an error model written in Python anything may come; the other cells do not suffer from
-        # it.
+        # An error model in Python may raise anything; the other cells go ahead.
         return CellResult(number, block, key, "failed", _reason(error), seed)
 
 
 def _reason(error: Exception) -> str:
-    """What went wrong, in one line."""
+    """Return the cause of a failure in one line."""
     if isinstance(error, ExperimentError):
         return "; ".join(map(str, error.messages))
     if isinstance(error, UnusableError):
@@ -119,9 +117,11 @@ def _reason(error: Exception) -> str:
     want = want_of_memory(error)
     if want is not None:
         return f"it {want}; {WITH_MEMORY}"
-    place = traceback.extract_tb(error.__traceback__)[-1]
+    last_call = traceback.extract_tb(error.__traceback__)[-1]
     text = "; ".join(str(error).splitlines())
-    return f"{type(error).__name__}: {text} ({Path(place.filename).name}, line {place.lineno})"
+    return (
+        f"{type(error).__name__}: {text} ({Path(last_call.filename).name}, line {last_call.lineno})"
+    )
 
 
 def _whole(sweep: Sweep, experiment: Experiment, task: CellTask, key: str, seed: int) -> CellResult:
@@ -129,28 +129,28 @@ def _whole(sweep: Sweep, experiment: Experiment, task: CellTask, key: str, seed:
     figures, details = plan_figures(planned, sweep.record)
     if sweep.trials is not None:
         if task.total is not None:
-            found = Trials(seed, combined(experiment, task.total))
+            replicates = Trials(seed, combined(experiment, task.total))
         else:
-            found = trials(experiment, sweep.trials, seed)
-        if found.outcome is None:
-            details["monte_carlo"] = found.reason
+            replicates = trials(experiment, sweep.trials, seed)
+        if replicates.outcome is None:
+            details["monte_carlo"] = replicates.reason
         else:
-            figures |= trial_figures(found.outcome, sweep.record)
-            if found.outcome.reason:
-                details["monte_carlo"] = found.outcome.reason
-            details["not_converged"] = list(found.outcome.failed)
+            figures |= trial_figures(replicates.outcome, sweep.record)
+            if replicates.outcome.reason:
+                details["monte_carlo"] = replicates.outcome.reason
+            details["not_converged"] = list(replicates.outcome.failed)
             details["flags"] = {
-                name: list(one.flags)
-                for name, one in found.outcome.comparisons.items()
-                if one.flags
+                name: list(comparison.flags)
+                for name, comparison in replicates.outcome.comparisons.items()
+                if comparison.flags
             }
     return CellResult(task.number, 0, key, "done", "", seed, figures, details)
 
 
 def lost(sweep: Sweep, task: CellTask) -> CellResult:
-    """The row of a task whose process ends whenever it is tried."""
+    """Return the row of a task whose process dies at every attempt."""
     reason = "the process that computed it was ended, by lack of memory perhaps"
-    # Without the experiment, which may be what ends the process.
+    # Making the experiment for a proper key might kill this process, too.
     return CellResult(
         task.number,
         task.block,
@@ -162,22 +162,21 @@ def lost(sweep: Sweep, task: CellTask) -> CellResult:
 
 
 def key_of(sweep: Sweep, experiment: Experiment) -> str:
-    """Key of a cell: of its experiment, what is recorded, and the data sets if there are any."""
+    """Return the key of a cell: of its experiment, the recorded quantities, and any data sets."""
     trials = None if sweep.trials is None else (sweep.trials, sweep.seed)
     return with_method(fingerprint(experiment, trials, sorted(set(sweep.record)), sweep.code))
 
 
 def invalid_key(sweep: Sweep, number: int) -> str:
-    """Key of a cell that makes no valid experiment: of its choices, and of the files."""
+    """Return the key of a cell without a valid experiment: of its choices and of all files."""
     text = f"{sweep.label(number)}\n{sweep.digest}"
     digest = hashlib.blake2b(text.encode("utf-8", "surrogatepass"), digest_size=16).hexdigest()
     return with_method(f"invalid {digest}")
 
 
 def seed_of(sweep: Sweep, key: str) -> int:
-    """Seed of a cell's data sets: of the sweep's seed and of what is computed, not of its place,
-    nor of the method.
-    """
+    """Return the seed of a cell's data sets: of the sweep's seed and of the cell's computation."""
+    # So a cell has the same data sets in any sweep, and after corrections of the method.
     text = f"{sweep.seed} {without_method(key)}"
     return int.from_bytes(hashlib.blake2b(text.encode(), digest_size=6).digest(), "big")
 
@@ -185,57 +184,59 @@ def seed_of(sweep: Sweep, key: str) -> int:
 def plan_figures(
     planned: Prediction, record: tuple[str, ...]
 ) -> tuple[dict[str, float], dict[str, Any]]:
-    """Figures and texts of a plan."""
-    judged = planned.verdict
-    counted = judged.singular_values[: len(judged.singular_values) - judged.deficiency]
+    """Return values and texts of a plan."""
+    verdict = planned.verdict
+    determined = verdict.singular_values[: len(verdict.singular_values) - verdict.deficiency]
     figures = {
-        "parameters": float(judged.parameters),
-        "observations": float(judged.observations),
-        "rank_deficiency": float(judged.deficiency),
-        "as_expected": float(judged.as_expected),
-        "weakly_determined": float(len(judged.weak)),
-        "smallest_singular_value_per_um": float(counted[-1]) if len(counted) else np.nan,
-        "gap": float(judged.gap),
+        "parameters": float(verdict.parameters),
+        "observations": float(verdict.observations),
+        "rank_deficiency": float(verdict.deficiency),
+        "as_expected": float(verdict.as_expected),
+        "weakly_determined": float(len(verdict.weak)),
+        "smallest_singular_value_per_um": float(determined[-1]) if len(determined) else np.nan,
+        "gap": float(verdict.gap),
     }
-    for symbol, one in planned.quantities.items():
+    for symbol, quantity in planned.quantities.items():
         if symbol.partition(" ")[0] not in record:
             continue
-        name, unit = symbol_column(symbol), unit_suffix(one.unit)
-        figures[f"{name}_maximum_{unit}"] = one.maximum
-        figures[f"{name}_average_{unit}"] = one.average
-        figures[f"{name}_undetermined"] = float(one.undetermined)
-        figures[f"{name}_count"] = float(one.count)
-        if one.within_target is not None:
-            figures[f"{name}_within_target"] = one.within_target
+        name, unit = symbol_column(symbol), unit_suffix(quantity.unit)
+        figures[f"{name}_maximum_{unit}"] = quantity.maximum
+        figures[f"{name}_average_{unit}"] = quantity.average
+        figures[f"{name}_undetermined"] = float(quantity.undetermined)
+        figures[f"{name}_count"] = float(quantity.count)
+        if quantity.within_target is not None:
+            figures[f"{name}_within_target"] = quantity.within_target
     details = {
-        "undetermined": [str(direction) for direction in judged.null],
-        "weak": [str(direction) for direction in judged.weak],
+        "undetermined": [str(direction) for direction in verdict.null],
+        "weak": [str(direction) for direction in verdict.weak],
         "largest_at": {
-            symbol: one.largest for symbol, one in planned.quantities.items() if one.largest
+            symbol: quantity.largest
+            for symbol, quantity in planned.quantities.items()
+            if quantity.largest
         },
     }
     return figures, details
 
 
 def trial_figures(outcome: MonteCarloOutcome, record: tuple[str, ...]) -> dict[str, float]:
-    """Figures of replicates."""
+    """Return the values of replicates."""
     figures = {"trials": float(outcome.trials), "not_converged": float(len(outcome.failed))}
 
     def add(name: str, figure: MonteCarloEstimate) -> None:
         figures[name] = figure.value
         figures[f"{name}_standard_error"] = figure.error
 
-    for symbol, one in outcome.comparisons.items():
+    for symbol, comparison in outcome.comparisons.items():
         if symbol.rstrip("'").partition(" ")[0] not in record:
             continue
-        name, unit = symbol_column(symbol), unit_suffix(one.unit)
-        figures[f"{name}_actual_maximum_{unit}"] = one.actual_maximum
-        figures[f"{name}_actual_average_{unit}"] = one.actual_average
-        add(f"{name}_spread_ratio", one.spread)
-        add(f"{name}_actual_ratio", one.actual)
-        add(f"{name}_bias_ratio", one.bias)
-        add(f"{name}_coverage_sigma_given", one.known)
-        add(f"{name}_coverage_sigma_estimated", one.estimated)
+        name, unit = symbol_column(symbol), unit_suffix(comparison.unit)
+        figures[f"{name}_actual_maximum_{unit}"] = comparison.actual_maximum
+        figures[f"{name}_actual_average_{unit}"] = comparison.actual_average
+        add(f"{name}_spread_ratio", comparison.spread)
+        add(f"{name}_actual_ratio", comparison.actual)
+        add(f"{name}_bias_ratio", comparison.bias)
+        add(f"{name}_coverage_sigma_given", comparison.known)
+        add(f"{name}_coverage_sigma_estimated", comparison.estimated)
     if outcome.comparisons:
         add("sum_of_squares", outcome.misfit.mean)
     figures["degrees_of_freedom"] = float(outcome.misfit.degrees_of_freedom)

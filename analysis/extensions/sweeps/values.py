@@ -1,6 +1,4 @@
-"""Values of axes: texts for tables, numbers where they are numbers, ranges, and subsets of
-lists.
-"""
+"""Values of axes: texts for tables, numbers, ranges, and subsets of lists."""
 
 from __future__ import annotations
 
@@ -36,7 +34,7 @@ KINDS: tuple[tuple[Unit, Callable[[object], float]], ...] = (
 
 
 def label(node: Node) -> str:
-    """A value as a short text.
+    """Return a value as a short text.
 
     >>> from ballplate.simulator.inputs.yamltree import parse_tree
     >>> label(parse_tree("[5, 750 mm]", ""))
@@ -56,17 +54,15 @@ def _text(value: Any) -> str:
 
 
 def numeric(value: object) -> tuple[float, Unit]:
-    """A number or quantity in SI units and the unit; NaN and no unit for anything else.
+    """Return a number or quantity in SI units with its unit; NaN without unit for anything else.
 
     >>> numeric("750 mm"), numeric(5), numeric("z low")[1]
     ((0.75, 'm'), (5.0, '1'), '')
     """
     if isinstance(value, int | float) and not isinstance(value, bool):
-        # Larger whole numbers are not the same as floats.
-        number = (
-            float(value) if abs(value) <= (2**53 if isinstance(value, int) else 1e300) else math.nan
-        )
-        return (number, "1") if math.isfinite(number) else (math.nan, "")
+        # A float cannot represent every larger whole number.
+        is_exact = abs(value) <= (2**53 if isinstance(value, int) else 1e300)
+        return (float(value), "1") if is_exact else (math.nan, "")
     if isinstance(value, str) and len(value) < 100:
         for unit, parse in KINDS:
             try:
@@ -79,10 +75,10 @@ def numeric(value: object) -> tuple[float, Unit]:
 def of_range(
     first: object, last: object, count: int | None, step: object, logarithmic: bool, most: int
 ) -> list[str | int | float]:
-    """Values of a range with the unit of its ends, computed exactly.
+    """Return the values of a range, computed exactly, in the unit of its ends.
 
-    :raises ValueError: ends that are no quantities of one unit, a step that does not lead from one
-        to the other, or more values than `most`.
+    :raises ValueError: ends that are no quantities of one unit, a step in the opposite direction,
+        or more values than `most`.
 
     >>> of_range("300 mm", "750 mm", 4, None, False, 100)
     ['300 mm', '450 mm', '600 mm', '750 mm']
@@ -105,11 +101,9 @@ def of_range(
                 " unit"
             )
         if difference == 0 or (high - low) / difference < 0:
-            raise ValueError(
-                "step does not lead from from to to; turn its sign round, or exchange the ends"
-            )
+            raise ValueError("step leads away from to; change its sign, or exchange from and to")
         if logarithmic:
-            raise ValueError("spacing: logarithmic goes with count; leave step out")
+            raise ValueError("spacing: logarithmic applies to count; replace step by count")
         count = int((high - low) / difference) + 1
     else:
         difference = (high - low) / (count - 1)
@@ -130,17 +124,17 @@ def of_range(
 
 
 def _exact(value: object, key: str) -> tuple[Fraction, str]:
-    """A number, and its unit as written."""
+    """Return a number and its unit as written."""
     if isinstance(value, bool) or not isinstance(value, int | float | str):
         raise ValueError(f"{key} is missing; give from, to and count or step")
     text = str(value)
-    found = QUANTITY.fullmatch(text.strip()) if len(text) < 100 else None
-    if found is None:
+    quantity = QUANTITY.fullmatch(text.strip()) if len(text) < 100 else None
+    if quantity is None:
         raise ValueError(
             f'{key}: "{shorten(text)}" is neither a number nor a quantity; write for example'
             ' "300 mm"'
         )
-    return exact_number(found[1]), (found[2] or "").strip()
+    return exact_number(quantity[1]), (quantity[2] or "").strip()
 
 
 def _written(value: Fraction, unit: str) -> str | int | float:
@@ -153,7 +147,7 @@ def _written(value: Fraction, unit: str) -> str | int | float:
 
 
 def entry_names(node: Node) -> list[str] | None:
-    """Names of the entries of a list, None where it is no list of named entries."""
+    """Return the names of the entries of a list; None unless all have one."""
     if not isinstance(node, Sequence):
         return None
     names = [child(item, "name") if isinstance(item, Mapping) else item for item in node.items]
@@ -163,35 +157,33 @@ def entry_names(node: Node) -> list[str] | None:
 
 
 def subset_count(total: int, fixed: int, sizes: tuple[int, ...]) -> int:
-    """How many subsets there are of `total` entries that hold `fixed` of them."""
+    """Return the number of subsets of `total` entries that include `fixed` given ones."""
     return sum(math.comb(total - fixed, size - fixed) for size in sizes if fixed <= size <= total)
 
 
 def subsets(
     names: list[str], always: tuple[str, ...], among: tuple[str, ...], sizes: tuple[int, ...]
 ) -> list[tuple[str, tuple[str, ...]]]:
-    """Subsets of the entries of a list, each with its label, in the order of sizes and then of the
-    list.
-    """
+    """Return labelled subsets of the entries of a list, by size, then in the order of the list."""
     free = [k for k, name in enumerate(names) if name in among and name not in always]
     fixed = [k for k, name in enumerate(names) if name in always]
-    found = []
+    labelled = []
     for size in sizes:
         if size < len(fixed):
             continue
         for chosen in combinations(free, size - len(fixed)):
             kept = sorted([*fixed, *chosen])
-            found.append((_subset_label(names, kept), tuple(names[k] for k in kept)))
-    return found
+            labelled.append((_subset_label(names, kept), tuple(names[k] for k in kept)))
+    return labelled
 
 
-def _subset_label(names: list[str], kept: list[int]) -> str:
-    """What is kept, or what is left out where that is shorter.
+def _subset_label(names: list[str], chosen: list[int]) -> str:
+    """Return the names in a subset, or the names outside it if that is shorter.
 
     >>> _subset_label(["a", "b", "c", "d"], [0, 1, 3]), _subset_label(["a", "b", "c", "d"], [0, 3])
     ('all but c', 'a + d')
     """
-    without = [name for k, name in enumerate(names) if k not in kept]
-    if 2 * len(without) < len(kept):
+    without = [name for k, name in enumerate(names) if k not in chosen]
+    if 2 * len(without) < len(chosen):
         return f"all but {' and '.join(without)}" if without else "all"
-    return " + ".join(names[k] for k in kept)
+    return " + ".join(names[k] for k in chosen)

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import pandas
-from ballplate.extensions.sweeps.frame import frame
+from ballplate.extensions.sweeps.running import stored_result
 from ballplate.extensions.sweeps.store import open_store
 
 from tests.reference.copies import copy_file
@@ -70,7 +70,7 @@ def rows(store: Path) -> pandas.DataFrame:
     """All rows but the time that they took."""
     opened = open_store(store)
     try:
-        return frame(opened).drop(columns="duration_s")
+        return stored_result(opened).table.drop(columns="duration_s")
     finally:
         opened.close()
 

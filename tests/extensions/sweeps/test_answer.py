@@ -126,7 +126,7 @@ def test_the_same_settings_of_two_stores_are_compared(tmp_path: Path) -> None:
     here, there = sweep(tmp_path / "a"), sweep(tmp_path / "b", worse=1.25, open_=(5,))
     found = compared(here, there, "b.sqlite")
     assert found.sentences[0].startswith(wording.SETTINGS_ARE_DONE_IN_BOTH_IN_THIS_STORE)
-    assert found.sentences[1].startswith(wording.IN_OF_THEM_SOME)
+    assert found.sentences[1].startswith(wording.SETTING_IS_NOT_COMPARED)
     assert wording.SMALLER_THAN_IN_SQLITE in found.sentences[2]
     assert wording.SETTINGS_ARE_RANK_DEFICIENT_ONLY in found.sentences
     same = compared(here, here, "a.sqlite")

@@ -122,7 +122,8 @@ def test_workers_with_other_code_are_refused(
     start("-c", worker + SERVE, address)
     err = ended(small_sweep(tmp_path, 2), address)
     assert (
-        f" has {words}, and this is ballplate 0.1.0; install the same wherever a worker runs" in err
+        f" has {words}, and this is ballplate 0.1.0; install the same ballplate on every worker"
+        in err
     )
     assert err.startswith("the worker tcp://127.0.0.1:")
     assert stored(tmp_path / "small.sqlite") == 0

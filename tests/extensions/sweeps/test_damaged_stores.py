@@ -180,15 +180,15 @@ def test_digests_notice_one_bit(store: Path, capsys: pytest.CaptureFixture[str])
     store.write_bytes(content[:place] + bytes([content[place] ^ 1]) + content[place + 1 :])
     assert main(commands(store, "csv")[0]) == 3
     err = capsys.readouterr().err
-    assert wording.CELL_COULD_NOT_BE_READ_ITS_CONTENT in err
+    assert wording.UNREADABLE_CELL_ITS_CONTENT in err
     assert read_table(store.parent / "table.csv")["cell"].tolist() == [0, 2, 3]
     assert main(commands(store, "html")[0]) == 3
     page = (store.parent / "report.html").read_text(encoding="utf-8")
-    assert wording.COULD_NOT_BE_READ in page
+    assert wording.UNREADABLE in page
     capsys.readouterr()
     assert main(commands(store, "sweep")[0]) == 1
     captured = capsys.readouterr()
-    assert wording.CELL_COULD_NOT_BE_READ in captured.err and wording.OF_THEM_BEFORE in captured.out
+    assert wording.UNREADABLE_CELL in captured.err and wording.OF_THEM_BEFORE in captured.out
 
 
 def many(path: Path, count: int) -> Store:
@@ -232,7 +232,9 @@ def test_all_but_the_rows_of_the_damaged_pages_survive(
         path.write_bytes(content[: len(content) - size])
     assert main(["sweep", "--export", str(path), "-o", str(tmp_path / "t.csv")]) == 3
     err = capsys.readouterr().err
-    told = re.search(r"(\d+) cells? could not be read", err)
+    told = re.search(r"(\d+) unreadable cells?", err)
+    # `sweep` refuses such a file.
+    assert f"; restore a copy, or {wording.NAME_A_NEW_FILE}" in err
     table = read_table(tmp_path / "t.csv")
     assert told is not None and int(told[1]) == 1000 - len(table)
     # Of those on one page, not of any other.
@@ -254,7 +256,7 @@ def test_a_report_of_nothing_done_says_so(store: Path, capsys: pytest.CaptureFix
     for arguments in commands(store, "text", "html"):
         assert main(arguments) == 0
         out, err = capsys.readouterr()
-        assert out == "" and err.count("\n") == 1 and wording.NONE_OF_ITS_CELLS_IS_DONE in err
+        assert out == "" and err.count("\n") == 1 and wording.OF_CELLS_DONE in err
         assert_told_in_lines(err, store)
 
 
@@ -265,7 +267,7 @@ def test_a_damaged_file_is_kept_and_its_cells_are_computed_under_another_name(
     page_of("text")(store)
     damaged = store.read_bytes()
     assert main(commands(store, "sweep")[0]) == 3
-    assert wording.STORE_AND_A_NEW_NAME_COMPUTES in capsys.readouterr().err
+    assert wording.NAME_A_NEW_FILE in capsys.readouterr().err
     other = store.with_name("other.sqlite")
     assert main([*commands(store, "sweep")[0], "--store", str(other)]) == 1
     assert_same(rows(other), right)
@@ -298,7 +300,7 @@ def test_a_store_that_vanishes_while_a_sweep_runs(
     assert "done" not in out
     line = err.splitlines()[-1]
     assert (
-        line.startswith(f"{store}: has been ")
+        line.startswith(f"{store}: was deleted, moved or replaced ")
         and wording.WHILE_THE_SWEEP_RAN in line
         and "Traceback" not in err
     )
@@ -322,7 +324,7 @@ def test_a_store_that_vanishes_at_the_end_is_not_called_done(
         )
         assert main(commands(store, "sweep")[0]) == 3
     out, err = capsys.readouterr()
-    assert out == "" and wording.HAS_BEEN_DELETED in err
+    assert out == "" and wording.WAS_DELETED in err
 
 
 def _gone(found: object, store: Path) -> object:

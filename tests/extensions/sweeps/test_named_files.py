@@ -174,4 +174,4 @@ def test_too_much_is_refused(
 ) -> None:
     monkeypatch.setattr(bundles, "MOST_BYTES", 100)
     assert main(["sweep", str(folder / "s.yaml"), "--workers", "1"]) == 3
-    assert wording.ARE_THE_LIMIT_OF_WHAT in capsys.readouterr().err
+    assert wording.ARE_THE_LIMIT_OF_A_STORE in capsys.readouterr().err

@@ -18,11 +18,11 @@ from ballplate.designs import shipped
 from ballplate.extensions.studio.document import opened
 from ballplate.extensions.studio.sweeping import swept
 from ballplate.extensions.sweeps.error_map_uncertainty import error_map
-from ballplate.extensions.sweeps.frame import frame
 from ballplate.extensions.sweeps.report.cells import NoExperimentError, experiments
 from ballplate.extensions.sweeps.report.page import page
 from ballplate.extensions.sweeps.report.results import read_results
 from ballplate.extensions.sweeps.report.verdicts import ranks
+from ballplate.extensions.sweeps.running import stored_result
 from ballplate.extensions.sweeps.store import open_store
 from ballplate.results.checked_designs import predict
 from ballplate.simulator.computing.steps import unreported
@@ -84,7 +84,7 @@ def assert_accessible(text: str) -> Page:
 def assert_of_store(found: Page, store: Path) -> None:
     """Every figure in the page is the frame's, to the last bit."""
     opened = open_store(store)
-    table = frame(opened).set_index("cell")
+    table = stored_result(opened).table.set_index("cell")
     opened.close()
     assert found.places
     for place in found.places:
@@ -330,5 +330,5 @@ def test_python_writes_the_page_of_a_sweep(
     ((store, results, run_modules, _, beside),) = asked
     assert Path(store.path) == plate_sizes and results.count("done") == 12 and run_modules
     assert beside.sentences[1:] == (wording.ALL_AVERAGES_ARE_THE_SAME,)
-    with pytest.raises(ValueError, match=wording.COMPARE_GOES_WITH_A_PAGE):
+    with pytest.raises(ValueError, match=wording.COMPARE_APPLIES_TO_PAGES):
         bp.sweep_report(plate_sizes, form="text", compare=plate_sizes)

@@ -183,14 +183,17 @@ def test_subsets_are_of_each_variants_own_list(written: Written, tmp_path: Path)
             "axes:\n  a: {path: artefacts.plat.size, values: [1]}\n",
             ["s.yaml:4:6: axes.a: artefacts.plat.size: there is no"],
         ),
-        ("axes:\n  a: {path: seed}\n", ["s.yaml:4:6: axes.a: does not say what it varies"]),
+        (
+            "axes:\n  a: {path: seed}\n",
+            ["s.yaml:4:6: axes.a: has no values; give one of values, from … to …"],
+        ),
         (
             "axes:\n  a: {values: [1]}\n",
-            ["s.yaml:4:6: axes.a: what the values replace is not clear; give path, or paths"],
+            ["s.yaml:4:6: axes.a: has no path, or both path and paths; give one"],
         ),
         (
             "axes:\n  a: {path: seed, values: [1], to: 5}\n",
-            ["s.yaml:4:32: axes.a.to: does not go with values"],
+            ["s.yaml:4:32: axes.a.to: does not apply to values"],
         ),
         (
             "axes:\n  a: {path: seed, from: 1, to: 5}\n",
@@ -202,7 +205,7 @@ def test_subsets_are_of_each_variants_own_list(written: Written, tmp_path: Path)
         ),
         (
             "axes:\n  a: {path: seed, from: 1, to: 5, step: -1}\n",
-            ["s.yaml:4:6: axes.a: step does not lead"],
+            ["s.yaml:4:6: axes.a: step leads away from to"],
         ),
         (
             "axes:\n  a: {path: seed, from: 1, to: 9000000, step: 1}\n",
@@ -228,7 +231,7 @@ def test_subsets_are_of_each_variants_own_list(written: Written, tmp_path: Path)
         ),
         (
             "axes:\n  a: {path: seed, values: [1]}\n  b: {path: seed, values: [1]}\n",
-            ['s.yaml:5:6: axes.b: seed is part of the same place as seed of the axis "a"'],
+            ['s.yaml:5:6: axes.b: seed overlaps seed of the axis "a"'],
         ),
         (
             "axes:\n  a: {path: seed, values: [1]}\nskip: [{b: 1}]\n",

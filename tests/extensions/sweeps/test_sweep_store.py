@@ -122,8 +122,7 @@ def test_rows_of_an_earlier_method_are_computed_anew_and_told(
     captured = capsys.readouterr()
     assert (
         told in captured.err
-        and f"this version computes by method {METHOD}, and computes these cells anew"
-        in captured.err
+        and f"this version computes by method {METHOD}; replaced in this run" in captured.err
     )
     assert captured.out == f"{store}: 4 cells, 2 done, 2 failed\n"
     # With the same seeds, so that only what was corrected differs.
@@ -214,7 +213,7 @@ def test_a_change_while_a_sweep_runs_is_noticed(
 
     monkeypatch.setattr("ballplate.extensions.sweeps.local.compute", changing)
     assert sweep(path) == 3
-    assert wording.WERE_CHANGED_WHILE_IT_RAN in capsys.readouterr().err
+    assert wording.HAVE_CHANGED_WHILE_IT_RAN in capsys.readouterr().err
     # What was computed before the change is there, and nothing else.
     assert rows(tmp_path / "small.sqlite")["cell"].tolist() == [0]
     monkeypatch.undo()
@@ -328,7 +327,7 @@ def test_dry_run_lists_the_cells(tmp_path: Path, capsys: pytest.CaptureFixture[s
     assert sweep(path, "--dry-run") == 1
     out, err = capsys.readouterr()
     # The last of the cells that were tried does not fit.
-    assert "judged by 3 of them\ncell 3 fails: " in err
+    assert "estimated from 3\ncell 3 fails: " in err
     assert out.splitlines()[1] == "1: size 600 mm, balls 5" and len(out.splitlines()) == 4
     assert err.startswith("4 cells, about ") and not (tmp_path / "small.sqlite").exists()
 
@@ -515,10 +514,7 @@ def test_a_cell_that_finds_no_memory_says_so(
     monkeypatch.setattr(f"ballplate.extensions.sweeps.task.{place}", finds_none)
     row = compute(loaded, CellTask(0))
     assert row.status == "failed"
-    assert (
-        row.reason
-        == f"{told}with fewer --workers there is more for each, and --retry-failed tries it again"
-    )
+    assert row.reason == f"{told}use fewer --workers, and --retry-failed to compute it again"
 
 
 def test_the_errors_of_a_cell_are_one_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -4,7 +4,7 @@ ABOVE_THE_MEASURING_VOLUME = "above the measuring volume"
 ALL_AVERAGES_ARE_THE_SAME = "All averages are the same."
 AMOUNTS_OF_CELL = "amounts of cell 0"
 ANOTHER_PROCESS_IS_COMPUTING_INTO = "another process is computing into it"
-ARE_THE_LIMIT_OF_WHAT = "are the limit of what a store takes"
+ARE_THE_LIMIT_OF_A_STORE = "are the limit of a store"
 AVERAGE_IS_THE_SAME = "1 average is the same."
 CELLS_MORE_ARE_NOT_SHOWN_HERE = (
     "7800 cells more are not shown here; ballplate sweep --export gives all."
@@ -12,21 +12,21 @@ CELLS_MORE_ARE_NOT_SHOWN_HERE = (
 CELLS_MORE_ARE_NOT_SHOWN_HERE_BALLPLATE = (
     "50 cells more are not shown here; ballplate sweep --export gives all."
 )
-CELL_COULD_NOT_BE_READ = "1 cell could not be read"
-CELL_COULD_NOT_BE_READ_ITS_CONTENT = (
-    "1 cell could not be read: 1 (its content is not what was stored)"
+UNREADABLE_CELL = "1 unreadable cell"
+UNREADABLE_CELL_ITS_CONTENT = (
+    "1 unreadable cell: 1 (its content has changed since it was stored); to compute"
 )
-COMPARE_GOES_WITH_A_PAGE = "compare goes with a page only"
-COULD_NOT_BE_READ = "1 could not be read from the damaged store"
+COMPARE_APPLIES_TO_PAGES = "compare applies to pages only"
+UNREADABLE = "1 unreadable in the damaged store"
 DIFFERS_IN_CASE_ONLY = "differs in case only"
 EYY_POSITIONING_ERROR = "EYY (positioning error of Y"
-HAS_BEEN_DELETED = "has been deleted, moved or replaced"
+WAS_DELETED = "was deleted, moved or replaced"
 HAS_THE_VARIANTS_FEW = (
     "s.yaml:2:7: base: has the variants few, many; choose one with variant: NAME, or add "
     "an axis {variants: all}"
 )
 INTERRUPTED_FINISHED_CELLS = "interrupted; finished cells are in"
-IN_OF_THEM_SOME = "In 1 of them some of U6 is undetermined in one or both"
+SETTING_IS_NOT_COMPARED = "1 setting is not compared: some of U6 is undetermined."
 IS_NOT_RECORDED = "U6 is not recorded"
 ITS_FOLDER_CANNOT_BE_WRITTEN = "its folder cannot be written; name another with --store"
 LEADS_OUT_OF_THE_FOLDER = "leads out of the folder"
@@ -34,7 +34,7 @@ MADE_IN_THE_STUDIO = "made in the studio"
 MAP_OF_STANDARD_UNCERTAINTIES = "Map of standard uncertainties"
 MODEL_METRIC_AS_IN_THE_BEST = "model metric, as in the best cell"
 MODULES_ARE_NOT_ALLOWED_HERE = "modules are not allowed here; add --run-modules"
-NONE_OF_ITS_CELLS_IS_DONE = "none of its 4 cells is done"
+OF_CELLS_DONE = "0 of 4 cells done"
 NONE_OF_THE_SETTINGS_MEETS = "None of the 12 settings meets"
 NO_MORE_THAN_THIRTY = "ValueError: no more than thirty"
 NO_TARGET_TO_BE_COMPARED = "no target to be compared with"
@@ -53,7 +53,7 @@ SETTINGS_ARE_RANK_DEFICIENT_ONLY = (
 )
 SMALLER_THAN_IN_SQLITE = "smaller than in b.sqlite in 11 of them, by a factor of 0.800."
 SMALLEST_AVERAGE_OF = "Smallest average of U6, 0.117 µm: cell 11, size 750 mm, balls 7"
-STORE_AND_A_NEW_NAME_COMPUTES = "--store and a new name computes anew"
+NAME_A_NEW_FILE = "to recompute, name a new file with ballplate sweep --store"
 SWEPT_OVER_BALLS = "swept over balls, edge, model and"
 THERE_IS_NO_SUCH_STORE = "there is no such store"
 THERE_IS_NO_SUCH_SWEEP = "there is no such sweep; it has 1"
@@ -71,5 +71,5 @@ THE_STORE_CANNOT_BE_TRUSTED = "the store cannot be trusted"
 THE_WORKER_HAS_NO_BALLPLATE = (
     "the worker b has no ballplate, and this is ballplate 1, and 1 more differ;"
 )
-WERE_CHANGED_WHILE_IT_RAN = "were changed while it ran"
+HAVE_CHANGED_WHILE_IT_RAN = "have changed while it ran"
 WHILE_THE_SWEEP_RAN = "while the sweep ran"

@@ -1,5 +1,5 @@
-"""Answer of a sweep: which settings meet the target, which of these takes fewest observations, and
-what each axis changes while the others stay.
+"""Answer of a sweep: the settings that meet the target, the cheapest of these, and each axis's
+effect.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from .axis_worth import AxisWorth, axis_worths
 from .measures import column_unit
 from .results import Integers, ReportedSweep, best_first, criterion, partly_open
 
-# Settings that the answer lists.
+# Settings in the answer's table.
 LISTED = 8
 
 WITHIN = "U6_within_target"
@@ -26,8 +26,10 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class SweepAnswer:
-    """Sentences, the settings that they are about, and what each axis is worth in the average of
-    the quantity `symbol`; `is_good` unless there is a target that no setting meets.
+    """Sentences, a table of settings, and each axis's effect on the average of the quantity
+    `symbol`.
+
+    `is_good` unless no setting meets an existing target.
     """
 
     symbol: str
@@ -38,7 +40,7 @@ class SweepAnswer:
 
 
 def answer(results: ReportedSweep) -> SweepAnswer | None:
-    """The answer of a sweep; None where nothing is done or recorded that cells are judged by."""
+    """Return the answer of a sweep; None if no cell is done, or no criterion is recorded."""
     judged = criterion(results)
     done = np.flatnonzero(results.done)
     if judged is None or not len(done):
@@ -49,14 +51,14 @@ def answer(results: ReportedSweep) -> SweepAnswer | None:
     share = results.figure(WITHIN)[done]
     meets = share == 1.0
     if np.isfinite(share).any():
-        sentences = _of_target(results, done, column, share, observations, value)
+        sentences = _sentences_with_target(results, done, column, share, observations, value)
         order = (
             best_first(~meets, observations, value) if meets.any() else best_first(-share, value)
         )
     else:
-        sentences = _without_target(results, done, column, value, partly)
+        sentences = _sentences_without_target(results, done, column, value, partly)
         order = best_first(partly, value)
-    sentences += _left_out(results, done)
+    sentences += _sentences_on_others(results, done)
     return SweepAnswer(
         _symbol(column),
         tuple(sentences),
@@ -66,7 +68,7 @@ def answer(results: ReportedSweep) -> SweepAnswer | None:
     )
 
 
-def _of_target(
+def _sentences_with_target(
     results: ReportedSweep,
     done: Integers,
     column: str,
@@ -74,14 +76,14 @@ def _of_target(
     observations: Floats,
     value: Floats,
 ) -> list[str]:
-    """Sentences on settings that have a target, which may be an axis of the sweep."""
+    """Return sentences on settings with a target, which may be an axis of the sweep."""
     meets, judged = share == 1.0, int(np.isfinite(share).sum())
     apart = len(done) - judged
     if meets.any():
-        told = [
+        sentences = [
             f"{meets.sum()} of {_settings(judged)} {_verb(int(meets.sum()), 'meet')} the target"
             " uncertainty with all lengths.",
-            _cheapest(results, done, column, np.flatnonzero(meets), observations, value),
+            _cheapest_sentence(results, done, column, np.flatnonzero(meets), observations, value),
         ]
     else:
         best = best_first(-share, value)[0]
@@ -89,19 +91,19 @@ def _of_target(
         tied = f"; {_settings(alike)} more {_verb(alike, 'have')} as many" if alike else ""
         subject = "The only setting does not meet" if judged == 1 else f"None of the {judged}"
         subject += "" if judged == 1 else " settings meets"
-        told = [
+        sentences = [
             f"{subject} the target uncertainty with all lengths. The"
             f" nearest is {_setting(results, done[best])}, with {percent(float(share[best]))} of"
             f" the lengths{tied}."
         ]
     if apart:
-        told.append(
+        sentences.append(
             f"{_settings(apart)} more {_verb(apart, 'have')} no target to be compared with."
         )
-    return told
+    return sentences
 
 
-def _cheapest(
+def _cheapest_sentence(
     results: ReportedSweep,
     done: Integers,
     column: str,
@@ -109,11 +111,13 @@ def _cheapest(
     observations: Floats,
     value: Floats,
 ) -> str:
-    """The setting of the fewest observations; of several, that with the smallest average."""
-    known = candidates[np.isfinite(observations[candidates])]
-    if not len(known):
-        return "How many observations they take is not recorded."
-    fewest = known[observations[known] == observations[known].min()]
+    """Return a sentence on the setting with the fewest observations and, among those, the
+    smallest average.
+    """
+    counted = candidates[np.isfinite(observations[candidates])]
+    if not len(counted):
+        return "Their numbers of observations are not recorded."
+    fewest = counted[observations[counted] == observations[counted].min()]
     best, same = _first_of_best(value, fewest)
     name, count = _setting(results, done[best]), f"{observations[best]:.0f} observations"
     if len(fewest) == 1:
@@ -126,38 +130,38 @@ def _cheapest(
     )
 
 
-def _without_target(
+def _sentences_without_target(
     results: ReportedSweep, done: Integers, column: str, value: Floats, partly: NDArray[np.bool_]
 ) -> list[str]:
-    """Sentences where nothing was compared with a target."""
+    """Return sentences on settings without a target."""
     if WITHIN.partition("_")[0] in results.definition["record"]:
-        told = "No setting has a target uncertainty that its lengths are compared with."
+        sentence = "No setting has a target uncertainty that its lengths are compared with."
     else:
-        told = "U6 is not recorded, so that no setting is compared with a target uncertainty."
+        sentence = "U6 is not recorded, so that no setting is compared with a target uncertainty."
     if partly.all():
-        return [told, f"In every setting some of {_symbol(column)} is undetermined."]
+        return [sentence, f"In every setting some of {_symbol(column)} is undetermined."]
     best, alike = _first_of_best(value, np.flatnonzero(~partly))
     tied = f"; {_settings(alike)} more {_verb(alike, 'have')} the same" if alike else ""
     return [
-        f"{told} The smallest average of {_quantity(results, column, value[best])}, is that of"
+        f"{sentence} The smallest average of {_quantity(results, column, value[best])}, is that of"
         f" {_setting(results, done[best])}{tied}."
     ]
 
 
 def _first_of_best(value: Floats, places: Integers) -> tuple[int, int]:
-    """The first of `places` that has the smallest value, and how many more have it."""
-    found = comparable(value[places])
-    best = best_first(found)[0]
-    return int(places[best]), int((found == found[best]).sum()) - 1
+    """Return the first of `places` with the smallest value, and the number of further ones."""
+    values = comparable(value[places])
+    best = best_first(values)[0]
+    return int(places[best]), int((values == values[best]).sum()) - 1
 
 
-def _left_out(results: ReportedSweep, done: Integers) -> list[str]:
-    """Sentences on settings that leave something open, and on those without figures."""
-    told = []
+def _sentences_on_others(results: ReportedSweep, done: Integers) -> list[str]:
+    """Return sentences on settings that are deficient, or without results."""
+    sentences = []
     deficient = int((results.figure("rank_deficiency")[done] > 0).sum())
     if deficient:
         verb = _verb(deficient, "leave")
-        told.append(f"{deficient} of {_settings(len(done))} {verb} something undetermined.")
+        sentences.append(f"{deficient} of {_settings(len(done))} {verb} something undetermined.")
     missing = (
         (results.count("failed"), "failed"),
         (results.left, "not computed yet"),
@@ -165,11 +169,11 @@ def _left_out(results: ReportedSweep, done: Integers) -> list[str]:
     )
     parts = [f"{count} {words}" for count, words in missing if count]
     if parts:
-        told.append(
+        sentences.append(
             f"Of {_settings(len(results.cells))}, {listing(parts)}; the answer is that of the"
             " others."
         )
-    return told
+    return sentences
 
 
 def _settings(count: int) -> str:
@@ -177,7 +181,7 @@ def _settings(count: int) -> str:
 
 
 def _verb(count: int, verb: str) -> str:
-    """A verb of so many settings.
+    """Return a verb that agrees with a number of settings.
 
     >>> _verb(1, "have"), _verb(2, "have"), _verb(1, "meet")
     ('has', 'have', 'meets')
@@ -194,7 +198,7 @@ def _symbol(column: str) -> str:
 
 
 def _quantity(results: ReportedSweep, column: str, value: float) -> str:
-    """A quantity with its average."""
+    """Return a quantity with its average."""
     return f"{_symbol(column)}, {number(1e6 * value, 3)} {column_unit(column)}"
 
 
@@ -208,7 +212,7 @@ def _table(results: ReportedSweep, rows: Integers, column: str, symbol: str) -> 
     if WITHIN in results.frame:
         columns.append(("lengths within target", WITHIN, 100.0))
     starred = partly_open(results, symbol)
-    found = []
+    listed = []
     for row in rows.tolist():
         entries = []
         for _, name, factor in columns:
@@ -220,14 +224,12 @@ def _table(results: ReportedSweep, rows: Integers, column: str, symbol: str) -> 
                 text = "-" if np.isnan(value) else f"{value:.0f}"
             entries.append(Entry(text, value, int(cells[row]), name))
         labels = [axis.labels[k] for axis, k in zip(results.axes, results.chosen[row], strict=True)]
-        found.append(Row(tuple(labels), tuple(entries)))
+        listed.append(Row(tuple(labels), tuple(entries)))
     headings = tuple(axis.name for axis in results.axes)
-    told = tuple(name for name, _, _ in columns)
-    notes = [
-        "Observations are readings and certified values; what else a setting costs is not here."
-    ]
+    names = tuple(name for name, _, _ in columns)
+    notes = ["Observations are readings and certified values; other costs are not included."]
     if starred[rows].any():
-        notes.append("Values marked * leave out what is undetermined.")
-    caption = "The settings that come first"
-    blocks = (Block("", tuple(found)),)
-    return Table("answer", caption, headings, told, blocks, notes=tuple(notes))
+        notes.append("Values marked * exclude undetermined ones.")
+    caption = "The best settings"
+    blocks = (Block("", tuple(listed)),)
+    return Table("answer", caption, headings, names, blocks, notes=tuple(notes))

@@ -1,4 +1,4 @@
-"""Experiments of cells, made anew from the files in a store."""
+"""Experiments of cells, rebuilt from the files in a store."""
 
 from __future__ import annotations
 
@@ -17,25 +17,25 @@ from .results import ReportedSweep
 
 
 class NoExperimentError(Exception):
-    """A cell's experiment cannot be had; the text says why."""
+    """A cell's experiment cannot be rebuilt; the text states the reason."""
 
 
 def experiments(
     store: Store, results: ReportedSweep, cells: Sequence[int], run_modules: bool = False
 ) -> list[Experiment]:
-    """Experiments of cells.
+    """Return experiments of cells.
 
-    What a store from elsewhere names is not trusted: code in Python runs only with `run_modules`,
-    and files outside the store are not read.
+    A store is not trusted: code in Python runs only with `run_modules`, and no file outside the
+    store is read.
 
-    :raises NoExperimentError: the files are not there, have changed their meaning, name others, or
-        would run code.
+    :raises NoExperimentError: files are missing, make other cells, name further files, or would run
+        code.
     """
     try:
-        kept = files(store, results.number)
+        stored_files = files(store, results.number)
     except StoreError as error:
         raise NoExperimentError(str(error).removeprefix(f"{store.path}: ")) from None
-    bundle = Bundle(results.definition["source"], results.definition["base"], kept)
+    bundle = Bundle(results.definition["source"], results.definition["base"], stored_files)
     names = [name for name, _ in bundle.files]
     if bundle.source not in names or bundle.base not in names:
         raise NoExperimentError("the store does not hold the sweep's files")
@@ -49,7 +49,7 @@ def experiments(
                 f"the store's files cannot be unpacked ({error.strerror})"
             ) from None
         try:
-            # The stored file, whichever the sweep file names.
+            # The stored experiment, even if the sweep file names another.
             base = Path(folder) / PurePosixPath(bundle.base)
             trust = Trust(run_modules, Path(folder), "add --run-modules if you trust the store")
             sweep = load_sweep(source, base, (Path(folder),), trust)

@@ -1,4 +1,4 @@
-"""Pictures of a design in the page of a sweep, as elements of it: positions, tips, error map."""
+"""Pictures of a design as elements of a sweep's page: positions, tips, error map."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 # Points around a map.
 LEFT, RIGHT, BELOW, ABOVE = 50.0, 18.0, 40.0, 10.0
 
-# Variables of the page for the colours that stand in for them.
+# Variables of the page by the colours in pictures.
 COLOURS = {INK: "--ink", MUTED: "--muted", PAPER: "--paper"} | {
     colour: f"--series-{k}" for k, colour in enumerate(SERIES)
 }
@@ -46,24 +46,24 @@ DARK = "#101010"
 
 
 def as_svg(figure: Figure, name: str, words: str) -> str:
-    """The figure as an element of a page, with `name` in front of its ids and a text for those who
-    do not see it.
+    """Return the figure as an element of a page, with `name` before its ids, and an accessible
+    text.
     """
-    found = io.StringIO()
+    stream = io.StringIO()
     figure.savefig(
-        found,
+        stream,
         format="svg",
         transparent=True,
         metadata=dict.fromkeys(("Date", "Creator", "Format", "Type")),
     )
-    body = found.getvalue()
+    body = stream.getvalue()
     body = body[body.index("<svg") :]
     size = re.search(r'viewBox="0 0 ([\d.]+) ([\d.]+)"', body)
     assert size is not None
     inner = body[body.index(">") + 1 :]
     inner = re.sub(r"<metadata>.*?</metadata>", "", inner, flags=re.DOTALL)
     inner = re.sub(r"<!--.*?-->\s*", "", inner, flags=re.DOTALL)
-    # A style inside would hold for the whole page, which has it in its own.
+    # A style inside would apply to the whole page.
     inner = re.sub(r"<defs>\s*<style.*?</style>\s*</defs>", "", inner, flags=re.DOTALL)
     # Groups that nothing refers to need no id.
     used = set(re.findall(r'(?:xlink:href="#|url\(#)([^")]+)', inner))
@@ -84,26 +84,27 @@ def as_svg(figure: Figure, name: str, words: str) -> str:
 
 
 def scene_svg(drawn: Scene, name: str, words: str) -> str:
-    """The volume with the positions in it."""
+    """Return the volume with its positions."""
     with scene_figure(drawn) as figure:
         return as_svg(figure, name, words)
 
 
 def probes_svg(drawn: Scene, name: str, words: str) -> str:
-    """The tips about the reference point, enlarged."""
+    """Return the tips about the reference point, enlarged."""
     with drawing(200.0) as figure:
         axes = blank_axes(figure)
         size = max(float(np.abs(tip).max()) for _, tip in drawn.tips) or 1.0
         axes.plot(0.0, 0.0, color=INK, marker="s", markersize=6.0)
         groups: list[tuple[Array, list[str]]] = []
         for probe, tip in drawn.tips:
-            same = next(
-                (names for at, names in groups if np.abs(at - tip).max() < 0.02 * size), None
+            names_there = next(
+                (names for centre, names in groups if np.abs(centre - tip).max() < 0.02 * size),
+                None,
             )
-            if same is None:
+            if names_there is None:
                 groups.append((tip, [probe]))
             else:
-                same.append(probe)
+                names_there.append(probe)
         for tip, names in groups:
             axes.plot([0.0, tip[0]], [0.0, tip[1]], color=INK, linewidth=1.4)
             axes.plot(*tip, color=INK, marker="o", markersize=8.0, markerfacecolor=PAPER)
@@ -124,14 +125,14 @@ def probes_svg(drawn: Scene, name: str, words: str) -> str:
         return as_svg(figure, name, words)
 
 
-def slice_svg(drawn: ErrorMap, one: Slice, name: str, words: str) -> str:
-    """A level of the error map: shades with the same limits in all levels, and lines with their
-    values.
+def slice_svg(drawn: ErrorMap, drawn_slice: Slice, name: str, words: str) -> str:
+    """Return a level of the error map: shades with common limits in all levels, and contour
+    lines.
     """
     from matplotlib.colors import LinearSegmentedColormap
     from matplotlib.ticker import MaxNLocator
 
-    values = 1e6 * one.values
+    values = 1e6 * drawn_slice.values
     every = 1e6 * np.concatenate([level.values.ravel() for level in drawn.slices])
     every = every[np.isfinite(every)]
     low, high = (float(every.min()), float(every.max())) if len(every) else (0.0, 1.0)
@@ -168,13 +169,17 @@ def slice_svg(drawn: ErrorMap, one: Slice, name: str, words: str) -> str:
 
 
 def slice_words(drawn: Slice) -> str:
-    """A level of the error map for those who do not see it."""
-    known = drawn.values[np.isfinite(drawn.values)]
-    at = ""
+    """Return an accessible text on a level of the error map."""
+    determined = drawn.values[np.isfinite(drawn.values)]
+    level = ""
     if drawn.level is not None:
-        at = f"{drawn.name} level, z {1e3 * drawn.level + 0.0:.6g} mm: "
-    if not len(known):
-        return f"{at}the error map is undetermined everywhere"
-    told = f"{at}{number(1e6 * known.min(), 3)} to {number(1e6 * known.max(), 3)} µm"
-    left = 1.0 - len(known) / drawn.values.size
-    return told + (f"; undetermined at {number(100 * left, 3)} % of the points" if left else "")
+        level = f"{drawn.name} level, z {1e3 * drawn.level + 0.0:.6g} mm: "
+    if not len(determined):
+        return f"{level}the error map is undetermined everywhere"
+    text = f"{level}{number(1e6 * determined.min(), 3)} to {number(1e6 * determined.max(), 3)} µm"
+    undetermined_share = 1.0 - len(determined) / drawn.values.size
+    return text + (
+        f"; undetermined at {number(100 * undetermined_share, 3)} % of the points"
+        if undetermined_share
+        else ""
+    )

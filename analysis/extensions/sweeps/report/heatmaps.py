@@ -1,6 +1,4 @@
-"""The average that cells are judged by over each pair of axes: tables whose entries are shaded by
-their size, each of them a single cell.
-"""
+"""Tables of the average that cells are judged by, over each pair of axes, shaded by size."""
 
 from __future__ import annotations
 
@@ -16,10 +14,10 @@ from .results import ReportAxis, ReportedSweep, criterion, partly_open, ranked
 from .series import evenly, setting_words
 from .tables import DIGITS, NOT_DONE, STAR
 
-# Values of an axis that are shown, shades that can be told apart, and pairs of axes.
+# Limits: values of an axis, distinguishable shades, pairs of axes.
 MOST_VALUES, SHADES, MOST_PAIRS = 12, 8, 10
 
-# In place of a shade: of what is undetermined in part at least, and of cells without a figure.
+# Instead of a shade: something is undetermined; no value.
 DEFICIENT, BLANK = -2, -1
 
 
@@ -38,8 +36,8 @@ class Heat:
 
 
 def heat_maps(results: ReportedSweep) -> list[Heat]:
-    """A map of the averages that cells are judged by, for each pair of axes of which several
-    values were combined.
+    """Return a map of the averages that cells are judged by, for each pair of axes with several
+    values.
     """
     judged, best = criterion(results), ranked(results)
     measures = [
@@ -47,21 +45,23 @@ def heat_maps(results: ReportedSweep) -> list[Heat]:
     ]
     if not measures or not len(best):
         return []
-    found: list[Heat] = []
+    maps: list[Heat] = []
     for i, j in combinations(range(len(results.axes)), 2):
-        if min(len(results.axes[k].labels) for k in (i, j)) > 1 and len(found) < MOST_PAIRS:
+        if min(len(results.axes[k].labels) for k in (i, j)) > 1 and len(maps) < MOST_PAIRS:
             heat = _heat(results, i, j, measures[0], int(best[0]))
-            found += [] if heat is None else [heat]
-    return found
+            maps += [] if heat is None else [heat]
+    return maps
 
 
 def _heat(results: ReportedSweep, i: int, j: int, measure: Measure, best: int) -> Heat | None:
-    """The map where all further axes are as in a cell; None where hardly any are combined there."""
+    """Return the map at a cell's values of all further axes; None if fewer than four cells are
+    there.
+    """
     rows, columns = results.axes[i], results.axes[j]
     further = [k for k in range(len(results.axes)) if k not in (i, j)]
-    own = results.chosen[best, further]
-    here = np.flatnonzero((results.chosen[:, further] == own).all(axis=1))
-    planned = results.cells[(results.cells[:, further] == own).all(axis=1)]
+    common = results.chosen[best, further]
+    here = np.flatnonzero((results.chosen[:, further] == common).all(axis=1))
+    planned = results.cells[(results.cells[:, further] == common).all(axis=1)]
     places = {
         (int(a), int(b)): int(row)
         for a, b, row in zip(results.chosen[here, i], results.chosen[here, j], here, strict=True)
@@ -76,21 +76,21 @@ def _heat(results: ReportedSweep, i: int, j: int, measure: Measure, best: int) -
     is_open = np.zeros(values.shape, bool)
     entries = []
     for r, line in enumerate(grid):
-        told = []
+        line_entries = []
         for c, place in enumerate(line):
             row = places.get(place)
             if row is None:
-                told.append(Entry(NOT_DONE if place in wanted else ""))
+                line_entries.append(Entry(NOT_DONE if place in wanted else ""))
                 continue
             entry, is_open[r, c] = _entry(results, row, measure, bool(open_[row]))
-            told.append(entry)
+            line_entries.append(entry)
             if entry.value is not None and not is_open[r, c]:
                 values[r, c] = entry.value
-        entries.append(tuple(told))
+        entries.append(tuple(line_entries))
     shades = np.where(is_open, DEFICIENT, _shades(values.ravel()).reshape(values.shape))
     notes = []
     if further:
-        notes.append(f"All with {setting_words(results, further, own)}, as in the best cell.")
+        notes.append(f"All with {setting_words(results, further, common)}, as in the best cell.")
     notes += [
         f"{len(shown)} of {len(axis.labels)} values of {axis.name}."
         for axis, shown in ((rows, row_values), (columns, column_values))
@@ -110,7 +110,7 @@ def _heat(results: ReportedSweep, i: int, j: int, measure: Measure, best: int) -
 
 
 def _entry(results: ReportedSweep, row: int, measure: Measure, is_open: bool) -> tuple[Entry, bool]:
-    """A cell's place, and whether it leaves something open."""
+    """Return a cell's entry, and whether something is undetermined."""
     cell = int(results.frame["cell"].to_numpy()[row])
     if not results.done[row]:
         return Entry(results.statuses[row], None, cell, measure.figure), False
@@ -120,14 +120,14 @@ def _entry(results: ReportedSweep, row: int, measure: Measure, is_open: bool) ->
 
 
 def _shades(values: NDArray[np.float64]) -> NDArray[np.int64]:
-    """Shades by size, on a logarithmic scale where all are above zero."""
+    """Return shades by size, on a logarithmic scale if all values are positive."""
     finite = np.isfinite(values)
-    found = np.full(len(values), BLANK)
+    shades = np.full(len(values), BLANK)
     if not finite.any():
-        return found
+        return shades
     scaled = np.log(values[finite]) if values[finite].min() > 0 else values[finite]
     low, size = scaled.min(), np.ptp(scaled)
-    # Equal values but for rounding have no order to show.
+    # Values that differ only by rounding get the same shade.
     share = (scaled - low) / size if size > 1e-9 else np.zeros(len(scaled))
-    found[finite] = np.minimum((SHADES * (share + 1e-9)).astype(int), SHADES - 1)
-    return found
+    shades[finite] = np.minimum((SHADES * (share + 1e-9)).astype(int), SHADES - 1)
+    return shades

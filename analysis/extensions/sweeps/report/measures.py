@@ -1,4 +1,4 @@
-"""The figures that tables and plots show, found among a frame's columns."""
+"""Columns of a frame that tables and plots show."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ STATISTICS = ("maximum", "average")
 
 @dataclass(frozen=True)
 class Measure:
-    """A figure: column `figure` of the frame times `factor` in `unit`, with the column of its
-    standard error if any.
+    """Column `figure` of the frame times `factor` in `unit`, with the column of any standard
+    error.
     """
 
     symbol: str
@@ -34,12 +34,12 @@ class Measure:
 
     @property
     def stands_for_all(self) -> bool:
-        """Whether the figure is told of all values of the quantity, those undetermined left out."""
+        """Return whether the value excludes undetermined ones."""
         return self.statistic in (*STATISTICS, "actual average")
 
     @property
     def is_share(self) -> bool:
-        """Whether the figure is a share within a target."""
+        """Return whether the value is a share within a target."""
         return self.statistic == "within target"
 
     @property
@@ -48,18 +48,17 @@ class Measure:
 
 
 def uncertainty_measures(results: ReportedSweep, of_parts: bool = True) -> list[Measure]:
-    """Maximum and average of all recorded uncertainties, what is open, and shares within the target
-    accuracy.
+    """Return maximum and average of all recorded uncertainties, with shares within the target.
 
-    Without `of_parts` the lengths and angles of U2 and U3 are left out, and how much is open.
+    `of_parts` includes lengths and angles of U2 and U3, and numbers of undetermined values.
     """
-    found: list[Measure] = []
+    measures: list[Measure] = []
     for symbol in DESCRIPTIONS:
         if " " in symbol and not of_parts:
             continue
         name = symbol_column(symbol)
         for statistic in STATISTICS:
-            found += [
+            measures += [
                 Measure(symbol, statistic, unit, column)
                 for column, unit in _columns(results, f"{name}_{statistic}_")
             ]
@@ -71,7 +70,7 @@ def uncertainty_measures(results: ReportedSweep, of_parts: bool = True) -> list[
                 of_parts and (results.figure(column) > 0).any()
             ):
                 continue
-            found.append(
+            measures.append(
                 Measure(
                     symbol,
                     statistic.replace("_", " "),
@@ -81,11 +80,11 @@ def uncertainty_measures(results: ReportedSweep, of_parts: bool = True) -> list[
                     is_count=statistic == "undetermined",
                 )
             )
-    return found
+    return measures
 
 
 def rank_measures(results: ReportedSweep) -> list[Measure]:
-    """The rank deficiency, where a cell has any."""
+    """Return the rank deficiency, unless all cells have full rank."""
     column = "rank_deficiency"
     if column not in results.frame or not (results.figure(column) > 0).any():
         return []
@@ -93,13 +92,13 @@ def rank_measures(results: ReportedSweep) -> list[Measure]:
 
 
 def trial_measures(results: ReportedSweep, of_parts: bool = True) -> list[Measure]:
-    """Figures of Monte Carlo; none where no trials were made."""
-    found: list[Measure] = []
+    """Return the measures of Monte Carlo; an empty list without trials."""
+    measures: list[Measure] = []
     for symbol in trial_symbols(results):
         if " " in symbol and not of_parts:
             continue
         name = symbol_column(symbol)
-        found += [
+        measures += [
             Measure(symbol, "actual average", unit, column)
             for column, unit in _columns(results, f"{name}_actual_average_")
         ]
@@ -109,52 +108,50 @@ def trial_measures(results: ReportedSweep, of_parts: bool = True) -> list[Measur
             ("covered", "coverage_sigma_given", "%", 100.0),
         ):
             figure = f"{name}_{column}"
-            found.append(
+            measures.append(
                 Measure(symbol, statistic, unit, figure, factor, f"{figure}_standard_error")
             )
-    return found
+    return measures
 
 
 def trial_symbols(results: ReportedSweep) -> list[str]:
-    """Quantities with Monte Carlo figures, those of further artefacts marked by dashes."""
-    found = []
+    """Return quantities with Monte Carlo results; dashes mark those of further artefacts."""
+    symbols = []
     for symbol in DESCRIPTIONS:
         while f"{symbol_column(symbol)}_spread_ratio" in results.frame:
-            found.append(symbol)
+            symbols.append(symbol)
             symbol += MORE
-    return found
+    return symbols
 
 
 def descriptions(measures: Sequence[Measure]) -> list[str]:
-    """What the quantities are the uncertainties of, each in a line."""
-    found = []
-    for symbol in dict.fromkeys(measure.symbol for measure in measures):
-        known = DESCRIPTIONS.get(symbol.rstrip(MORE))
-        if known is not None:
-            found.append(
-                f"{symbol}: {known}" + (" of a further artefact" if symbol.endswith(MORE) else "")
-            )
-    return found
+    """Return descriptions of the quantities of measures, one line each."""
+    return [
+        f"{symbol}: {DESCRIPTIONS[symbol.rstrip(MORE)]}"
+        + (" of a further artefact" if symbol.endswith(MORE) else "")
+        for symbol in dict.fromkeys(measure.symbol for measure in measures)
+        if symbol.rstrip(MORE) in DESCRIPTIONS
+    ]
 
 
 def _columns(results: ReportedSweep, start: str) -> list[tuple[str, str]]:
-    """Columns that begin so, with the unit in which they are shown."""
-    found = []
-    for column in results.frame.columns:
-        if column.startswith(start):
-            found.append((column, _shown(column.removeprefix(start))))
-    return found
+    """Return columns with a prefix, and their printed unit."""
+    return [
+        (column, _printed_unit(column.removeprefix(start)))
+        for column in results.frame.columns
+        if column.startswith(start)
+    ]
 
 
 def column_unit(column: str) -> str:
-    """Unit in which a column of averages is shown.
+    """Return the printed unit of a column of averages.
 
     >>> column_unit("U6_average_m"), column_unit("U3_average_m_or_rad")
     ('µm', 'µm or µrad')
     """
-    return _shown(column.partition("_average_")[2])
+    return _printed_unit(column.partition("_average_")[2])
 
 
-def _shown(suffix: str) -> str:
+def _printed_unit(suffix: str) -> str:
     unit = suffix.replace("_or_", ", ").replace("ratio", "1")
     return shown_unit(unit).replace(", ", " or ")

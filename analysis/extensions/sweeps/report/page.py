@@ -1,6 +1,4 @@
-"""A sweep's results as one page that needs nothing else: no network, no script, no file beside
-it.
-"""
+"""A sweep's results as one page that needs no network, script or further file."""
 
 from __future__ import annotations
 
@@ -46,16 +44,16 @@ from .store_comparison import StoreComparison
 from .tables import report_tables
 from .verdicts import failures, flags, ranks, weak
 
-# Values of an axis that are listed.
+# Values of an axis in the list of facts.
 LISTED = 12
 
-# The name of the sweep file that the studio makes, for as long as it computes.
+# Temporary sweep file of the studio.
 MADE_IN_STUDIO = ".ballplate-sweep.yaml"
 
 
 @dataclass(frozen=True)
 class Drawing:
-    """A drawing with what stands below it."""
+    """A picture with its caption."""
 
     svg: str
     caption: str
@@ -63,7 +61,7 @@ class Drawing:
 
 @dataclass(frozen=True)
 class DrawnDesign:
-    """A cell's design: the drawing, its probes, and the positions as a table."""
+    """A cell's design: the picture, its probes, and the positions as a table."""
 
     cell: int
     heading: str
@@ -88,8 +86,9 @@ def page(
     report: Report = unreported,
     comparison: StoreComparison | None = None,
 ) -> str:
-    """The page. Experiments with code of their own are drawn only with `run_modules`; `report`
-    receives what is drawn, and a `comparison` with another sweep follows the answer.
+    """Return the page of a sweep.
+
+    Experiments with code in Python are drawn only with `run_modules`; `report` receives progress.
 
     :raises ImportError: jinja2 or matplotlib is not installed.
     """
@@ -126,7 +125,7 @@ def page(
 
 
 def _sections(context: dict[str, Any]) -> list[tuple[str, str]]:
-    known = [
+    sections = [
         ("answer", "Answer", context["answer"]),
         ("comparison", "Compared with another sweep", context["comparison"]),
         ("swept", "What was swept", True),
@@ -138,7 +137,7 @@ def _sections(context: dict[str, Any]) -> list[tuple[str, str]]:
         ("designs", "Designs", context["designs"] or context["no_designs"]),
         ("error-map", "The error map's uncertainty", context["error_map"]),
     ]
-    return [(name, words) for name, words, is_there in known if is_there]
+    return [(name, words) for name, words, is_there in sections if is_there]
 
 
 def _summary(results: ReportedSweep) -> str:
@@ -146,17 +145,17 @@ def _summary(results: ReportedSweep) -> str:
     parts += [f"{results.count('failed')} failed"] if results.count("failed") else []
     parts += [f"{results.left} left"] if results.left else []
     unreadable = len(results.found.damaged)
-    parts += [f"{unreadable} could not be read from the damaged store"] if unreadable else []
+    parts += [f"{unreadable} unreadable in the damaged store"] if unreadable else []
     return ", ".join(parts) + "."
 
 
 def _source(path: str) -> tuple[str, str]:
-    """What a sweep comes from, by the path of its file as it is stored.
+    """Return the source of a sweep, from the path of its file in the store.
 
     >>> _source("plates/sizes.yaml"), _source("plates/.ballplate-sweep.yaml")
     (('Sweep file', 'plates/sizes.yaml'), ('Sweep', 'made in the studio'))
     """
-    # A file that was there for the computation only has a name that nobody can look up.
+    # Readers cannot look up a temporary file.
     if PurePosixPath(path).name == MADE_IN_STUDIO:
         return "Sweep", "made in the studio"
     return "Sweep file", in_one_line(path)
@@ -177,7 +176,9 @@ def _facts(results: ReportedSweep) -> list[tuple[str, str]]:
     cells = f"{len(results.cells)}: {results.count('done')} done, "
     cells += f"{results.count('failed')} failed, {results.left} left"
     if results.found.damaged:
-        cells += f", {len(results.found.damaged)} could not be read: {_unreadable(results)}"
+        damaged = sorted(results.found.damaged)
+        reason = in_one_line(results.found.damaged[damaged[0]])
+        cells += f", {len(damaged)} unreadable: {cell_list(damaged)} ({reason})"
     facts += [
         ("Cells", cells),
         ("Recorded", ", ".join(stored["record"])),
@@ -191,70 +192,59 @@ def _facts(results: ReportedSweep) -> list[tuple[str, str]]:
     counts = Counter(zip(*(results.frame[name].tolist() for name in names), strict=True))
     for versions, count in counts.items():
         words = ", ".join(
-            f"{name.removesuffix('_version')} {one}"
-            for name, one in zip(names, versions, strict=True)
+            f"{name.removesuffix('_version')} {version}"
+            for name, version in zip(names, versions, strict=True)
         )
         facts.append(("Computed with", words if len(counts) == 1 else f"{words} ({count} cells)"))
     return facts
 
 
-def _unreadable(results: ReportedSweep) -> str:
-    """Which cells could not be read, and why the first of them."""
-    cells = sorted(results.found.damaged)
-    return f"{cell_list(cells)} ({in_one_line(results.found.damaged[cells[0]])})"
-
-
 def _plots(
     drawn: list[Plot], judged: str, report: Report
 ) -> list[tuple[str, list[Drawing], list[Drawing]]]:
-    """Plots of the quantity that cells are judged by against each axis, and those of others."""
-    found = []
-    number_of = 0
-    for axis, some in groupby(
+    """Return plots against each axis: of the quantity that cells are judged by, and of others."""
+    plots_by_axis = []
+    count = 0
+    for axis, axis_plots in groupby(
         counted(drawn, "plots", len(drawn), report), lambda plot: plot.axis.name
     ):
         figures: tuple[list[Drawing], list[Drawing]] = [], []
-        for plot in some:
-            number_of += 1
+        for plot in axis_plots:
+            count += 1
             caption = f"{plot.symbol}, {DESCRIPTIONS[plot.symbol]}, against {plot.axis.name}."
-            picture = plot_svg(plot, f"plot{number_of}")
+            picture = plot_svg(plot, f"plot{count}")
             of_others = symbol_column(plot.symbol) != judged
             figures[of_others].append(Drawing(picture, f"{caption} {plot.note}".strip()))
-        found.append((axis, *figures))
-    return found
+        plots_by_axis.append((axis, *figures))
+    return plots_by_axis
 
 
 def _designs(
     store: Store, results: ReportedSweep, run_modules: bool, report: Report
 ) -> dict[str, Any]:
-    """The best and the worst cell's design, and the best one's error map."""
+    """Return the best and the worst cell's design, and the best one's error map."""
     empty: dict[str, Any] = {"designs": [], "no_designs": "", "error_map": None}
     cells, judged = best_and_worst(results), criterion(results)
     if not cells or judged is None:
         return empty
     try:
-        found = experiments(store, results, cells, run_modules)
+        built = experiments(store, results, cells, run_modules)
     except NoExperimentError as error:
         return {**empty, "no_designs": str(error)}
     symbol = judged[1].replace("_", " ")
     designs = []
     for k, (cell, experiment) in enumerate(
-        counted(zip(cells, found, strict=True), "designs", len(cells), report)
+        counted(zip(cells, built, strict=True), "designs", len(cells), report)
     ):
         which = ("Smallest", "Largest")[k] if len(cells) > 1 else "The only"
         row = int(np.flatnonzero(results.frame["cell"] == cell)[0])
-        value, open_ = (
-            results.value(name, row) for name in (judged[0], f"{judged[1]}_undetermined")
-        )
-        told = f", {number(1e6 * value, 3)} µm" if not np.isnan(value) else ""
-        told += f", {open_:.0f} undetermined" if open_ else ""
-        heading = f"{which} average of {symbol}{told}: cell {cell}, {results.label(cell)}"
+        value = results.value(judged[0], row)
+        open_ = results.value(f"{judged[1]}_undetermined", row)
+        text = f", {number(1e6 * value, 3)} µm" if not np.isnan(value) else ""
+        text += f", {open_:.0f} undetermined" if open_ else ""
+        heading = f"{which} average of {symbol}{text}: cell {cell}, {results.label(cell)}"
         designs.append(_drawn_design(experiment, cell, heading, k))
-    return {
-        "designs": designs,
-        "no_designs": "",
-        "error_map": _drawn_map(found[0], results, cells[0]),
-    }
+    return {**empty, "designs": designs, "error_map": _drawn_map(built[0], results, cells[0])}
 
 
 def _drawn_design(experiment: Experiment, cell: int, heading: str, k: int) -> DrawnDesign:
@@ -264,9 +254,8 @@ def _drawn_design(experiment: Experiment, cell: int, heading: str, k: int) -> Dr
     words = f"Volume of {sizes} mm with {len(drawn.places)} positions, which the table below lists."
     caption = (
         "Positions in the volume: balls that are read (circles), and from one ball the styli to the"
-        " machine's "
+        " machine's reference point (squares)."
     )
-    caption += "reference point (squares)."
     if not drawn.is_named:
         caption += " Positions are numbered as in the table."
     if any(place.read > MOST_BALLS for place in drawn.places):
@@ -301,27 +290,29 @@ def _positions(drawn: Scene, cell: int) -> Table:
 
 
 def _drawn_map(experiment: Experiment, results: ReportedSweep, cell: int) -> DrawnMap:
-    found = error_map(experiment)
+    drawn = error_map(experiment)
     words = (
         f"Standard uncertainty of the error function of cell {cell} ({results.label(cell)}), as the"
         " root mean square over the co-ordinates of a point, with the probe"
         f" {experiment.evaluation.probe}, in µm."
     )
-    if any(np.isnan(one.values).any() for one in found.slices):
+    if any(np.isnan(level_slice.values).any() for level_slice in drawn.slices):
         words += " Hatched regions are undetermined."
-    if found.within is not None:
+    if drawn.within is not None:
         words += (
-            f" Of the distances between all points of this grid {percent(found.within)} are known"
+            f" Of the distances between all points of this grid {percent(drawn.within)} are known"
             " to within the target uncertainty, by the"
             f" {uncertainty_words(experiment.coverage_factor)}."
         )
     figures = []
-    for k, one in enumerate(found.slices):
-        told = slice_words(one)
-        caption = told[0].upper() + told[1:] + "."
+    for k, level_slice in enumerate(drawn.slices):
+        slice_text = slice_words(level_slice)
+        caption = slice_text[0].upper() + slice_text[1:] + "."
         figures.append(
             Drawing(
-                slice_svg(found, one, f"slice{k}", f"Map of standard uncertainties, {told}"),
+                slice_svg(
+                    drawn, level_slice, f"slice{k}", f"Map of standard uncertainties, {slice_text}"
+                ),
                 caption,
             )
         )

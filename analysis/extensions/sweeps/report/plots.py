@@ -44,7 +44,7 @@ PANEL, ABOVE, LEFT, RIGHT, BELOW, LINE = 118.0, 22.0, 50.0, 16.0, 40.0, 15.0
 
 
 def plot_svg(plot: Plot, name: str) -> str:
-    """Average above, maximum below, over the same axis."""
+    """Return a plot: average above, maximum below, over the same axis."""
     lines = plot.panels[0].lines
     has_legend = len(lines) > 1 or len(lines[0].actual) > 0
     columns = 2 if max((len(line.label) for line in lines), default=0) <= LEGEND // 2 - 6 else 1
@@ -53,15 +53,15 @@ def plot_svg(plot: Plot, name: str) -> str:
     count = len(plot.panels)
     below = BELOW + LINE * rows * wrapped
     with drawing(below + count * (PANEL + ABOVE)) as figure:
-        found: list[Axes] = []
+        panels: list[Axes] = []
         for k, panel in enumerate(plot.panels):
             bottom = below + (count - 1 - k) * (PANEL + ABOVE)
-            found.append(placed_axes(figure, LEFT, bottom, WIDTH - LEFT - RIGHT, PANEL))
-            _panel(found[k], plot, panel)
-            found[k].tick_params(labelbottom=k == count - 1)
-        found[-1].set_xlabel(micro(plot.axis.title))
+            panels.append(placed_axes(figure, LEFT, bottom, WIDTH - LEFT - RIGHT, PANEL))
+            _panel(panels[k], plot, panel)
+            panels[k].tick_params(labelbottom=k == count - 1)
+        panels[-1].set_xlabel(micro(plot.axis.title))
         if has_legend:
-            common_legend(figure, found[0], loc="lower center", ncols=columns, borderaxespad=0.0)
+            common_legend(figure, panels[0], loc="lower center", ncols=columns, borderaxespad=0.0)
         return as_svg(figure, name, words(plot))
 
 
@@ -114,7 +114,7 @@ def _line(axes: Axes, line: SeriesLine, k: int, is_scattered: bool) -> None:
         label=label,
     )
     if len(line.actual):
-        told = "Monte Carlo, ± one standard error" if k == 0 else None
+        bar_label = "Monte Carlo, ± one standard error" if k == 0 else None
         axes.errorbar(
             line.x,
             line.actual,
@@ -124,7 +124,7 @@ def _line(axes: Axes, line: SeriesLine, k: int, is_scattered: bool) -> None:
             elinewidth=1.2,
             capsize=5.0,
             capthick=1.2,
-            label=told,
+            label=bar_label,
         )
 
 
@@ -133,19 +133,19 @@ def _wrapped(text: str) -> str:
 
 
 def words(plot: Plot) -> str:
-    """The plot for those who do not see it."""
-    told = []
+    """Return an accessible text on the plot."""
+    parts = []
     for panel in plot.panels:
         for line in panel.lines:
-            known = np.flatnonzero(np.isfinite(line.y))
-            if not len(known):
+            determined = np.flatnonzero(np.isfinite(line.y))
+            if not len(determined):
                 continue
             ends = [
                 f"{number(line.y[k], 3)} {plot.unit} at {line.x[k]:.6g}"
                 f" {micro(plot.axis.unit)}".rstrip()
-                for k in sorted({known[0], known[-1]})
+                for k in sorted({determined[0], determined[-1]})
             ]
-            told.append(
+            parts.append(
                 " ".join([panel.measure.statistic, line.label]).rstrip() + ": " + ", ".join(ends)
             )
-    return f"{plot.symbol} against {plot.axis.name}. " + "; ".join(told)
+    return f"{plot.symbol} against {plot.axis.name}. " + "; ".join(parts)

@@ -1,4 +1,4 @@
-"""Contents of a report: a sweep of a store with its axes, figures and texts."""
+"""Contents of a report: a sweep of a store with its axes, values and texts."""
 
 from __future__ import annotations
 
@@ -24,17 +24,14 @@ if TYPE_CHECKING:
 
 Integers = NDArray[np.int64]
 
-# The quantities whose average makes one cell better than another; the first of these that is
-# recorded.
+# Quantities to judge cells by: the average of the first that is recorded.
 PREFERRED = ("U6", "U4", "U5", "U1", "U3_lengths", "U2_lengths", "U3", "U2")
 CRITERIA = (*PREFERRED, *(symbol for symbol in RECORDED if symbol not in PREFERRED))
 
 
 @dataclass(frozen=True)
 class ReportAxis:
-    """An axis of the sweep; `numbers` are its values in `unit` as the file writes them, none where
-    they are texts.
-    """
+    """An axis of the sweep; `numbers` are its values in `unit` as written, empty for texts."""
 
     name: str
     column: str
@@ -44,12 +41,12 @@ class ReportAxis:
 
     @property
     def title(self) -> str:
-        """The name, with the unit where there is one."""
+        """Name, with the unit if there is one."""
         return f"{self.name}, {self.unit}" if self.unit else self.name
 
     @property
     def short_labels(self) -> tuple[str, ...]:
-        """Labels without the unit that `title` has, and no longer than tells them apart."""
+        """Labels without the unit, and no longer than distinct labels need."""
         if not self.numbers:
             return self.labels
         short = tuple(f"{number:.4g}" for number in self.numbers)
@@ -61,9 +58,9 @@ class ReportAxis:
 class ReportedSweep:
     """A sweep and its results.
 
-    `cells` (cells, axes) are the indices of the values that make up each cell, `frame` has the rows
-    of those that are done or have failed, `chosen` (rows, axes) their indices, and `texts` what was
-    told of them, by cell. `found` is what the store holds of them.
+    `cells` (cells, axes) are the indices of each cell's values. `frame` has the rows of finished
+    and failed cells, `chosen` (rows, axes) their indices, `texts` their details by cell. `found`
+    are the results in the store.
     """
 
     number: int
@@ -80,7 +77,7 @@ class ReportedSweep:
         return str(self.definition["title"])
 
     def count(self, status: str) -> int:
-        """Number of cells of a status."""
+        """Return the number of cells of a status."""
         return self.statuses.count(status)
 
     @property
@@ -88,14 +85,14 @@ class ReportedSweep:
         return len(self.cells) - len(self.frame) - len(self.found.damaged)
 
     def label(self, cell: int) -> str:
-        """A cell in words."""
+        """Return a cell's axes with their values."""
         return ", ".join(
             f"{axis.name} {axis.labels[k]}"
             for axis, k in zip(self.axes, self.cells[cell].tolist(), strict=True)
         )
 
     def value(self, name: str, row: int) -> float:
-        """A figure of a row of the frame; NaN where none was recorded."""
+        """Return a value in a row of the frame; NaN if it is not recorded."""
         return float(self.frame[name].to_numpy()[row]) if name in self.frame else math.nan
 
     @cached_property
@@ -105,11 +102,11 @@ class ReportedSweep:
 
     @cached_property
     def done(self) -> NDArray[np.bool_]:
-        """Which rows of the frame are of cells that are done."""
+        """Mask (rows,) of finished cells."""
         return np.array([status == "done" for status in self.statuses], bool)
 
     def figure(self, name: str) -> NDArray[np.float64]:
-        """A column of the frame (rows,); NaN where none was recorded."""
+        """Return a column of the frame (rows,); NaN if it is not recorded."""
         return (
             np.asarray(self.frame[name], float)
             if name in self.frame
@@ -118,24 +115,24 @@ class ReportedSweep:
 
 
 def read_results(store: Store, sweep: int | None) -> ReportedSweep:
-    """Results of a sweep of a store, the newest by default.
+    """Return the results of a sweep of a store, the newest by default.
 
     :raises StoreError: there is no such sweep, or the store cannot be read.
     """
     number, definition = chosen_sweep(store, sweep)
-    axes = tuple(_axis(one) for one in definition["axes"])
+    axes = tuple(_axis(stored_axis) for stored_axis in definition["axes"])
     cells = np.array(definition["cells"], np.int64).reshape(len(definition["cells"]), len(axes))
-    found = results(store, number, len(cells))
-    texts = {row.number: row.details for row in found.rows}
+    stored = results(store, number, len(cells))
+    texts = {row.number: row.details for row in stored.rows}
     return ReportedSweep(
         number,
         definition,
         axes,
         cells,
-        frame_of(found, definition),
-        cells[found.cells],
+        frame_of(stored, definition),
+        cells[stored.cells],
         texts,
-        found,
+        stored,
     )
 
 
@@ -143,21 +140,19 @@ def _axis(stored: dict[str, Any]) -> ReportAxis:
     labels = tuple(map(in_one_line, stored["labels"]))
     if not stored["unit"]:
         return ReportAxis(in_one_line(stored["name"]), stored["column"], labels, (), "")
-    # The unit as it was written, where all values have the same; otherwise metres or radians.
-    found = [QUANTITY.fullmatch(label.strip()) for label in labels]
-    units = {(one[2] or "").strip() for one in found if one is not None}
+    # The unit as written, if common to all values; otherwise metres or radians.
+    matches = [QUANTITY.fullmatch(label.strip()) for label in labels]
+    units = {(match[2] or "").strip() for match in matches if match is not None}
     numbers = tuple(float(value) for value in stored["values"])
     unit = "" if stored["unit"] == "1" else stored["unit"]
-    if len(units) == 1 and all(found):
+    if len(units) == 1 and all(matches):
         unit = units.pop()
-        numbers = tuple(float(exact_number(one[1])) for one in found if one is not None)
+        numbers = tuple(float(exact_number(match[1])) for match in matches if match is not None)
     return ReportAxis(in_one_line(stored["name"]), stored["column"], labels, numbers, unit)
 
 
 def partly_open(results: ReportedSweep, symbol: str) -> NDArray[np.bool_]:
-    """Rows of the frame (rows,) in which some of a quantity's values are undetermined, so that
-    others stand for all.
-    """
+    """Return the rows of the frame (rows,) in which some values of a quantity are undetermined."""
     column = f"{symbol_column(symbol.rstrip(MORE))}_undetermined"
     if column not in results.frame:
         return np.zeros(len(results.frame), bool)
@@ -165,8 +160,8 @@ def partly_open(results: ReportedSweep, symbol: str) -> NDArray[np.bool_]:
 
 
 def criterion(results: ReportedSweep) -> tuple[str, str] | None:
-    """Column of the average that cells are judged by, and its quantity; None where none is
-    recorded.
+    """Return the column of the average that cells are judged by, and its quantity; None without
+    one.
     """
     for name in CRITERIA:
         for column in results.frame.columns:
@@ -176,19 +171,15 @@ def criterion(results: ReportedSweep) -> tuple[str, str] | None:
 
 
 def best_and_worst(results: ReportedSweep) -> tuple[int, ...]:
-    """The cell with the smallest average uncertainty, and that with the largest; those that leave
-    less open come first.
-
-    One cell if there is only one, none if none is done or nothing is recorded.
-    """
+    """Return the first and the last of the ranked cells, which may be the same, or missing."""
     rows = ranked(results)
     cells = results.frame["cell"].to_numpy()[rows]
     return tuple(dict.fromkeys((int(cells[0]), int(cells[-1])))) if len(rows) else ()
 
 
 def ranked(results: ReportedSweep) -> Integers:
-    """Rows of the cells that are done, best first: those that leave less open, then of smaller
-    average uncertainty.
+    """Return the rows of finished cells, best first: fewest undetermined values, then smallest
+    average.
     """
     judged = criterion(results)
     done = np.flatnonzero(results.done)
@@ -201,8 +192,9 @@ def ranked(results: ReportedSweep) -> Integers:
 
 
 def best_first(*keys: NDArray[np.generic]) -> Integers:
-    """Order of places by the first of `keys` (m,), then by the next: smallest first and NaN last.
-    Values of the last key that are equal but for rounding stay in the order in which they are.
+    """Return an order by the first of `keys` (m,), then by the next: smallest first and NaN last.
+
+    Values of the last key that differ only by rounding keep their order.
 
     >>> best_first(np.array([1, 0, 0, 0]), np.array([0.1, 0.1 + 0.2, 0.3, np.nan])).tolist()
     [1, 2, 3, 0]
@@ -212,7 +204,7 @@ def best_first(*keys: NDArray[np.generic]) -> Integers:
 
 
 def cell_list(cells: Iterable[int], most: int = 12) -> str:
-    """Numbers of cells, neighbours put together.
+    """Return numbers of cells as text, with ranges.
 
     >>> cell_list([0, 1, 2, 5, 7, 8]), cell_list(range(0, 40, 2), 3)
     ('0 to 2, 5, 7 to 8', '0, 2, 4 and 17 more')
@@ -223,23 +215,23 @@ def cell_list(cells: Iterable[int], most: int = 12) -> str:
             runs[-1] = [runs[-1][0], cell]
         else:
             runs.append([cell, cell])
-    told = [f"{first} to {last}" if last > first else f"{first}" for first, last in runs[:most]]
+    parts = [f"{first} to {last}" if last > first else f"{first}" for first, last in runs[:most]]
     more = sum(last - first + 1 for first, last in runs[most:])
-    return ", ".join(told) + (f" and {more} more" if more else "")
+    return ", ".join(parts) + (f" and {more} more" if more else "")
 
 
 def common_values(results: ReportedSweep, cells: Sequence[int]) -> str:
-    """Values of axes that a set of cells has and no other cell: what tells it from the others, if
-    anything does.
+    """Return values of axes that distinguish a set of cells from all others; empty without such
+    values.
     """
     inside = np.zeros(len(results.cells), bool)
     inside[list(cells)] = True
     words = []
     for k, axis in enumerate(results.axes):
-        mine, others = (
+        own_values, outside = (
             set(results.cells[inside, k].tolist()),
             set(results.cells[~inside, k].tolist()),
         )
-        if len(others) and not mine & others and len(mine) <= 6:
-            words.append(f"{axis.name} " + " or ".join(axis.labels[i] for i in sorted(mine)))
+        if len(outside) and not own_values & outside and len(own_values) <= 6:
+            words.append(f"{axis.name} " + " or ".join(axis.labels[i] for i in sorted(own_values)))
     return ", ".join(words)

@@ -1,6 +1,4 @@
-"""Data of a report's plots: an uncertainty along a swept axis, for each setting of the other
-axes.
-"""
+"""Data of a report's plots: an uncertainty along an axis, for each setting of the other axes."""
 
 from __future__ import annotations
 
@@ -16,20 +14,16 @@ from .results import ReportAxis, ReportedSweep, criterion, partly_open, ranked
 
 Floats = NDArray[np.float64]
 
-# Lines that can be told apart, values along an axis that are drawn, pictures of one quantity for
-# settings of further axes, and cells that are drawn as points.
+# Limits: distinguishable lines, values along an axis, pictures of one quantity for settings of
+# further axes, cells drawn as points.
 MOST_LINES, MOST_PLACES, MOST_PICTURES, MOST_POINTS = 6, 200, 4, 1000
-
-# Of a line without Monte Carlo.
-NONE = np.zeros(0)
 
 
 @dataclass(frozen=True, eq=False)
 class SeriesLine:
     """Values along an axis, each of a single cell.
 
-    `actual` and `error` are what Monte Carlo makes of it and its standard error, empty where no
-    trials were made.
+    `actual` and `error` are Monte Carlo's value and its standard error, empty without trials.
     """
 
     label: str
@@ -49,9 +43,9 @@ class Panel:
 
 @dataclass(frozen=True, eq=False)
 class Plot:
-    """Average and maximum of a quantity against an axis; `note` says what the lines are.
+    """Average and maximum of a quantity against an axis; `note` describes the lines.
 
-    `is_scattered` where the cells are points of which no two share the other axes' values.
+    `is_scattered` if no two cells share the values of the other axes: then cells are points.
     """
 
     axis: ReportAxis
@@ -63,8 +57,10 @@ class Plot:
 
 
 def plots(results: ReportedSweep) -> list[Plot]:
-    """Plots for each axis with numbers and each quantity of one unit: lines for values of a second
-    axis and, of what cells are judged by, a picture for each setting of the others.
+    """Return plots for each axis with numbers and each quantity with one unit.
+
+    Lines are values of a second axis. The quantity that cells are judged by has a picture for each
+    setting of the further axes.
     """
     measures = [
         m
@@ -72,29 +68,31 @@ def plots(results: ReportedSweep) -> list[Plot]:
         if m.statistic in ("average", "maximum") and " or " not in m.unit
     ]
     judged = criterion(results)
-    found = []
+    drawn = []
     for k, axis in enumerate(results.axes):
         if len(axis.numbers) < 2:
             continue
         pictures = _pictures(results, k)
         for symbol in sorted(
             dict.fromkeys(m.symbol for m in measures),
-            key=lambda one: judged is None or judged[1] != symbol_column(one),
+            key=lambda symbol: judged is None or judged[1] != symbol_column(symbol),
         ):
-            mine = {m.statistic: m for m in measures if m.symbol == symbol}
-            if len(mine) < 2:
+            by_statistic = {m.statistic: m for m in measures if m.symbol == symbol}
+            if len(by_statistic) < 2:
                 continue
             is_judged = judged is not None and judged[1] == symbol_column(symbol)
             for picture in pictures if is_judged else pictures[:1]:
-                plot = _plot(results, k, picture, symbol, [mine["average"], mine["maximum"]])
+                plot = _plot(
+                    results, k, picture, symbol, [by_statistic["average"], by_statistic["maximum"]]
+                )
                 if any(np.isfinite(line.y).any() for panel in plot.panels for line in panel.lines):
-                    found.append(plot)
-    return found
+                    drawn.append(plot)
+    return drawn
 
 
 @dataclass(frozen=True, eq=False)
 class _Picture:
-    """Lines of rows of the frame, with their labels, and what is to be said of all of them."""
+    """Rows of the frame by line, with the lines' labels, and a note."""
 
     lines: tuple[tuple[str, NDArray[np.int64]], ...]
     note: str
@@ -102,44 +100,48 @@ class _Picture:
 
 
 def _pictures(results: ReportedSweep, k: int) -> list[_Picture]:
-    """What is drawn against axis `k`: that of the best cell first."""
+    """Return the pictures against axis `k`, that of the best cell first."""
     best = ranked(results)
     rows = np.flatnonzero(results.done)
-    others = [i for i in range(len(results.axes)) if i != k]
-    settings, which = np.unique(results.chosen[rows][:, others], axis=0, return_inverse=True)
+    other_axes = [i for i in range(len(results.axes)) if i != k]
+    settings, which = np.unique(results.chosen[rows][:, other_axes], axis=0, return_inverse=True)
     which = which.ravel()
     if len(settings) <= MOST_LINES or not len(best):
-        return [_picture(results, k, others, [rows[which == i] for i in range(len(settings))], "")]
+        return [
+            _picture(results, k, other_axes, [rows[which == i] for i in range(len(settings))], "")
+        ]
     if np.bincount(which).max() < 2:
         thinned = rows[:: -(-len(rows) // MOST_POINTS)]
         note = "Each point is a cell; the other axes differ from one to the next."
         note += f" {len(thinned)} of {len(rows)} are drawn." if len(thinned) < len(rows) else ""
         return [_Picture((("", thinned),), note, True)]
     second = max(
-        others, key=lambda i: (len(results.axes[i].labels) <= MOST_LINES, _count(results, i))
+        other_axes, key=lambda i: (len(results.axes[i].labels) <= MOST_LINES, _count(results, i))
     )
-    further = [i for i in others if i != second]
+    further = [i for i in other_axes if i != second]
     values = evenly(results.axes[second], MOST_LINES)
     apart, place = np.unique(results.chosen[rows][:, further], axis=0, return_inverse=True)
-    own = place.ravel()[np.flatnonzero(rows == best[0])[0]]
-    order = [int(own), *(i for i in range(len(apart)) if i != own)][:MOST_PICTURES]
-    found = []
+    best_setting = place.ravel()[np.flatnonzero(rows == best[0])[0]]
+    order = [int(best_setting), *(i for i in range(len(apart)) if i != best_setting)][
+        :MOST_PICTURES
+    ]
+    pictures = []
     for i in order:
         here = rows[place.ravel() == i]
         lines = [here[results.chosen[here, second] == value] for value in values]
         note = setting_words(results, further, apart[i])
         note = f"With {note}" if note else ""
-        if i == own and len(apart) > 1:
+        if i == best_setting and len(apart) > 1:
             note += ", the setting of the best cell"
         count = len(results.axes[second].labels)
         if len(values) < count:
             note += f"; {len(values)} of {count} values of {results.axes[second].name}"
         if i == order[-1] and len(order) < len(apart):
             note += f"; {len(apart) - len(order)} settings more are in the store"
-        found.append(
+        pictures.append(
             _picture(results, k, [second], lines, f"{note}.".removeprefix("; ") if note else "")
         )
-    return found
+    return pictures
 
 
 def _count(results: ReportedSweep, i: int) -> int:
@@ -147,7 +149,7 @@ def _count(results: ReportedSweep, i: int) -> int:
 
 
 def evenly(axis: ReportAxis, most: int) -> list[int]:
-    """Places of values of an axis, in order and evenly spread where there are more than `most`."""
+    """Return indices of values of an axis in order, evenly spread if there are more than `most`."""
     order = (
         np.argsort(np.array(axis.numbers), kind="stable")
         if axis.numbers
@@ -171,16 +173,16 @@ def _picture(
     lines: Sequence[NDArray[np.int64]],
     note: str,
 ) -> _Picture:
-    """Lines of rows, each ordered by what is plotted, which the file may have in any order."""
+    """Return lines of rows, each sorted along the plotted axis."""
     x = np.array(results.axes[k].numbers)[results.chosen[:, k]]
     shown = set(evenly(results.axes[k], MOST_PLACES))
-    found = []
+    labelled_lines = []
     for line in lines:
-        kept = line[[one in shown for one in results.chosen[line, k].tolist()]]
-        if len(kept):
-            label = setting_words(results, axes, results.chosen[kept[0], axes])
-            found.append((label, kept[np.argsort(x[kept], kind="stable")]))
-    return _Picture(tuple(found), note)
+        line_rows = line[[value in shown for value in results.chosen[line, k].tolist()]]
+        if len(line_rows):
+            label = setting_words(results, axes, results.chosen[line_rows[0], axes])
+            labelled_lines.append((label, line_rows[np.argsort(x[line_rows], kind="stable")]))
+    return _Picture(tuple(labelled_lines), note)
 
 
 def _plot(
@@ -198,7 +200,7 @@ def _plot(
                 label,
                 x[rows],
                 values[rows],
-                *((actual[rows], error[rows]) if len(actual) else (NONE, NONE)),
+                *((actual[rows], error[rows]) if len(actual) else (actual, error)),
             )
             for label, rows in picture.lines
         ]
@@ -210,15 +212,11 @@ def _plot(
 
 
 def _actual(results: ReportedSweep, measure: Measure) -> tuple[Floats, Floats]:
-    """What Monte Carlo makes of an average, and its standard error; nothing where there is none.
-
-    It is the average times the ratio of actual to linearised errors: where Monte Carlo follows a
-    sample of the distances only, the average of these may differ from that of all, the ratio does
-    not.
-    """
+    """Return Monte Carlo's value of an average and its standard error; empty without trials."""
     name = symbol_column(measure.symbol)
     if measure.statistic != "average" or measure.symbol not in trial_symbols(results):
         return np.zeros(0), np.zeros(0)
+    # Monte Carlo may follow a sample of the distances, with another average but the same ratio.
     average = measure.factor * results.figure(measure.figure)
     ratio, error = (results.figure(f"{name}_actual_ratio{end}") for end in ("", "_standard_error"))
     return average * ratio, average * error

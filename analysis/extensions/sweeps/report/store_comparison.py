@@ -1,5 +1,5 @@
-"""Comparison of two sweeps: settings that both have, by the average uncertainty that cells are
-judged by.
+"""Comparison of two sweeps: common settings, by the average uncertainty that cells are judged
+by.
 """
 
 from __future__ import annotations
@@ -17,82 +17,80 @@ from .axis_worth import SAME
 from .measures import column_unit
 from .results import Integers, ReportedSweep, best_first, criterion, partly_open
 
-# Settings that are listed, those that differ most.
+# Settings in the table, those that differ most.
 LISTED = 12
 
-# Digits to which values of an axis are the same in both sweeps, in whichever unit they are written;
-# values of one sweep that are alike in these are told apart by more, up to those that tell any two
-# numbers apart.
+# Significant digits in which an axis's values must agree in both sweeps, whose units may differ;
+# more, up to all digits, if values of one sweep would be equal.
 DIGITS, ALL_DIGITS = 9, 17
 
 
 class IncomparableError(ValueError):
-    """Two sweeps have nothing in common that can be compared; the text says what."""
+    """Two sweeps cannot be compared; the text states the difference."""
 
 
 @dataclass(frozen=True)
 class StoreComparison:
-    """What two sweeps say of the same settings, as sentences and a table."""
+    """Comparison of two sweeps at the same settings, as sentences and a table."""
 
     sentences: tuple[str, ...]
     settings: Table | None
 
 
-def compared(results: ReportedSweep, other: ReportedSweep, name: str) -> StoreComparison:
-    """A sweep compared with another one, called by its `name`; settings are matched by the names
-    and values of their axes, in any order.
+def compared(results: ReportedSweep, reference: ReportedSweep, name: str) -> StoreComparison:
+    """Compare a sweep with a reference called `name`; settings match by the names and values of
+    their axes.
 
-    :raises IncomparableError: their axes differ, or they record nothing that both can be judged by.
+    :raises IncomparableError: their axes differ, or they have no criterion in common.
     """
-    own, others = ({axis.name for axis in one.axes} for one in (results, other))
-    if own != others:
+    axes_here, axes_there = ({axis.name for axis in sweep.axes} for sweep in (results, reference))
+    if axes_here != axes_there:
         raise IncomparableError(
-            f"{name} is swept over {listing(sorted(others))} and this store over"
-            f" {listing(sorted(own))}; compare sweeps of the same axes"
+            f"{name} is swept over {listing(sorted(axes_there))} and this store over"
+            f" {listing(sorted(axes_here))}; compare sweeps of the same axes"
         )
-    judged, theirs = criterion(results), criterion(other)
+    judged, theirs = criterion(results), criterion(reference)
     if judged is None or theirs is None or judged != theirs:
         raise IncomparableError(f"{name} and this store record no quantity that both are judged by")
     column, symbol = judged
-    here, there = _by_setting(results, other)
-    both = [key for key in here if key in there]
+    here, there = _by_setting(results, reference)
+    common = [key for key in here if key in there]
     sentences = [
-        f"{_settings_are(len(both))} done in both; {len(here) - len(both)} in this store alone,"
-        f" {len(there) - len(both)} in {name} alone."
+        f"{_settings_are(len(common))} done in both; {len(here) - len(common)} in this store alone,"
+        f" {len(there) - len(common)} in {name} alone."
     ]
-    told = symbol.replace("_", " ")
-    rows = np.array([here[key] for key in both], np.int64)
-    rows_there = np.array([there[key] for key in both], np.int64)
-    value, before = results.figure(column)[rows], other.figure(column)[rows_there]
+    quantity = symbol.replace("_", " ")
+    rows = np.array([here[key] for key in common], np.int64)
+    rows_there = np.array([there[key] for key in common], np.int64)
+    value, before = results.figure(column)[rows], reference.figure(column)[rows_there]
     # Averages that leave out what is undetermined are not of the same lengths.
-    open_ = partly_open(results, symbol)[rows] | partly_open(other, symbol)[rows_there]
+    open_ = partly_open(results, symbol)[rows] | partly_open(reference, symbol)[rows_there]
     open_ |= ~(np.isfinite(value) & np.isfinite(before))
     ratio = np.full(len(rows), np.nan)
     np.divide(value, before, out=ratio, where=~open_ & (value > 0.0) & (before > 0.0))
     if open_.any():
         sentences.append(
-            f"In {open_.sum()} of them some of {told} is undetermined in one or both: these are not"
-            " compared."
+            f"{_settings_are(int(open_.sum()))} not compared: some of {quantity} is undetermined."
         )
     for words, changed in (("smaller", ratio < 1 - SAME), ("larger", ratio > 1 + SAME)):
         if changed.any():
             ends = ratio[changed].min(), ratio[changed].max()
-            by = " to ".join(dict.fromkeys(number(float(one), 3) for one in ends))
+            factor = " to ".join(dict.fromkeys(number(float(sweep), 3) for sweep in ends))
             sentences.append(
-                f"The average of {told} is {words} than in {name} in"
-                f" {changed.sum()} of them, by a factor of {by}."
+                f"The average of {quantity} is {words} than in {name} in"
+                f" {changed.sum()} of them, by a factor of {factor}."
             )
     same = int((np.abs(ratio - 1) <= SAME).sum())
     if same:
         which = f"{number_of(same, 'average')} {'is' if same == 1 else 'are'}"
-        which = "All averages are" if same == len(both) > 1 else which
+        which = "All averages are" if same == len(common) > 1 else which
         sentences.append(f"{which} the same.")
     for words, name_of, least in (
         ("rank-deficient", "rank_deficiency", 1.0),
         ("within the target, each store's own, with all lengths", WITHIN, 1.0),
     ):
         now = results.figure(name_of)[rows] >= least
-        then = other.figure(name_of)[rows_there] >= least
+        then = reference.figure(name_of)[rows_there] >= least
         if (now != then).any():
             sentences.append(
                 f"{_settings_are(int((now & ~then).sum()))} {words} only in this store,"
@@ -106,7 +104,7 @@ def compared(results: ReportedSweep, other: ReportedSweep, name: str) -> StoreCo
 
 
 def _settings_are(count: int) -> str:
-    """So many settings with the verb.
+    """Return a number of settings with its verb.
 
     >>> _settings_are(1), _settings_are(2)
     ('1 setting is', '2 settings are')
@@ -115,28 +113,29 @@ def _settings_are(count: int) -> str:
 
 
 def _by_setting(*sweeps: ReportedSweep) -> list[dict[tuple[str, ...], int]]:
-    """Rows of the cells of each sweep that are done, by the values of the axes in the order of
-    their names.
-    """
-    orders = [np.argsort([axis.name for axis in one.axes], kind="stable") for one in sweeps]
+    """Return each sweep's rows of finished cells by the values of the axes, sorted by name."""
+    orders = [np.argsort([axis.name for axis in sweep.axes], kind="stable") for sweep in sweeps]
     axes = [
-        [one.definition["axes"][i] for i in order]
-        for one, order in zip(sweeps, orders, strict=True)
+        [sweep.definition["axes"][i] for i in order]
+        for sweep, order in zip(sweeps, orders, strict=True)
     ]
     keys = zip(*(_values(*alike) for alike in zip(*axes, strict=True)), strict=True)
-    found = []
-    for one, order, own in zip(sweeps, orders, keys, strict=True):
-        rows = np.flatnonzero(one.done).tolist()
-        chosen = one.chosen[:, order].tolist()
-        found.append(
-            {tuple(key[k] for key, k in zip(own, chosen[row], strict=True)): row for row in rows}
+    rows_by_setting = []
+    for sweep, order, sweep_keys in zip(sweeps, orders, keys, strict=True):
+        rows = np.flatnonzero(sweep.done).tolist()
+        chosen = sweep.chosen[:, order].tolist()
+        rows_by_setting.append(
+            {
+                tuple(key[k] for key, k in zip(sweep_keys, chosen[row], strict=True)): row
+                for row in rows
+            }
         )
-    return found
+    return rows_by_setting
 
 
 def _values(*axes: dict[str, Any]) -> list[list[str]]:
-    """Values of an axis in several stores, alike for the same size in another unit and different
-    for any two of one store; texts as they are.
+    """Return values of an axis in several stores as texts: equal for equal sizes in any unit,
+    distinct in one store.
 
     >>> inch = {"unit": "m", "values": [25.4e-3]}
     >>> _values({"unit": "m", "values": [0.0254 + 1e-17]}, inch)
@@ -144,15 +143,15 @@ def _values(*axes: dict[str, Any]) -> list[list[str]]:
     >>> _values({"unit": "m", "values": [1.0, 1.0000000001]}, {"unit": "m", "values": [1.0]})
     [['1 m', '1.0000000001 m'], ['1 m']]
     """
-    found: list[list[str]] = []
+    texts: list[list[str]] = []
     for digits in range(DIGITS, ALL_DIGITS + 1):
-        found = [_rounded(axis, digits) for axis in axes]
+        texts = [_rounded(axis, digits) for axis in axes]
         if all(
-            len(set(one)) == len(set(_rounded(axis, ALL_DIGITS)))
-            for one, axis in zip(found, axes, strict=True)
+            len(set(rounded)) == len(set(_rounded(axis, ALL_DIGITS)))
+            for rounded, axis in zip(texts, axes, strict=True)
         ):
             break
-    return found
+    return texts
 
 
 def _rounded(axis: dict[str, Any], digits: int) -> list[str]:
@@ -173,7 +172,7 @@ def _table(
     if not shown:
         return None
     cells = results.frame["cell"].to_numpy()
-    found = []
+    table_rows = []
     for k in shown:
         row = int(rows[k])
         labels = [axis.labels[i] for axis, i in zip(results.axes, results.chosen[row], strict=True)]
@@ -183,9 +182,9 @@ def _table(
             Entry(number(1e6 * float(before[k]), 4)),
             Entry(number(float(ratio[k]), 4)),
         )
-        found.append(Row(tuple(labels), entries))
+        table_rows.append(Row(tuple(labels), entries))
     headings = tuple(axis.name for axis in results.axes)
     unit = column_unit(column)
     columns = (f"average here, {unit}", f"in {name}, {unit}", "ratio")
     caption = "Settings that differ most"
-    return Table("comparison", caption, headings, columns, (Block("", tuple(found)),))
+    return Table("comparison", caption, headings, columns, (Block("", tuple(table_rows)),))

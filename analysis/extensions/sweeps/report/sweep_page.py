@@ -1,4 +1,4 @@
-"""The page of a sweep in a store, as the command and results of sweeps ask for it."""
+"""The page of a sweep in a store, for the function and for results of sweeps."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ from .store_comparison import compared
 def sweep_page(
     store: Path, sweep: int | None, run_modules: bool, compare: Path | None, report: Report
 ) -> str:
-    """A sweep of a store as HTML, with the newest sweep of a store to `compare` with beside it.
+    """Return a sweep of a store as HTML, compared with the newest sweep of another store if given.
 
-    :raises ImportError: what pages need is not installed.
+    :raises ImportError: a library for pages is not installed.
     :raises ValueError: the two sweeps cannot be compared.
     """
     with closing(open_store(store)) as opened:
-        results, beside = read_results(opened, sweep), None
+        results, comparison = read_results(opened, sweep), None
         if compare is not None:
-            with closing(open_store(compare)) as other:
-                beside = compared(results, read_results(other, None), compare.name)
-        return page(opened, results, run_modules, report, beside)
+            with closing(open_store(compare)) as reference:
+                comparison = compared(results, read_results(reference, None), compare.name)
+        return page(opened, results, run_modules, report, comparison)

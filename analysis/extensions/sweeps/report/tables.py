@@ -1,4 +1,4 @@
-"""The tables of a report."""
+"""Tables of a report."""
 
 from __future__ import annotations
 
@@ -20,60 +20,63 @@ from .results import ReportedSweep, criterion, partly_open, ranked
 
 DIGITS = 3
 
-# Columns beside each other, blocks below each other and rows of a table that can still be read.
+# Limits of a readable table: columns, blocks and rows.
 MOST_COLUMNS, MOST_BLOCKS, MOST_ROWS = 12, 12, 200
 MOST_BEST = 10
 
 NOT_DONE = "left"
 UNREADABLE = "unreadable"
 
-# Behind a value that leaves out what is undetermined.
+# Mark of values that exclude undetermined ones.
 STAR = "*"
 
 
 def report_tables(results: ReportedSweep) -> tuple[Table, ...]:
-    """All tables of figures: the uncertainties and, where trials were made, those of Monte
-    Carlo.
-    """
-    beside = _is_beside(results)
-    measures = [*rank_measures(results), *uncertainty_measures(results, beside)]
-    open_ = f"Maxima and averages leave out what is undetermined; {STAR} marks those that do."
+    """Return all tables: uncertainties and, if there were trials, Monte Carlo."""
+    in_columns = _fits_columns(results)
+    measures = [*rank_measures(results), *uncertainty_measures(results, in_columns)]
+    open_ = f"Maxima and averages marked {STAR} exclude undetermined values."
     notes = (open_,) if rank_measures(results) else ()
-    found = (
-        [_table(results, "uncertainties", "Standard uncertainties", measures, beside, notes)]
+    tables = (
+        [_table(results, "uncertainties", "Standard uncertainties", measures, in_columns, notes)]
         if measures
         else []
     )
-    if not beside and len(results.frame) > 1:
-        found = [*_best(results), *found]
-    of_trials = trial_measures(results, beside)
+    if not in_columns and len(results.frame) > 1:
+        tables = [*_best(results), *tables]
+    of_trials = trial_measures(results, in_columns)
     if of_trials:
-        caption = "Monte Carlo beside the uncertainties"
+        caption = "Monte Carlo and the uncertainties"
         note = (
-            "In parentheses the standard error in units of the last digit; actual is the root mean"
-            " square of the errors, averaged as U is; covered is the share of true values within"
-            " the expanded uncertainty for 95 %. U5 and U6 are followed over 1000 distances where"
-            " there are more, of which actual is the average and which spread / U compares with"
-            " their own U."
+            "In parentheses: standard error in units of the last digit. Actual: root mean square"
+            " of the errors, averaged as U is. Covered: share of true values within the expanded"
+            " uncertainty for 95 %. Of more than 1000 distances of U5 and U6, a sample of 1000"
+            " gives actual, and spread / U with the U of the sample."
         )
-        found.append(_table(results, "monte-carlo", caption, of_trials, beside, (note, *notes)))
-    return tuple(found)
+        tables.append(
+            _table(results, "monte-carlo", caption, of_trials, in_columns, (note, *notes))
+        )
+    return tuple(tables)
 
 
 def _best(results: ReportedSweep) -> list[Table]:
-    """The best cells first, where cells do not stand beside each other anyway."""
+    """Return a table of the best cells."""
     judged = criterion(results)
     if judged is None:
         return []
-    own = [one for one in uncertainty_measures(results, of_parts=False) if one.symbol == judged[1]]
-    measures = [*rank_measures(results), *own]
+    criterion_measures = [
+        measure
+        for measure in uncertainty_measures(results, of_parts=False)
+        if measure.symbol == judged[1]
+    ]
+    measures = [*rank_measures(results), *criterion_measures]
     rows = ranked(results)[:MOST_BEST].tolist()
-    note = f"By average {judged[1]}; cells that leave less undetermined come first."
-    return [_below(results, "best", "Best cells", measures, (note,), rows)] if rows else []
+    note = f"Sorted by the number of undetermined values, then by average {judged[1]}."
+    return [_rows_table(results, "best", "Best cells", measures, (note,), rows)] if rows else []
 
 
-def _is_beside(results: ReportedSweep) -> bool:
-    """Whether cells fit beside each other: one axis as columns, another as blocks."""
+def _fits_columns(results: ReportedSweep) -> bool:
+    """Return whether the cells fit one axis as columns, and another as blocks."""
     counts = [len(axis.labels) for axis in results.axes]
     return (
         len(counts) <= 2
@@ -88,23 +91,23 @@ def _table(
     name: str,
     caption: str,
     measures: Sequence[Measure],
-    beside: bool,
+    in_columns: bool,
     notes: tuple[str, ...] = (),
 ) -> Table:
     words = (*notes, *([f"{'; '.join(descriptions(measures))}."] if descriptions(measures) else []))
-    build = _beside if beside else _below
+    build = _columns_table if in_columns else _rows_table
     return build(results, name, caption, measures, words)
 
 
-def _beside(
+def _columns_table(
     results: ReportedSweep,
     name: str,
     caption: str,
     measures: Sequence[Measure],
     notes: tuple[str, ...],
 ) -> Table:
-    """A column for each value of the last axis, a block for each of the first where there are
-    two.
+    """Return a table with a column for each value of the last axis, a block for each of the
+    first of two.
     """
     cells = {tuple(choice): cell for cell, choice in enumerate(results.cells.tolist())}
     rows = {int(cell): row for row, cell in enumerate(results.frame["cell"])}
@@ -112,7 +115,7 @@ def _beside(
     firsts = range(len(results.axes[0].labels)) if len(results.axes) == 2 else [None]
     blocks = []
     for first in firsts:
-        found = []
+        measure_rows = []
         for measure in measures:
             entries = []
             for last in range(len(axis.labels)):
@@ -120,15 +123,15 @@ def _beside(
                 entries.append(
                     Entry("") if cell is None else _entry(results, measure, cell, rows.get(cell))
                 )
-            found.append(Row((measure.name, measure.unit), tuple(entries)))
+            measure_rows.append(Row((measure.name, measure.unit), tuple(entries)))
         title = "" if first is None else f"{results.axes[0].name} {results.axes[0].labels[first]}"
-        if any(entry.text for row in found for entry in row.entries):
-            blocks.append(Block(title, tuple(found)))
+        if any(entry.text for row in measure_rows for entry in row.entries):
+            blocks.append(Block(title, tuple(measure_rows)))
     block = "" if len(results.axes) == 1 else results.axes[0].name
     return Table(name, caption, ("", "unit"), axis.labels, tuple(blocks), axis.name, block, notes)
 
 
-def _below(
+def _rows_table(
     results: ReportedSweep,
     name: str,
     caption: str,
@@ -136,8 +139,8 @@ def _below(
     notes: tuple[str, ...],
     rows: Sequence[int] | None = None,
 ) -> Table:
-    """A row for each cell, as far as they can be read, or for some of them."""
-    found = []
+    """Return a table with a row for each cell, up to MOST_ROWS, or for some of them."""
+    cell_rows = []
     for row in range(min(len(results.frame), MOST_ROWS)) if rows is None else rows:
         cell = int(results.frame["cell"].to_numpy()[row])
         labels = tuple(
@@ -145,8 +148,8 @@ def _below(
             for axis, k in zip(results.axes, results.cells[cell].tolist(), strict=True)
         )
         entries = tuple(_entry(results, measure, cell, row) for measure in measures)
-        found.append(Row((str(cell), *labels), entries))
-    more = len(results.frame) - len(found)
+        cell_rows.append(Row((str(cell), *labels), entries))
+    more = len(results.frame) - len(cell_rows)
     if more > 0 and rows is None:
         notes = (
             f"{more} cells more are not shown here; ballplate sweep --export gives all.",
@@ -154,7 +157,7 @@ def _below(
         )
     headings = ("cell", *(axis.name for axis in results.axes))
     columns = tuple(measure.title for measure in measures)
-    return Table(name, caption, headings, columns, (Block("", tuple(found)),), notes=notes)
+    return Table(name, caption, headings, columns, (Block("", tuple(cell_rows)),), notes=notes)
 
 
 def _entry(results: ReportedSweep, measure: Measure, cell: int, row: int | None) -> Entry:
@@ -165,7 +168,7 @@ def _entry(results: ReportedSweep, measure: Measure, cell: int, row: int | None)
         return Entry(results.statuses[row], None, cell, measure.figure)
     value = results.value(measure.figure, row)
     if math.isnan(value) and not _is_open(results, measure, row):
-        # Not recorded of this cell, as opposed to undetermined.
+        # Not recorded, as opposed to undetermined.
         return Entry("", value, cell, measure.figure)
     if measure.is_count:
         text = "-" if math.isnan(value) else f"{value:.0f}"
@@ -174,7 +177,7 @@ def _entry(results: ReportedSweep, measure: Measure, cell: int, row: int | None)
             MonteCarloEstimate(value, results.value(measure.error, row)), measure.factor
         )
     elif measure.is_share:
-        # Never rounded up: what is told to be all is all.
+        # Never rounded up: 100 % means all.
         text = "-" if math.isnan(value) else percent(value).removesuffix(" %")
     else:
         text = number(measure.factor * value, DIGITS)
@@ -188,6 +191,6 @@ def _entry(results: ReportedSweep, measure: Measure, cell: int, row: int | None)
 
 
 def _is_open(results: ReportedSweep, measure: Measure, row: int) -> bool:
-    """Whether the observations of a cell leave open all that a measure tells of."""
+    """Return whether a cell leaves all values of a measure undetermined."""
     column = f"{symbol_column(measure.symbol)}_undetermined"
     return column in results.frame and results.value(column, row) > 0

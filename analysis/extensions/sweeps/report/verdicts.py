@@ -1,4 +1,4 @@
-"""Statements on cells: rank, weak directions, flags of Monte Carlo, failures."""
+"""Statements on cells: rank, weak directions, Monte Carlo, failures."""
 
 from __future__ import annotations
 
@@ -8,17 +8,17 @@ from dataclasses import dataclass
 
 from .results import ReportedSweep, cell_list, common_values
 
-# Groups that are told, and lines of each.
+# Limits: groups, and lines of each.
 MOST_GROUPS, MOST_LINES = 30, 8
 
-# Amounts, by which alone cells of a sweep may differ in what is told of them.
+# Amounts, in which the statements of one group may differ.
 AMOUNT = re.compile(r"(?<![\w.])-?\d+(\.\d+)?(e[-+]?\d+)? ([uµμ](?=(m|rad)\b)|(?=ppm\b))")
 
 
 @dataclass(frozen=True)
 class VerdictGroup:
-    """Cells of which the same is told, but for amounts: `heading` in short, `lines` in full, less
-    `more` of them.
+    """Cells with the same statement, except for amounts: `heading`, and `lines` with `more` left
+    out.
     """
 
     heading: str
@@ -45,79 +45,83 @@ class VerdictGroups:
 
 NOT = "not "
 
-# A heading, and the lines that belong to it.
-Told = tuple[str, tuple[str, ...]]
+# A heading with its lines.
+Statement = tuple[str, tuple[str, ...]]
 
 
 def ranks(results: ReportedSweep) -> VerdictGroups:
-    """Cells by rank deficiency and by what is undetermined."""
+    """Return cells by rank deficiency and undetermined directions."""
     if "rank_deficiency" not in results.frame:
         return VerdictGroups(())
-    done = results.done
-    columns = (
-        results.frame[name].to_numpy()[done] for name in ("cell", "rank_deficiency", "as_expected")
-    )
-    found: dict[Told, list[int]] = {}
-    for cell, deficiency, expected in zip(*columns, strict=True):
+    columns = results.frame[["cell", "rank_deficiency", "as_expected"]][results.done]
+    cells_by_statement: dict[Statement, list[int]] = {}
+    for cell, deficiency, expected in columns.to_numpy():
         heading = f"rank deficiency {int(deficiency)}" if deficiency else "full rank"
         lines = tuple(results.texts.get(int(cell), {}).get("undetermined", ()))
-        found.setdefault((f"{heading}, {'' if expected else NOT}as expected", lines), []).append(
-            int(cell)
-        )
-    return _told(results, found)
+        cells_by_statement.setdefault(
+            (f"{heading}, {'' if expected else NOT}as expected", lines), []
+        ).append(int(cell))
+    return _grouped(results, cells_by_statement)
 
 
 def weak(results: ReportedSweep) -> VerdictGroups:
-    """Cells by what is weakly determined."""
-    found: dict[Told, list[int]] = {}
+    """Return cells by weakly determined directions."""
+    cells_by_statement: dict[Statement, list[int]] = {}
     for cell, texts in results.texts.items():
         if texts.get("weak"):
             lines = tuple(texts["weak"])
             word = "direction" if len(lines) == 1 else "directions"
-            found.setdefault((f"{len(lines)} {word} weakly determined", lines), []).append(cell)
-    return _told(results, found)
+            cells_by_statement.setdefault(
+                (f"{len(lines)} {word} weakly determined", lines), []
+            ).append(cell)
+    return _grouped(results, cells_by_statement)
 
 
 def flags(results: ReportedSweep) -> VerdictGroups:
-    """Cells by what Monte Carlo finds different from linear theory, and by why there is no Monte
-    Carlo.
+    """Return cells by differences of Monte Carlo from linear theory, or by the reason for its
+    absence.
     """
-    found: dict[Told, list[int]] = {}
+    cells_by_statement: dict[Statement, list[int]] = {}
     for cell, texts in results.texts.items():
-        told = [f"{symbol}: {', '.join(names)}" for symbol, names in texts.get("flags", {}).items()]
+        parts = [
+            f"{symbol}: {', '.join(names)}" for symbol, names in texts.get("flags", {}).items()
+        ]
         if "monte_carlo" in texts:
-            told.append(f"no Monte Carlo: {texts['monte_carlo']}")
+            parts.append(f"no Monte Carlo: {texts['monte_carlo']}")
         elif texts.get("not_converged"):
-            told.append("data sets that did not converge, and are left out")
-        if told:
-            found.setdefault(("; ".join(told), ()), []).append(cell)
-    return _told(results, found)
+            parts.append("data sets that did not converge, and are left out")
+        if parts:
+            cells_by_statement.setdefault(("; ".join(parts), ()), []).append(cell)
+    return _grouped(results, cells_by_statement)
 
 
 def failures(results: ReportedSweep) -> VerdictGroups:
-    """Failed cells by reason."""
-    found: dict[Told, list[int]] = {}
+    """Return failed cells by reason."""
+    cells_by_statement: dict[Statement, list[int]] = {}
     failed = results.frame[results.frame["status"] == "failed"]
     for cell, reason in zip(failed["cell"], failed["reason"], strict=True):
         lines = tuple(str(reason).splitlines())
-        told: Told = (
+        statement: Statement = (
             (lines[0] if lines else "failed", ())
             if len(lines) < 2
             else (f"{len(lines)} errors", lines)
         )
-        found.setdefault(told, []).append(int(cell))
-    return _told(results, found)
+        cells_by_statement.setdefault(statement, []).append(int(cell))
+    return _grouped(results, cells_by_statement)
 
 
-def _told(results: ReportedSweep, found: Mapping[Told, list[int]]) -> VerdictGroups:
-    """Groups of cells of which the same is told, those together that differ in amounts only."""
-    alike: dict[Told, tuple[Told, list[int]]] = {}
-    for (heading, lines), cells in found.items():
+def _grouped(
+    results: ReportedSweep, cells_by_statement: Mapping[Statement, list[int]]
+) -> VerdictGroups:
+    """Return groups of cells whose statements differ only in amounts."""
+    alike: dict[Statement, tuple[Statement, list[int]]] = {}
+    for (heading, lines), cells in cells_by_statement.items():
         form = heading, tuple(AMOUNT.sub("", line) for line in lines)
         alike.setdefault(form, ((heading, lines), []))[1].extend(cells)
-    some = list(alike.values())[:MOST_GROUPS]
+    shown = list(alike.values())[:MOST_GROUPS]
     groups = [
-        _group(results, *told, sorted(cells), len(found) > len(alike)) for told, cells in some
+        _group(results, *statement, sorted(cells), len(cells_by_statement) > len(alike))
+        for statement, cells in shown
     ]
     return VerdictGroups(tuple(groups), max(len(alike) - MOST_GROUPS, 0))
 
