@@ -154,10 +154,10 @@ def _first(problem: SelectionProblem, start: Collection[int] | None) -> _Mixture
     selection = fill(problem, problem.constraints.must, Losses(problem)) if start is None else start
     vertices = [np.isin(np.arange(n), list(selection)).astype(float)]
     for _ in range(MOST_STARTS):
-        found = _largest(limits, generator.random(n), n)
-        if found is None:
+        point = _largest(limits, generator.random(n), n)
+        if point is None:
             return None
-        vertices.append(found)
+        vertices.append(point)
         mixture = _Mixture(np.array(vertices), np.full(len(vertices), 1.0 / len(vertices)))
         if (
             len(vertices) >= FEWEST_STARTS
@@ -192,17 +192,17 @@ def _improved(problem: SelectionProblem, mixture: _Mixture, power: float) -> _Mi
     information = problem.information
     used = np.flatnonzero(mixture.vertices.any(axis=0))
     matrices = np.tensordot(mixture.vertices[:, used], information.matrices[used], axes=1)
-    held = information.frames.held(used.tolist())
+    frame_rows = information.frames.held(used.tolist())
 
     def logarithm(shares: Array) -> tuple[float, Array]:
-        root = full_root(information.base + held + np.tensordot(shares, matrices, axes=1))
+        root = full_root(information.base + frame_rows + np.tensordot(shares, matrices, axes=1))
         if root is None:
             return 1e3, np.zeros(len(shares))
         smooth, value, weight = problem.tangent(root, power)
         half = root @ (root[problem.counted].T @ weight)
         return float(np.log(smooth)), -np.tensordot(matrices, half @ half.T, axes=2) / value
 
-    found = minimize(
+    solution = minimize(
         logarithm,
         mixture.shares,
         jac=True,
@@ -211,14 +211,14 @@ def _improved(problem: SelectionProblem, mixture: _Mixture, power: float) -> _Mi
         constraints={"type": "eq", "fun": lambda s: s.sum() - 1.0, "jac": np.ones_like},
         options={"maxiter": MOST_INNER, "ftol": 1e-7},
     )
-    shares = np.maximum(found.x, 0.0)
+    shares = np.maximum(solution.x, 0.0)
     if (
         not np.isfinite(shares).all()
         or logarithm(shares / shares.sum())[0] > logarithm(mixture.shares)[0]
     ):
         shares = mixture.shares
-    kept = shares > DROPPED * shares.max()
-    return _Mixture(mixture.vertices[kept], shares[kept] / shares[kept].sum())
+    is_kept = shares > DROPPED * shares.max()
+    return _Mixture(mixture.vertices[is_kept], shares[is_kept] / shares[is_kept].sum())
 
 
 def _largest(limits: Limits, slope: Array, count: int) -> Array | None:
@@ -230,12 +230,12 @@ def _largest(limits: Limits, slope: Array, count: int) -> Array | None:
     matrix, most, low, high = limits
     cost = np.zeros(matrix.shape[1])
     cost[:count] = -comparable(slope / np.abs(slope).max(), COMPARED)
-    found = linprog(
+    solution = linprog(
         cost, A_ub=matrix, b_ub=most, bounds=np.stack([low, high], axis=1), method="highs"
     )
-    if found.status != 0:
+    if solution.status != 0:
         return None
-    return np.clip(np.asarray(found.x[:count], float), 0.0, 1.0)
+    return np.clip(np.asarray(solution.x[:count], float), 0.0, 1.0)
 
 
 def _whole(limits: Limits, tangent: _Tangent) -> float:
@@ -247,13 +247,13 @@ def _whole(limits: Limits, tangent: _Tangent) -> float:
     scale = np.abs(tangent.slope).max()
     cost = np.zeros(matrix.shape[1])
     cost[:count] = -comparable(tangent.slope / scale, COMPARED)
-    found = milp(
+    solution = milp(
         cost,
         integrality=np.ones(len(cost)),
         bounds=Bounds(low, high),
         constraints=LinearConstraint(matrix, -np.inf, most),
         options={"node_limit": MOST_NODES},
     )
-    if found.mip_dual_bound is None or not np.isfinite(found.mip_dual_bound):
+    if solution.mip_dual_bound is None or not np.isfinite(solution.mip_dual_bound):
         return 0.0
-    return float((tangent.constant - found.mip_dual_bound * scale) ** -0.5)
+    return float((tangent.constant - solution.mip_dual_bound * scale) ** -0.5)

@@ -106,22 +106,22 @@ def campaign(
     refuse_many_points(experiment, request.criterion)
     offered = offered or offer(pool)
     refusal: ExperimentError | None = None
-    found, less = None, offered.without_begun(experiment)
+    result, less = None, offered.without_begun(experiment)
     try:
-        found = _campaign(experiment, pool, request, offered, earlier, workers, report)
+        result = _campaign(experiment, pool, request, offered, earlier, workers, report)
     except ExperimentError as error:
         if less is offered:
             raise
         refusal = error
     if less is offered:
-        assert found is not None
-        return found
+        assert result is not None
+        return result
     try:
         request = replace(
-            request, budget=request.budget or (None if found is None else found.budget)
+            request, budget=request.budget or (None if result is None else result.budget)
         )
         names = None if earlier is None else [offered.candidates[k].name for k in earlier]
-        other = _campaign(
+        alternative = _campaign(
             experiment,
             pool,
             request,
@@ -131,15 +131,17 @@ def campaign(
             report,
         )
     except ExperimentError as error:
-        if found is None:
+        if result is None:
             raise refusal or error from None
-        return found
-    if found is not None and found.value <= other.value * (1 + GAIN):
-        return found
-    kept = {one.name for one in other.done}
+        return result
+    if result is not None and result.value <= alternative.value * (1 + GAIN):
+        return result
+    done_names = {position.name for position in alternative.done}
     return replace(
-        other,
-        ignored=tuple(offered.candidates[k] for k in offered.done if offered.name(k) not in kept),
+        alternative,
+        ignored=tuple(
+            offered.candidates[k] for k in offered.done if offered.name(k) not in done_names
+        ),
     )
 
 
@@ -155,20 +157,22 @@ def _campaign(
 ) -> Campaign:
     candidates, standing = offered.candidates, offered.standing
     whole, completed_by = offered.weighed
-    known = without_drift(experiment)
+    steady = without_drift(experiment)
     information = pool_information(
-        known, whole, is_about_balls(request.criterion), completed_by, report
+        steady, whole, is_about_balls(request.criterion), completed_by, report
     )
     gap: OpenPool | None = None
     gap_of = optional_service("pool_gap") if information.deficiency else None
     if gap_of is not None:
-        gap = gap_of(known, pool.candidates, information, report)
+        gap = gap_of(steady, pool.candidates, information, report)
     try:
         wanted = criterion(information, experiment, request.criterion)
     except ExperimentError as error:
         raise error if gap is None else gap.refusing(error) from None
-    own = [offered.now(k) for k, candidate in enumerate(pool.candidates) if candidate.drawn]
-    drawn = sorted(earlier or own)
+    drawn_candidates = [
+        offered.now(k) for k, candidate in enumerate(pool.candidates) if candidate.drawn
+    ]
+    drawn = sorted(earlier or drawn_candidates)
     begun = offered.begun(experiment)
     free = constraints(
         candidates,
@@ -201,17 +205,19 @@ def _campaign(
         expected += experiment.expected_rank_deficiency or 0
     _refuse_unusable(experiment, chosen, limits)
     unlimited = replace(problem, constraints=free)
-    done = tuple(candidates[k] for k in offered.done)
-    interrupted = tuple(candidates[one.part] for one in offered.interrupted)
+    done_indices = tuple(candidates[k] for k in offered.done)
+    interrupted = tuple(candidates[given_candidate.part] for given_candidate in offered.interrupted)
     # In the order in which they will be read, as the first of a plate may hold its frame, on which
     # U1 and U2 depend.
     orders = _orders(experiment, pool, request, offered, chosen)
     order = LEAST_CHANGE_OVER if orders is None else orders.chosen
-    sheet = run_sheet(chosen, pool.changes, done, completed, interrupted, order=order)
+    sheet = run_sheet(chosen, pool.changes, done_indices, completed, interrupted, order=order)
     names = short_names(
-        (step.position for step in sheet.steps), offered.names, [one.name for one in candidates]
+        (step.position for step in sheet.steps),
+        offered.names,
+        [given_candidate.name for given_candidate in candidates],
     )
-    sheet = run_sheet(chosen, pool.changes, done, completed, interrupted, names, order)
+    sheet = run_sheet(chosen, pool.changes, done_indices, completed, interrupted, names, order)
     timed = in_time(experiment, sheet, pool.changes, names)
     return Campaign(
         experiment,
@@ -221,7 +227,7 @@ def _campaign(
         wanted.excluded,
         budget,
         tuple(chosen),
-        done,
+        done_indices,
         limits.spent(best.chosen),
         best.value,
         np.nan if relaxed is None else relaxed.value,
@@ -262,8 +268,8 @@ def _orders(
         return None
     if orders is None:
         return None
-    found: DriftInOrders = orders.of(experiment, pool, request, bool(offered.done), chosen)
-    return found
+    drift: DriftInOrders = orders.of(experiment, pool, request, bool(offered.done), chosen)
+    return drift
 
 
 def _impossible(experiment: Experiment, path: str, text: str) -> ExperimentError:
@@ -274,16 +280,16 @@ def _limits(experiment: Experiment, pool: Pool, offered: Offer) -> list[AtMost]:
     """Limits on what is offered, and that of several certificates of the same length only one
     counts.
     """
-    found = list(offered.at_most)
+    at_most = list(offered.at_most)
     for name, artefact in experiment.artefacts.items():
-        own = tuple(
+        plate_calibrations = tuple(
             k
-            for k, one in enumerate(pool.candidates)
-            if not isinstance(one.item, Position) and one.item.artefact == name
+            for k, candidate in enumerate(pool.candidates)
+            if not isinstance(candidate.item, Position) and candidate.item.artefact == name
         )
-        if len(own) > 1 and artefact.role != "plate":
-            found.append(AtMost(own, 1))
-    return found
+        if len(plate_calibrations) > 1 and artefact.role != "plate":
+            at_most.append(AtMost(plate_calibrations, 1))
+    return at_most
 
 
 def _refuse_unusable(
@@ -292,7 +298,11 @@ def _refuse_unusable(
     """Refuse a choice that is no experiment: without a position, or with balls that nobody
     reads.
     """
-    positions = [one.item for one in chosen if isinstance(one.item, Position)]
+    positions = [
+        chosen_position.item
+        for chosen_position in chosen
+        if isinstance(chosen_position.item, Position)
+    ]
     if not positions:
         every = range(limits.count)
         if limits.can_read(every):
@@ -300,9 +310,11 @@ def _refuse_unusable(
             raise _impossible(experiment, "pool", text)
         raise _out_of_reach(experiment, limits, every, "no position can be read")
     for name in {position.artefact for position in positions}:
-        own = [position for position in positions if position.artefact == name]
-        read = {ball for position in own for ball in position.balls.tolist()}
-        unread = [ball for k, ball in enumerate(experiment.layouts[name].names) if k not in read]
+        plate_positions = [position for position in positions if position.artefact == name]
+        read_balls = {ball for position in plate_positions for ball in position.balls.tolist()}
+        unread = [
+            ball for k, ball in enumerate(experiment.layouts[name].names) if k not in read_balls
+        ]
         if unread and experiment.artefacts[name].role == "plate":
             balls = listing(f'"{ball}"' for ball in unread)
             text = (
@@ -319,10 +331,10 @@ def _refuse_lacking(
     begun: Mapping[str, tuple[int, ...]],
 ) -> None:
     """Refuse a choice without what every choice needs."""
-    for plate, others in begun.items():
-        if set(others).isdisjoint(best.chosen):
+    for plate, plates in begun.items():
+        if set(plates).isdisjoint(best.chosen):
             text = f'"{plate}" was begun, but no position of its other balls can be read'
-            raise _out_of_reach(experiment, problem.constraints, others, text)
+            raise _out_of_reach(experiment, problem.constraints, plates, text)
     for members in problem.constraints.at_least:
         if set(members).isdisjoint(best.chosen):
             name = problem.information.candidates[members[0]].name
@@ -336,7 +348,7 @@ def _refuse_lacking(
         if set(placing).isdisjoint(best.chosen)
     }
     if missing:
-        names, name = listing(f'"{one}"' for one in missing), problem.criterion.name
+        names, name = listing(f'"{ball}"' for ball in missing), problem.criterion.name
         raise _out_of_reach(
             experiment,
             problem.constraints,
@@ -412,35 +424,39 @@ def _search(
         (problem, None, 0),
         *((problem, share, depth) for share in shares),
     ]
-    relaxed, *found = counted(
+    relaxed, *found_selections = counted(
         in_processes(_task, tasks, workers), "starts of the search", len(tasks), report
     )
-    selections = [one for some in found if isinstance(some, list) for one in some]
+    selections = [
+        selection for some in found_selections if isinstance(some, list) for selection in some
+    ]
     # Of a selection that is just enough, most of what an exchange passes through is deficient.
     ways = (
         (False, True)
-        if _is_just_enough(problem, min(selections, key=lambda one: one.order))
+        if _is_just_enough(problem, min(selections, key=lambda selection: selection.order))
         else (False,)
     )
     for by_pivots in ways[1:]:
         tasks = [(problem, share, depth, by_pivots) for share in shares]
-        others = counted(
+        found_by_pivots = counted(
             in_processes(_task, tasks, workers), "starts by pivots", len(tasks), report
         )
-        selections += [one for some in others if isinstance(some, list) for one in some]
+        selections += [
+            selection for some in found_by_pivots if isinstance(some, list) for selection in some
+        ]
     if isinstance(relaxed, Bound):
         by_weight = np.argsort(-comparable(relaxed.weights), kind="stable").tolist()
         start = starts(problem, by_weight, 0, seed)[-1]
         selections += [
             improve(problem, start, Losses(problem, by_pivots), depth) for by_pivots in ways
         ]
-    selections = sorted(set(selections), key=lambda one: one.order)
+    selections = sorted(set(selections), key=lambda selection: selection.order)
     if not is_small:
-        best_starts = [one.chosen for one in selections[:BEST_STARTS]]
+        best_starts = [selection.chosen for selection in selections[:BEST_STARTS]]
         tasks = [(problem, [start], 2, by_pivots) for start in best_starts for by_pivots in ways]
         again = counted(in_processes(_task, tasks, workers), "deeper searches", len(tasks), report)
-        selections += [one for some in again if isinstance(some, list) for one in some]
-    best = min(selections, key=lambda one: one.order)
+        selections += [selection for some in again if isinstance(some, list) for selection in some]
+    best = min(selections, key=lambda selection: selection.order)
     return best, relaxed if isinstance(relaxed, Bound) else None
 
 
@@ -457,7 +473,7 @@ def _best_of_all(problem: SelectionProblem, report: Report) -> Found:
     tried = counted(every, "selections", 2 ** len(members), report)
     best = min(
         (chosen for chosen in tried if limits.allows(chosen)),
-        key=lambda one: (losses.of(one), sorted(one)),
+        key=lambda selection: (losses.of(selection), sorted(selection)),
     )
     return judged(problem, best)
 
@@ -531,12 +547,16 @@ def _curve(
     for budget, result in zip(budgets, results, strict=True):
         if result is None:
             continue
-        found, relaxed = result
-        if np.isfinite(found.value):
-            names = tuple(candidates[k] for k in found.chosen)
+        best_so_far, relaxed = result
+        if np.isfinite(best_so_far.value):
+            names = tuple(candidates[k] for k in best_so_far.chosen)
             points.append(
                 CurvePoint(
-                    budget, problem.constraints.spent(found.chosen), names, found.value, relaxed
+                    budget,
+                    problem.constraints.spent(best_so_far.chosen),
+                    names,
+                    best_so_far.value,
+                    relaxed,
                 )
             )
     return points
@@ -550,11 +570,13 @@ def _curve_point(problem: SelectionProblem, best: Found) -> tuple[Found, float] 
     generous = [best.chosen[k] for k in np.argsort(-without, kind="stable")]
     losses = Losses(problem)
     selections = [improve(problem, start, losses, 1) for start in starts(problem, generous, 0, 1)]
-    found = min(selections, key=lambda one: one.order)
-    relaxed = bound(problem) if np.isfinite(found.value) else None
+    best_selection = min(selections, key=lambda selection: selection.order)
+    relaxed = bound(problem) if np.isfinite(best_selection.value) else None
     if relaxed is not None:
-        relaxed.check(f"{problem.criterion.name} for {problem.constraints.budget}", found.value)
-    return found, np.nan if relaxed is None else relaxed.value
+        relaxed.check(
+            f"{problem.criterion.name} for {problem.constraints.budget}", best_selection.value
+        )
+    return best_selection, np.nan if relaxed is None else relaxed.value
 
 
 def _budgets(problem: SelectionProblem) -> list[Budget]:
@@ -564,14 +586,19 @@ def _budgets(problem: SelectionProblem) -> list[Budget]:
     if budget.positions is not None and budget.seconds is None and budget.readings is None:
         most = max(budget.positions + 2, round(1.5 * budget.positions))
         return [Budget(positions=k) for k in range(1, most + 1)]
-    found = []
+    budgets = []
     for factor in factors:
         positions = None if budget.positions is None else max(round(budget.positions * factor), 1)
         readings = None if budget.readings is None else round(budget.readings * factor)
-        found.append(
+        budgets.append(
             Budget(None if budget.seconds is None else budget.seconds * factor, readings, positions)
         )
-    found = list(dict.fromkeys([*found, budget]))
+    budgets = list(dict.fromkeys([*budgets, budget]))
     return sorted(
-        found, key=lambda one: (one.seconds or 0.0, one.readings or 0, one.positions or 0)
+        budgets,
+        key=lambda budget_seconds: (
+            budget_seconds.seconds or 0.0,
+            budget_seconds.readings or 0,
+            budget_seconds.positions or 0,
+        ),
     )

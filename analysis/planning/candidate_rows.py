@@ -73,15 +73,19 @@ class PoolDesign:
     def columns(self) -> Integers:
         """Columns of the layout that positions share."""
         start = self.layout.influences.start
-        place = np.array([one.position for one in self.design.influence_parameters], np.int64)
+        place = np.array(
+            [parameter.position for parameter in self.design.influence_parameters], np.int64
+        )
         before = np.arange(self.layout.model.start, start)
         return np.concatenate([before, start + np.flatnonzero(place < 0)])
 
     def influences_of(self, position: int) -> tuple[Integers, Array]:
         """The influence quantities of a position alone, with their standard uncertainties."""
         every = self.design.influence_parameters
-        own = np.array([k for k, one in enumerate(every) if one.position == position], np.int64)
-        return own, np.array([every[k].uncertainty for k in own], float)
+        indices = np.array(
+            [k for k, parameter in enumerate(every) if parameter.position == position], np.int64
+        )
+        return indices, np.array([every[k].uncertainty for k in indices], float)
 
     @property
     def certificates(self) -> int:
@@ -124,14 +128,14 @@ def refuse_influences(experiment: Experiment, design: Design) -> None:
     :raises ExperimentError: a position brings a free parameter of its own.
     """
     text = ""
-    own = [
-        one.name
-        for one in design.influence_parameters
-        if one.position >= 0 and not np.isfinite(one.uncertainty)
+    free = [
+        parameter.name
+        for parameter in design.influence_parameters
+        if parameter.position >= 0 and not np.isfinite(parameter.uncertainty)
     ]
-    if own:
+    if free:
         text = (
-            f"{own[0]} is unknown, which a plan cannot weigh; state a standard uncertainty to plan"
+            f"{free[0]} is unknown, which a plan cannot weigh; state a standard uncertainty to plan"
         )
     if text:
         raise refused(experiment.source, text, "influences")
@@ -160,24 +164,26 @@ def position_rows(drawn: PoolDesign) -> Iterator[CandidateRows]:
                 free = np.flatnonzero(columns[:, axis] >= 0)
                 by_shared[free, :, columns[free, axis]] = blocks.by_offset[free, :, axis]
         if blocks.by_influence is not None:
-            at = drawn.columns - drawn.layout.influences.start
-            by_shared[:, :, np.flatnonzero(at >= 0)] = blocks.by_influence[:, :, at[at >= 0]]
+            first_influence = drawn.columns - drawn.layout.influences.start
+            by_shared[:, :, np.flatnonzero(first_influence >= 0)] = blocks.by_influence[
+                :, :, first_influence[first_influence >= 0]
+            ]
         by_shared *= drawn.scale
         for k in range(first, last):
             if k in lengths:
                 yield lengths[k]
                 continue
-            own = slice(end[k] - count[k] - start, end[k] - start)
-            balls = np.repeat(readings.ball[own], d)[:, None]
-            found = CandidateRows(
+            position_slice = slice(end[k] - count[k] - start, end[k] - start)
+            balls = np.repeat(readings.ball[position_slice], d)[:, None]
+            rows = CandidateRows(
                 balls,
-                STEP * blocks.by_ball[own].reshape(len(balls), 1, d),
-                by_shared[own].reshape(len(balls), drawn.shared),
-                blocks.by_pose[own].reshape(len(balls), blocks.by_pose.shape[2]),
+                STEP * blocks.by_ball[position_slice].reshape(len(balls), 1, d),
+                by_shared[position_slice].reshape(len(balls), drawn.shared),
+                blocks.by_pose[position_slice].reshape(len(balls), blocks.by_pose.shape[2]),
             )
             if blocks.by_influence is not None:
-                found = _with_influences(drawn, k, found, blocks.by_influence[own])
-            yield found
+                rows = _with_influences(drawn, k, rows, blocks.by_influence[position_slice])
+            yield rows
         first = last
 
 
@@ -187,9 +193,9 @@ def _with_influences(
     """Rows of a position with its own influence quantities, which count with its pose, and what is
     known of them.
     """
-    own, uncertainty = drawn.influences_of(position)
-    q, count = rows.by_pose.shape[1], len(own)
-    by_own = by_influence[:, :, own].reshape(len(rows), count)
+    influences, uncertainty = drawn.influences_of(position)
+    q, count = rows.by_pose.shape[1], len(influences)
+    by_own = by_influence[:, :, influences].reshape(len(rows), count)
     by_pose = np.zeros((len(rows) + count, q + count))
     by_pose[: len(rows)] = np.concatenate([rows.by_pose, by_own], axis=1)
     by_pose[len(rows) + np.arange(count), q + np.arange(count)] = 1.0 / uncertainty
@@ -215,14 +221,14 @@ def _length_rows(drawn: PoolDesign) -> dict[int, CandidateRows]:
         np.concatenate([derivative[:, drawn.columns], by_position.by_error], axis=1) * drawn.scale
     )
     place = design.readings.position[design.of(Lengths).first[by_position.length]]
-    found = {}
+    rows_by_item = {}
     for k in np.unique(place).tolist():
         chosen, columns = np.flatnonzero(place == k), layout.pose_columns[k]
-        found[k] = replace(
+        rows_by_item[k] = replace(
             _of_shared(drawn, shared[chosen]),
             by_pose=derivative[np.ix_(chosen, columns[columns >= 0])],
         )
-    return found
+    return rows_by_item
 
 
 def _of_shared(drawn: PoolDesign, shared: Array) -> CandidateRows:
@@ -253,10 +259,10 @@ def calibration_rows(
     artefact = drawn.design.artefacts.names.index(item.artefact)
     if experiment.is_observed(item):
         first = int(drawn.design.balls.of(artefact)[0])
-        one, root = item.observed(first), item.root
-        if root is not None and isinstance(one, BallObservations):
-            one = JointValues.of([(one, root)])
-        return _of_observations(drawn, [one])
+        values, root = item.observed(first), item.root
+        if root is not None and isinstance(values, BallObservations):
+            values = JointValues.of([(values, root)])
+        return _of_observations(drawn, [values])
     named = drawn.design.unknown_lengths.of(artefact)
     if len(named) != 1:
         text = (
@@ -264,10 +270,10 @@ def calibration_rows(
             " its certificates"
         )
         raise refused(experiment.source, text, "pool.calibration")
-    stated = next(item.certified_values(experiment.layouts[item.artefact]))
+    stated_value = next(item.certified_values(experiment.layouts[item.artefact]))
     row = np.zeros((1, drawn.shared))
     row[0, drawn.layout.lengths.start - drawn.layout.model.start + named[0]] = 1.0 / max(
-        stated.standard_uncertainty, EXACT
+        stated_value.standard_uncertainty, EXACT
     )
     return [_of_shared(drawn, row * drawn.scale)]
 
@@ -276,21 +282,21 @@ def _of_observations(
     drawn: PoolDesign, observations: Sequence[Observations]
 ) -> list[CandidateRows]:
     """Rows of observations that are not formed of readings."""
-    found = []
-    for one in observations:
-        if len(one) and not isinstance(one, Lengths):
-            rows = one.rows(drawn.design, drawn.state, None)
-            by_shared = np.zeros((len(one), drawn.shared))
+    candidate_rows = []
+    for observation in observations:
+        if len(observation) and not isinstance(observation, Lengths):
+            rows = observation.rows(drawn.design, drawn.state, None)
+            by_shared = np.zeros((len(observation), drawn.shared))
             if rows.by_shared is not None:
                 by_shared[:, : len(drawn.columns)] = rows.by_shared[:, drawn.columns]
             is_shared = by_shared.any(axis=1) | rows.by_ball.any(axis=(1, 2))
-            found.append(
+            candidate_rows.append(
                 CandidateRows(
-                    one.balls[is_shared],
+                    observation.balls[is_shared],
                     STEP * rows.by_ball[is_shared],
                     by_shared[is_shared] * drawn.scale,
                     np.zeros((int(is_shared.sum()), 0)),
-                    len(one.fixing()[0]) > 0,
+                    len(observation.fixing()[0]) > 0,
                 )
             )
-    return found
+    return candidate_rows

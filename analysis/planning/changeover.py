@@ -146,23 +146,33 @@ def cheapest(
     return Order(seconds, seconds if task.is_exact else min(task.bound, seconds), visits, before)
 
 
-def _between(changes: ChangeTimes, one: Visit, other: Visit) -> float:
-    is_moved = (one.kind.artefact, one.kind.plane) != (other.kind.artefact, other.kind.plane)
-    return changes.plane * is_moved + changes.probe * (one.last != other.first)
+def _between(changes: ChangeTimes, from_visit: Visit, to_visit: Visit) -> float:
+    is_moved = (from_visit.kind.artefact, from_visit.kind.plane) != (
+        to_visit.kind.artefact,
+        to_visit.kind.plane,
+    )
+    return changes.plane * is_moved + changes.probe * (from_visit.last != to_visit.first)
 
 
 def _task(
     kinds: Iterable[tuple[Setup, int]], changes: ChangeTimes, after: Setup | None, is_paid: bool
 ) -> _Task:
     # The order of a set differs from run to run.
-    todo = sorted(kinds, key=lambda one: (one[0].artefact, one[0].plane, sorted(one[0].probes)))
+    todo = sorted(
+        kinds,
+        key=lambda candidate_kind: (
+            candidate_kind[0].artefact,
+            candidate_kind[0].plane,
+            sorted(candidate_kind[0].probes),
+        ),
+    )
     every = [kind for kind, _ in todo] + ([] if after is None else [after])
     names = tuple(sorted({probe for kind in every for probe in kind.probes}))
     members: dict[tuple[str, str], dict[tuple[int, ...], list[Setup]]] = {}
     for kind, count in todo:
         probes = tuple(k for k, name in enumerate(names) if name in kind.probes)
-        own = members.setdefault(_place(kind, changes), {})
-        own.setdefault(probes, []).extend([kind] * count)
+        probe_sets = members.setdefault(_place(kind, changes), {})
+        probe_sets.setdefault(probes, []).extend([kind] * count)
     begin, entry = np.zeros(len(names)), np.zeros(len(members))
     if after is not None:
         weight = 1.0 if is_paid else TIE
@@ -192,7 +202,9 @@ class _Task:
     @cached_property
     def contents(self) -> list[_Content]:
         """What there is to read in each place."""
-        return [tuple((some, len(kinds)) for some, kinds in one.items()) for one in self.members]
+        return [
+            tuple((some, len(kinds)) for some, kinds in member.items()) for member in self.members
+        ]
 
     @cached_property
     def positions(self) -> list[tuple[int, tuple[int, ...]]]:
@@ -242,7 +254,7 @@ class _Task:
     def within(self) -> list[Array]:
         """By place what it costs from arriving with a probe to leaving with one, (probe, probe)."""
         size = len(self.names)
-        every = [_probe_changes(one, size) for one in self.contents]
+        every = [_probe_changes(content, size) for content in self.contents]
         return [np.asarray(self.changes.probe * changed, float) for changed in every]
 
     @cached_property
@@ -250,30 +262,30 @@ class _Task:
         """By the set of places that are to come, as binary digits, the least cost after leaving
         another place with each probe, where each place is visited once.
         """
-        layer = found = {0: np.zeros(len(self.names))}
+        layer = costs = {0: np.zeros(len(self.names))}
         for _ in self.contents[1:]:
             following: dict[int, Array] = {}
-            for rest, later in layer.items():
+            for remaining, later in layer.items():
                 for k, within in enumerate(self.within):
-                    if not rest >> k & 1:
+                    if not remaining >> k & 1:
                         cost = self.changes.plane + (within + later).min(axis=1)
-                        known = following.get(rest | 1 << k, cost)
-                        following[rest | 1 << k] = np.minimum(known, cost)
+                        known_cost = following.get(remaining | 1 << k, cost)
+                        following[remaining | 1 << k] = np.minimum(known_cost, cost)
             layer = following
             if len(self.contents) > MOST_PLACES:
-                order = sorted(layer, key=lambda one: (layer[one].min(), one))
-                layer = {rest: layer[rest] for rest in order[:MOST_SETS]}
-            found = found | layer
-        return found
+                order = sorted(layer, key=lambda cost_of: (layer[cost_of].min(), cost_of))
+                layer = {remaining: layer[remaining] for remaining in order[:MOST_SETS]}
+            costs = costs | layer
+        return costs
 
-    def next_place(self, rest: int, begin: Array, entry: Array) -> tuple[float, int, int, int]:
+    def next_place(self, remaining: int, begin: Array, entry: Array) -> tuple[float, int, int, int]:
         """The least cost of the rest of the places, the next of them, and the probes with which it
         is begun and left.
         """
         options = []
         for k, within in enumerate(self.within):
-            later = self.ahead.get(rest & ~(1 << k))
-            if rest >> k & 1 and later is not None:
+            later = self.ahead.get(remaining & ~(1 << k))
+            if remaining >> k & 1 and later is not None:
                 cost = entry[k] + begin[:, None] + within + later
                 first, last = divmod(int(cost.argmin()), len(begin))
                 options.append((float(cost.min()), k, first, last))
@@ -294,17 +306,17 @@ class _Task:
         reached = ended.copy()
         reached[0] = (self.begin + self.entry[:, None]).ravel()
         sets = np.arange(1 << count)
-        sizes = np.array([one.bit_count() for one in range(1 << count)])
-        for taken in range(count + 1):
-            own = sets[sizes == taken]
-            if taken:
-                reached[own] = (ended[own, :, None] + self.between).min(axis=1)
+        sizes = np.array([subset.bit_count() for subset in range(1 << count)])
+        for size_taken in range(count + 1):
+            sets_of_size = sets[sizes == size_taken]
+            if size_taken:
+                reached[sets_of_size] = (ended[sets_of_size, :, None] + self.between).min(axis=1)
             for k, (place, probes) in enumerate(self.positions):
-                before = own[own >> k & 1 == 0]
+                before = sets_of_size[sets_of_size >> k & 1 == 0]
                 for first, last in _ends(probes):
-                    at, after = place * size + last, before | 1 << k
+                    state, after = place * size + last, before | 1 << k
                     cost = reached[before, place * size + first]
-                    ended[after, at] = np.minimum(ended[after, at], cost)
+                    ended[after, state] = np.minimum(ended[after, state], cost)
         return ended, reached
 
     @cached_property
@@ -321,42 +333,44 @@ class _Task:
         if not self.contents:
             return
         is_single = self.comes_back and self.is_small
-        left = [{probes: [*kinds] for probes, kinds in one.items()} for one in self.members]
+        unvisited = [
+            {probes: [*kinds] for probes, kinds in member.items()} for member in self.members
+        ]
         for place, probes, first, last in self.traced() if is_single else self.followed():
-            kinds = left[place][probes]
+            kinds = unvisited[place][probes]
             # Of one probe, all are read together.
             for _ in range(len(kinds) if is_single and len(probes) == 1 else 1):
                 yield Visit(kinds.pop(0), self.names[first], self.names[last])
 
     def followed(self) -> Iterator[_Step]:
         """The best order that visits each place once."""
-        rest, begin, entry = (1 << len(self.contents)) - 1, self.begin, self.entry
-        while rest:
-            _, place, first, last = self.next_place(rest, begin, entry)
+        todo, begin, entry = (1 << len(self.contents)) - 1, self.begin, self.entry
+        while todo:
+            _, place, first, last = self.next_place(todo, begin, entry)
             for step in _route(self.contents[place], first, last, len(begin)):
                 yield place, *step
-            rest &= ~(1 << place)
+            todo &= ~(1 << place)
             begin = np.where(np.arange(len(begin)) == last, 0.0, np.inf)
             entry = np.full(len(entry), self.changes.plane)
 
     def traced(self) -> Iterator[_Step]:
         """The best order of single positions, found from its end."""
         ended, reached = self.by_positions
-        size, taken, steps = len(self.names), len(ended) - 1, []
-        at = int(ended[taken].argmin())
-        while taken:
+        size, state, steps = len(self.names), len(ended) - 1, []
+        index = int(ended[state].argmin())
+        while state:
             k, first = next(
                 (k, first)
                 for k, (place, probes) in enumerate(self.positions)
                 for first, last in _ends(probes)
-                if taken >> k & 1
-                and place * size + last == at
-                and reached[taken & ~(1 << k), place * size + first] == ended[taken, at]
+                if state >> k & 1
+                and place * size + last == index
+                and reached[state & ~(1 << k), place * size + first] == ended[state, index]
             )
             place, probes = self.positions[k]
-            steps.append((place, probes, first, at % size))
-            taken &= ~(1 << k)
-            at = int((ended[taken] + self.between[:, place * size + first]).argmin())
+            steps.append((place, probes, first, index % size))
+            state &= ~(1 << k)
+            index = int((ended[state] + self.between[:, place * size + first]).argmin())
         yield from reversed(steps)
 
 
@@ -366,20 +380,20 @@ def _route(
     """Positions in one place, from arriving with a probe to leaving with another, with the fewest
     changes; of equal orders, those that stay with a set of probes.
     """
-    rest, before = dict(content), None
-    while rest:
+    todo, before = dict(content), None
+    while todo:
         options = []
-        for probes in rest:
-            left = {some: count - (some == probes) for some, count in rest.items()}
-            following = tuple((some, count) for some, count in sorted(left.items()) if count)
+        for probes in todo:
+            fewer = {some: count - (some == probes) for some, count in todo.items()}
+            following = tuple((some, count) for some, count in sorted(fewer.items()) if count)
             ahead = _probe_changes(following, size)[:, last]
             options += [
                 (int(probe != first) + int(ahead[end]), probes != before, probes, first, end)
                 for first, end in _ends(probes)
             ]
         *_, before, first, probe = min(options)
-        rest = {some: count - (some == before) for some, count in rest.items()}
-        rest = {some: count for some, count in rest.items() if count}
+        todo = {some: count - (some == before) for some, count in todo.items()}
+        todo = {some: count for some, count in todo.items() if count}
         yield before, first, probe
 
 
@@ -398,23 +412,23 @@ def _probe_changes(content: _Content, size: int) -> Integers:
         pairs = list(combinations(probes, 2)) or [(probes[0], probes[0])]
         for _ in range(_enough(len(probes), count, comes_back=False)):
             graphs = {_joined(graph, *pair) for graph in graphs for pair in pairs}
-    found = np.empty((size, size), np.int64)
+    changes = np.empty((size, size), np.int64)
     for first in range(size):
         for last in range(first, size):
             # What comes next leads from the last probe back to the first.
             least = min(_missing(_joined(graph, first, last)) for graph in graphs)
-            found[first, last] = found[last, first] = least
-    return found
+            changes[first, last] = changes[last, first] = least
+    return changes
 
 
-def _joined(graph: _Graph, one: int, other: int) -> _Graph:
+def _joined(graph: _Graph, first: int, second: int) -> _Graph:
     """A graph with an edge more."""
     parts, odd = graph
-    new, old = sorted(parts[k] if parts[k] >= 0 else k for k in (one, other))
+    new, old = sorted(parts[k] if parts[k] >= 0 else k for k in (first, second))
     joined = tuple(
-        new if k in (one, other) or part == old else part for k, part in enumerate(parts)
+        new if k in (first, second) or part == old else part for k, part in enumerate(parts)
     )
-    return joined, odd ^ 1 << one ^ 1 << other
+    return joined, odd ^ 1 << first ^ 1 << second
 
 
 def _missing(graph: _Graph) -> int:

@@ -76,8 +76,8 @@ class Wanted:
         """The trust in a file."""
         if self.with_modules:
             return OPENED
-        here, own = Path.cwd(), path.resolve().parent
-        within = here if own.is_relative_to(here) else own
+        here, folders = Path.cwd(), path.resolve().parent
+        within = here if folders.is_relative_to(here) else folders
         return Trust(within=within, remedy=WITH_MODULES)
 
 
@@ -113,33 +113,36 @@ def check_files(
     A variant that no file has is told last, as the error of all files together. What is reported
     are files, the designs of a single file, or the search for repairs of a single design.
     """
-    found: set[str | None] = set()
+    names_seen: set[str | None] = set()
     complete = True
     within = report if len(files) == 1 else unreported
     for path in counted(files, "files", len(files), report) if len(files) > 1 else files:
         try:
             trust = wanted.trust(path)
             experiments = load(path, trust=trust)
-            found |= {experiment.name for experiment in experiments}
-            chosen = [one for one in experiments if not variants or one.name in variants]
+            names_seen |= {experiment.name for experiment in experiments}
+            chosen = [
+                variant for variant in experiments if not variants or variant.name in variants
+            ]
             # What a plan may choose from is loaded where it is asked for only.
             pools = {}
             if wanted.repairs:
-                pools = {one.name: one for one in load(path, True, trust)}
-            doubts = tuple(dict.fromkeys(doubt for one in chosen for doubt in one.doubts))
-            notes = tuple(dict.fromkeys(note for one in chosen for note in one.notes))
+                pools = {variant.name: variant for variant in load(path, True, trust)}
+            doubts = tuple(dict.fromkeys(doubt for variant in chosen for doubt in variant.doubts))
+            notes = tuple(dict.fromkeys(note for variant in chosen for note in variant.notes))
             is_single = len(chosen) == 1
             designs = chosen if is_single else counted(chosen, "designs", len(chosen), within)
             of_search = within if is_single else unreported
             judged = tuple(
-                checked_design(one, pools.get(one.name), wanted, of_search) for one in designs
+                checked_design(variant, pools.get(variant.name), wanted, of_search)
+                for variant in designs
             )
             yield CheckedFile(str(path), judged, (), doubts, notes)
         except ExperimentError as error:
             complete = False
             yield CheckedFile(str(path), (), error.messages)
     # A file that cannot be used may be the one that has the variant.
-    messages = unknown_variants(files, variants, found) if complete else ()
+    messages = unknown_variants(files, variants, names_seen) if complete else ()
     if messages:
         yield CheckedFile(messages[0].file, (), messages)
 
@@ -152,14 +155,14 @@ def checked_design(
 ) -> CheckedDesign:
     """An experiment judged, with changes looked for in its pool if there is one."""
     prediction = check(experiment, with_scale=True)
-    found: SuggestedChanges | None = None
+    suggestions: SuggestedChanges | None = None
     if with_pool is not None:
-        found = service("suggested")(with_pool, prediction, report)
+        suggestions = service("suggested")(with_pool, prediction, report)
     goals, missed = _judged(experiment, wanted.goals)
     if wanted.nothing_weak and prediction.verdict.weak:
         count = len(prediction.verdict.weak)
         missed += (number_of(count, "weakly determined direction"),)
-    design = advised(CheckedDesign(prediction, None, found, goals, missed, experiment.name))
+    design = advised(CheckedDesign(prediction, None, suggestions, goals, missed, experiment.name))
     if not design.complaints:
         return design
     steps: tuple[str, ...] = (

@@ -118,11 +118,11 @@ class Selection:
 
     def title_of(self, candidate: Candidate) -> str:
         """The name of a candidate, after its short name if it has one."""
-        rest, name = "", candidate.name
+        prefixes, name = "", candidate.name
         if name.startswith(REST):
-            rest, name = REST, name.removeprefix(REST)
+            prefixes, name = REST, name.removeprefix(REST)
         short = self.names.get(name, name)
-        return candidate.name if short == name else f"{rest}{short}, {name}"
+        return candidate.name if short == name else f"{prefixes}{short}, {name}"
 
     @property
     def efficiency(self) -> float:

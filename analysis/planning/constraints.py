@@ -91,17 +91,17 @@ class Constraints:
 
     def spent(self, chosen: Collection[int]) -> Spent:
         """Cost of a selection, less what is done."""
-        own = sorted(set(chosen) - self.done)
-        seconds = float(self.seconds[own].sum()) + changeover(
-            self._kinds(own), self.changes, self._first(own)
+        added = sorted(set(chosen) - self.done)
+        seconds = float(self.seconds[added].sum()) + changeover(
+            self._kinds(added), self.changes, self._first(added)
         )
-        return Spent(seconds, int(self.readings[own].sum()), int(self.positions[own].sum()))
+        return Spent(seconds, int(self.readings[added].sum()), int(self.positions[added].sum()))
 
-    def _kinds(self, own: Iterable[int]) -> list[Setup]:
-        return [kind for k in own if k != self.first and (kind := self.kinds[k]) is not None]
+    def _kinds(self, members: Iterable[int]) -> list[Setup]:
+        return [kind for k in members if k != self.first and (kind := self.kinds[k]) is not None]
 
-    def _first(self, own: Collection[int]) -> Setup | None:
-        return None if self.first is None or self.first not in own else self.kinds[self.first]
+    def _first(self, members: Collection[int]) -> Setup | None:
+        return None if self.first is None or self.first not in members else self.kinds[self.first]
 
     def allows(self, chosen: Collection[int]) -> bool:
         """Whether a selection keeps to all limits, or may be extended to one that has what is
@@ -141,20 +141,20 @@ class Constraints:
         if budget.positions is not None:
             allowed &= self.positions <= budget.positions - spent.positions
         if budget.seconds is not None:
-            own = sorted(members - self.done)
-            left = budget.seconds + SLACK - float(self.seconds[own].sum())
-            kinds, first = self._kinds(own), self._first(own)
+            added = sorted(members - self.done)
+            seconds_left = budget.seconds + SLACK - float(self.seconds[added].sum())
+            kinds, first = self._kinds(added), self._first(added)
             is_first = np.arange(self.count) == self.first
             for kind in dict.fromkeys(self.kinds):
-                within = left - changeover(
+                within = seconds_left - changeover(
                     kinds if kind is None else [*kinds, kind], self.changes, first
                 )
-                too_long = np.array([other == kind for other in self.kinds]) & (
+                too_long = np.array([further_kind == kind for further_kind in self.kinds]) & (
                     self.seconds > within
                 )
                 allowed &= ~too_long | is_first
             if self.first is not None and first is None:
-                within = left - changeover(kinds, self.changes, self.kinds[self.first])
+                within = seconds_left - changeover(kinds, self.changes, self.kinds[self.first])
                 allowed[self.first] &= bool(self.seconds[self.first] <= within)
         return np.flatnonzero(allowed)
 
@@ -215,7 +215,7 @@ def constraints(
     budget: Budget,
     must: Collection[int] = (),
     at_most: Sequence[AtMost] = (),
-    done: Collection[int] = (),
+    done_indices: Collection[int] = (),
     at_least: Sequence[tuple[int, ...]] = (),
     first: int | None = None,
 ) -> Constraints:
@@ -223,18 +223,22 @@ def constraints(
     as none itself.
     """
     is_position = [
-        isinstance(one.item, Position) and k != first for k, one in enumerate(candidates)
+        isinstance(candidate.item, Position) and k != first
+        for k, candidate in enumerate(candidates)
     ]
     return Constraints(
         budget,
-        np.array([one.seconds for one in candidates], float),
-        np.array([one.readings for one in candidates], np.int64),
+        np.array([candidate.seconds for candidate in candidates], float),
+        np.array([candidate.readings for candidate in candidates], np.int64),
         np.array(is_position, np.int64),
-        tuple(kind_of(one) if isinstance(one.item, Position) else None for one in candidates),
+        tuple(
+            kind_of(candidate) if isinstance(candidate.item, Position) else None
+            for candidate in candidates
+        ),
         changes,
-        frozenset(must) | frozenset(done),
+        frozenset(must) | frozenset(done_indices),
         tuple(at_most),
-        frozenset(done),
+        frozenset(done_indices),
         tuple(at_least),
         first,
     )

@@ -137,10 +137,10 @@ class Criterion:
     def value(self, root: Array) -> float:
         """Value in metres, or a ratio, where root root' is the covariance of z."""
         if self.functions is not None:
-            found = self.functions.uncertainties(root)
+            uncertainties = self.functions.uncertainties(root)
             if self.largest:
-                return max(float(some.max(initial=0.0)) for some in found)
-            return sum(float(some.sum()) for some in found) / self.functions.count
+                return max(float(some.max(initial=0.0)) for some in uncertainties)
+            return sum(float(some.sum()) for some in uncertainties) / self.functions.count
         sizes = np.linalg.svd(self.scaled @ root, compute_uv=False)
         if self.name == "A":
             return float(np.sqrt((sizes**2).mean()))
@@ -167,24 +167,24 @@ class Criterion:
                 if self.largest
                 else _mean_tangent(self.functions, root)
             )
-        left, sizes, _ = np.linalg.svd(self.scaled @ root, full_matrices=False)
+        decomposition, sizes, _ = np.linalg.svd(self.scaled @ root, full_matrices=False)
         n, value = len(sizes), self.value(root)
         if self.name == "A":
             return value, value, self.scaled.T @ self.scaled / (2 * n * value)
         if self.name == "D":
-            half = (left / sizes).T @ self.scaled
+            half = (decomposition / sizes).T @ self.scaled
             return value, value, value / (2 * n) * half.T @ half
         relative = sizes / sizes[0]
         weights = relative**power / (relative**power).sum()
         value = float(np.sqrt(weights @ sizes**2))
         smooth = float(sizes[0] * (relative ** (power + 2)).mean() ** (1 / (power + 2)))
-        half = (left * np.sqrt(weights)).T @ self.scaled
+        half = (decomposition * np.sqrt(weights)).T @ self.scaled
         return smooth, value, half.T @ half / (2 * value)
 
 
 def _mean_tangent(functions: Functions, root: Array) -> tuple[float, float, Array]:
-    def weigh(found: Array) -> Array:
-        return np.stack([_halved(np.ones(len(found)), found), found])
+    def weigh(uncertainties: Array) -> Array:
+        return np.stack([_halved(np.ones(len(uncertainties)), uncertainties), uncertainties])
 
     (_, total), squares = functions.squares(functions.uncertainties(root), weigh)
     value = float(total) / functions.count
@@ -192,9 +192,9 @@ def _mean_tangent(functions: Functions, root: Array) -> tuple[float, float, Arra
 
 
 def _largest_tangent(functions: Functions, root: Array, power: float) -> tuple[float, float, Array]:
-    found: Iterable[Array] = functions.uncertainties(root)
-    found = list(found) if functions.count <= KEPT else found
-    largest = max(float(some.max(initial=0.0)) for some in found)
+    uncertainties: Iterable[Array] = functions.uncertainties(root)
+    uncertainties = list(uncertainties) if functions.count <= KEPT else uncertainties
+    largest = max(float(some.max(initial=0.0)) for some in uncertainties)
     size = max(largest, np.finfo(float).tiny)
 
     def weigh(some: Array) -> Array:
@@ -202,7 +202,7 @@ def _largest_tangent(functions: Functions, root: Array, power: float) -> tuple[f
         weights = relative ** (power - 1)
         return np.stack([_halved(weights, some), weights, weights * some, relative**power])
 
-    again = found if isinstance(found, list) else functions.uncertainties(root)
+    again = uncertainties if isinstance(uncertainties, list) else functions.uncertainties(root)
     (_, weight, weighted, powers), squares = functions.squares(again, weigh)
     return (
         largest * float(powers / functions.count) ** (1 / power),
@@ -211,10 +211,10 @@ def _largest_tangent(functions: Functions, root: Array, power: float) -> tuple[f
     )
 
 
-def _halved(weights: Array, found: Array) -> Array:
+def _halved(weights: Array, uncertainties: Array) -> Array:
     """Half of `weights` for each uncertainty; what is known without any stays so."""
-    known = found > 0.0
-    return np.where(known, 0.5 * weights, 0.0) / np.where(known, found, 1.0)
+    is_positive = uncertainties > 0.0
+    return np.where(is_positive, 0.5 * weights, 0.0) / np.where(is_positive, uncertainties, 1.0)
 
 
 @dataclass(frozen=True)
@@ -242,8 +242,8 @@ class Linear:
     def squares(
         self, uncertainties: Iterable[Array], weigh: Callable[[Array], Array]
     ) -> tuple[Array, Array]:
-        found = next(iter(uncertainties))
-        weighed = weigh(found)
+        values = next(iter(uncertainties))
+        weighed = weigh(values)
         return weighed.sum(axis=1), (self.rows * weighed[0][:, None]).T @ self.rows
 
 
@@ -340,15 +340,15 @@ class Pairs:
     def uncertainties(self, root: Array) -> Iterator[Array]:
         n, d = self.places.shape
         spread = (self.displacement.reshape(n * d, -1) @ root).reshape(n, d, -1)
-        own = [[(spread[:, i] * spread[:, j]).sum(axis=1) for j in range(d)] for i in range(d)]
+        products = [[(spread[:, i] * spread[:, j]).sum(axis=1) for j in range(d)] for i in range(d)]
         for block in self._blocks():
-            one, other = spread[block.first], spread[block.second]
+            first, second = spread[block.first], spread[block.second]
             total = np.zeros(block.length.shape)
             for i, j, weight in block.weights:
-                apart = own[i][j][block.first, None] + own[i][j][None, block.second]
-                product = one[:, i] @ other[:, j].T
+                apart = products[i][j][block.first, None] + products[i][j][None, block.second]
+                product = first[:, i] @ second[:, j].T
                 apart -= product
-                apart -= product if i == j else one[:, j] @ other[:, i].T
+                apart -= product if i == j else first[:, j] @ second[:, i].T
                 apart *= weight
                 total += apart
             yield np.sqrt(np.maximum(total[block.chosen], 0.0))
@@ -360,19 +360,19 @@ class Pairs:
         # The squares' sum is that of displacements times these.
         moved = np.zeros_like(self.displacement)
         # What follows belongs to other functions.
-        for block, found in zip(self._blocks(), uncertainties, strict=False):
-            weighed = weigh(found)
+        for block, squared in zip(self._blocks(), uncertainties, strict=False):
+            weighed = weigh(squared)
             sums.append(weighed.sum(axis=1))
-            each = np.zeros(block.length.shape)
-            each[block.chosen] = weighed[0]
-            one, other = self.displacement[block.first], self.displacement[block.second]
+            weights_of_block = np.zeros(block.length.shape)
+            weights_of_block[block.chosen] = weighed[0]
+            from_end, to_end = self.displacement[block.first], self.displacement[block.second]
             for i, j, weight in block.weights:
-                amount = each * weight
+                amount = weights_of_block * weight
                 moved[block.first, i] += (
-                    amount.sum(axis=1)[:, None] * one[:, j] - amount @ other[:, j]
+                    amount.sum(axis=1)[:, None] * from_end[:, j] - amount @ to_end[:, j]
                 )
                 moved[block.second, i] += (
-                    amount.sum(axis=0)[:, None] * other[:, j] - amount.T @ one[:, j]
+                    amount.sum(axis=0)[:, None] * to_end[:, j] - amount.T @ from_end[:, j]
                 )
         size = self.displacement.shape[2]
         total = self.displacement.reshape(-1, size).T @ moved.reshape(-1, size)
@@ -402,10 +402,10 @@ class Several:
     def squares(
         self, uncertainties: Iterable[Array], weigh: Callable[[Array], Array]
     ) -> tuple[Array, Array]:
-        left = iter(uncertainties)
-        found = [part.squares(left, weigh) for part in self.parts]
-        return np.sum([sums for sums, _ in found], axis=0), np.sum(
-            [squares for _, squares in found], axis=0
+        iterator = iter(uncertainties)
+        by_part = [part.squares(iterator, weigh) for part in self.parts]
+        return np.sum([sums for sums, _ in by_part], axis=0), np.sum(
+            [squares for _, squares in by_part], axis=0
         )
 
 
@@ -444,28 +444,28 @@ def criterion(information: Information, experiment: Experiment, name: CriterionN
     kind = QUANTITIES.get(symbol)
     if kind is None:
         model = slice(0, len(drawn.design.model.parameters))
-        kept = np.abs(information.open_[model]).max(axis=1, initial=0.0) <= OPEN
-        if not kept.all():
+        is_determined = np.abs(information.open_[model]).max(axis=1, initial=0.0) <= OPEN
+        if not is_determined.all():
             text = f"{name} includes parameters that even all candidates leave undetermined"
             raise refused(experiment.source, text, "pool")
         scaled = _of_shared(information, STEP * np.eye(drawn.shared)[model])
     else:
         parts: list[Pairs | Linear] = []
-        for given in functions_of(symbol, drawn.design, drawn.layout):
-            assert isinstance(given, Distances)
-            if isinstance(given.places, BallPlaces):
+        for quantity_functions in functions_of(symbol, drawn.design, drawn.layout):
+            assert isinstance(quantity_functions, Distances)
+            if isinstance(quantity_functions.places, BallPlaces):
                 plate = drawn.design.artefacts.names[
-                    drawn.design.balls.artefact[given.places.index[0]]
+                    drawn.design.balls.artefact[quantity_functions.places.index[0]]
                 ]
                 placing = information.placing(plate)
                 if not placing:
                     continue
                 needed.append((plate, placing))
-            parts.append(_distances(information, given))
+            parts.append(_distances(information, quantity_functions))
         functions = Several(tuple(parts))
         if not functions.count:
-            left = "no selection determines any of it; offer other candidates"
-            lacks = left if functions.excluded else f"the experiment has no {kind.needs}"
+            reason = "no selection determines any of it; offer other candidates"
+            lacks = reason if functions.excluded else f"the experiment has no {kind.needs}"
             text = f"{name} has nothing to minimise: {lacks}"
             raise refused(experiment.source, text, "pool")
     excluded = 0 if functions is None else functions.excluded
@@ -480,20 +480,27 @@ def _target(experiment: Experiment, name: CriterionName, functions: Several | No
     if functions is None:
         return None
     parts = functions.parts
-    own = [one for part in parts if isinstance(part, Linear) for one in part.targets]
+    stated_targets = [
+        target for part in parts if isinstance(part, Linear) for target in part.targets
+    ]
     of_file = QUANTITIES[name.removesuffix(MAXIMUM)].has_target
-    targets = own or ([experiment.target_uncertainty] if of_file else [])
-    stated = [one for one in targets if one is not None]
-    if not stated or len(stated) < len(targets):
+    targets = stated_targets or ([experiment.target_uncertainty] if of_file else [])
+    known_targets = [target for target in targets if target is not None]
+    if not known_targets or len(known_targets) < len(targets):
         return None
     if name.endswith(MAXIMUM):
-        standards = {one.standard for one in stated}
+        standards = {target.standard for target in known_targets}
         only = next(iter(standards))
         return only.constant if len(standards) == 1 and only.slope == 0 else None
-    if own:
+    if stated_targets:
         lengths = np.concatenate(list(functions.lengths()))
-        return float(np.mean([one.at(some) for one, some in zip(stated, lengths, strict=True)]))
-    return sum(float(stated[0].at(some).sum()) for some in functions.lengths()) / functions.count
+        return float(
+            np.mean([target.at(some) for target, some in zip(known_targets, lengths, strict=True)])
+        )
+    return (
+        sum(float(known_targets[0].at(some).sum()) for some in functions.lengths())
+        / functions.count
+    )
 
 
 def _of_shared(information: Information, rows: Array) -> Array:
@@ -501,27 +508,30 @@ def _of_shared(information: Information, rows: Array) -> Array:
     return rows @ information.basis.shared_root
 
 
-def _distances(information: Information, given: Distances) -> Pairs | Linear:
+def _distances(information: Information, distances: Distances) -> Pairs | Linear:
     """Distances that are determined, between all places or those pairs that have names."""
-    of = given.places
-    places = of.at(information.drawn.design, information.drawn.state)
+    point_places = distances.places
+    places = point_places.at(information.drawn.design, information.drawn.state)
     moved = (
-        _of_balls(information, of) if isinstance(of, BallPlaces) else _of_points(information, of)
+        _of_balls(information, point_places)
+        if isinstance(point_places, BallPlaces)
+        else _of_points(information, point_places)
     )
     # Without the motion of all places together, no digits are lost where distances are formed.
     displacement, open_ = (without_rigid_motion(places, amount) for amount in moved)
-    if given.pairs is None:
+    if distances.pairs is None:
         return Pairs(places, displacement, open_)
-    first, second = given.pairs.T
+    first, second = distances.pairs.T
     unit = places[first] - places[second]
     length = np.linalg.norm(unit, axis=1)
     unit /= length[:, None]
     change, rows = (
-        np.einsum("md,mdz->mz", unit, one[first] - one[second]) for one in (open_, displacement)
+        np.einsum("md,mdz->mz", unit, matrix[first] - matrix[second])
+        for matrix in (open_, displacement)
     )
-    kept = np.abs(change).max(axis=1, initial=0.0) <= OPEN * STEP
-    targets = tuple(compress(given.targets, kept))
-    return Linear(rows[kept], length[kept], int((~kept).sum()), targets)
+    is_kept = np.abs(change).max(axis=1, initial=0.0) <= OPEN * STEP
+    targets = tuple(compress(distances.targets, is_kept))
+    return Linear(rows[is_kept], length[is_kept], int((~is_kept).sum()), targets)
 
 
 def _of_balls(information: Information, places: BallPlaces) -> tuple[Array, Array]:
@@ -539,9 +549,11 @@ def _of_points(information: Information, places: MeasuredPoints) -> tuple[Array,
     """
     drawn, (n, d) = information.drawn, places.points.shape
     rows = np.zeros((n * d, drawn.shared))
-    for some, found in point_rows(drawn.design, drawn.layout, drawn.state, places):
-        own = found[:, :, drawn.columns].reshape(-1, len(drawn.columns))
-        rows[some.start * d : some.start * d + len(own), : own.shape[1]] = own
+    for some, matrix in point_rows(drawn.design, drawn.layout, drawn.state, places):
+        point_matrix = matrix[:, :, drawn.columns].reshape(-1, len(drawn.columns))
+        rows[some.start * d : some.start * d + len(point_matrix), : point_matrix.shape[1]] = (
+            point_matrix
+        )
     rows *= drawn.scale
     return _of_shared(information, rows).reshape(n, d, -1), (rows @ information.open_).reshape(
         n, d, -1

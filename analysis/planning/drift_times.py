@@ -21,8 +21,8 @@ from .short_names import with_names
 
 def without_drift(experiment: Experiment) -> Experiment:
     """The experiment without what depends on the order of readings."""
-    left = tuple(one for one in experiment.influences if not one.in_order)
-    return replace(experiment, influences=left)
+    steady = tuple(influence for influence in experiment.influences if not influence.in_order)
+    return replace(experiment, influences=steady)
 
 
 def in_time(
@@ -35,7 +35,7 @@ def in_time(
     that; `names` are the short names of positions.
     """
     chosen = with_chosen(with_names(experiment, names or {}), sheet.written)
-    placed = {one.name for one in chosen.positions}
+    placed = {position.name for position in chosen.positions}
     positions = {
         step.name: DriftPositionSettings.model_construct(
             start=sheet.first_readings[step.name], reading=step.candidate.reading_seconds
@@ -45,10 +45,10 @@ def in_time(
     }
     times = DriftTimesSettings.model_construct(probe_change=changes.probe)
     timed = tuple(
-        one.model_copy(update={"positions": positions, "times": times})
-        if isinstance(one, DriftSettings)
-        else one
-        for one in chosen.influences
+        position.model_copy(update={"positions": positions, "times": times})
+        if isinstance(position, DriftSettings)
+        else position
+        for position in chosen.influences
     )
     return replace(chosen, influences=timed)
 
@@ -57,16 +57,16 @@ def in_order_settings(experiment: Experiment) -> dict[int, dict[str, Any]]:
     """What an experiment file says of the times of its drifts, by their places among the influence
     quantities.
     """
-    found: dict[int, dict[str, Any]] = {}
-    for k, one in enumerate(experiment.influences):
-        if isinstance(one, DriftSettings):
-            places = (one.positions or {}).items()
-            times = one.times or DriftTimesSettings.model_construct()
-            found[k] = {
+    settings_by_index: dict[int, dict[str, Any]] = {}
+    for k, influence in enumerate(experiment.influences):
+        if isinstance(influence, DriftSettings):
+            places = (influence.positions or {}).items()
+            times = influence.times or DriftTimesSettings.model_construct()
+            settings_by_index[k] = {
                 "times": {"probe_change": format_duration(times.probe_change)},
                 "positions": {
                     name: {key: format_duration(value) for key, value in place.stated.items()}
                     for name, place in places
                 },
             }
-    return found
+    return settings_by_index

@@ -86,7 +86,7 @@ def experiment_text(
         )
         for key in root.items
     }
-    kept = {key: chunk for key, chunk in chunks.items() if is_same[key]}
+    unchanged = {key: chunk for key, chunk in chunks.items() if is_same[key]}
     first = text.partition("\n")[0]
     head = (
         [first]
@@ -94,7 +94,7 @@ def experiment_text(
         else []
     )
     head += [f"# {in_one_line(line)}".rstrip() for line in header.splitlines()]
-    for parts in (kept, {}):
+    for parts in (unchanged, {}):
         written = "\n".join(
             [
                 "\n".join(head),
@@ -139,81 +139,87 @@ def _content(
     short: Mapping[str, str],
     of_influences: Mapping[int, dict[str, Any]],
 ) -> dict[str, Any]:
-    said: dict[str, Any] = to_list(to_python(tree))
-    positions = [one for one in chosen if isinstance(one.item, Position)]
-    placed = {one.item.artefact for one in positions}
-    names = {one.name for one in positions}
-    others = (
-        {one.name for one in experiment.pool.candidates} - names - set(short)
+    settings: dict[str, Any] = to_list(to_python(tree))
+    positions = [entry for entry in chosen if isinstance(entry.item, Position)]
+    placed = {entry.item.artefact for entry in positions}
+    names = {entry.name for entry in positions}
+    unused = (
+        {entry.name for entry in experiment.pool.candidates} - names - set(short)
         if experiment.pool is not None
         else set()
     )
     # Where there is one artefact, nothing says which.
-    only = next(iter(said["artefacts"]))
+    only = next(iter(settings["artefacts"]))
     items = [
-        one
-        for one in said.get("calibration", [])
-        if str(one.get("artefact", only)) in placed or is_of_machine(str(one.get("kind")))
+        entry
+        for entry in settings.get("calibration", [])
+        if str(entry.get("artefact", only)) in placed or is_of_machine(str(entry.get("kind")))
     ]
     items += [
-        to_list(one.settings)
-        for one in chosen
-        if not isinstance(one.item, Position) and one.item.artefact in {*placed, ""}
+        to_list(entry.settings)
+        for entry in chosen
+        if not isinstance(entry.item, Position) and entry.item.artefact in {*placed, ""}
     ]
-    said["artefacts"] = {name: one for name, one in said["artefacts"].items() if name in placed}
-    said["positions"] = [to_list(one.settings) for one in positions]
-    said["calibration"] = items
-    if "priors" in said:
-        gone = {one.path for one in experiment.priors if one.position in others}
-        paths = [format_path(("priors", i, "parameter")) for i in range(len(said["priors"]))]
-        said["priors"] = [
-            one for one, path in zip(said["priors"], paths, strict=True) if path not in gone
+    settings["artefacts"] = {
+        name: entry for name, entry in settings["artefacts"].items() if name in placed
+    }
+    settings["positions"] = [to_list(entry.settings) for entry in positions]
+    settings["calibration"] = items
+    if "priors" in settings:
+        gone = {entry.path for entry in experiment.priors if entry.position in unused}
+        paths = [format_path(("priors", i, "parameter")) for i in range(len(settings["priors"]))]
+        settings["priors"] = [
+            entry for entry, path in zip(settings["priors"], paths, strict=True) if path not in gone
         ]
-    if "influences" in said:
-        told = [_of_chosen(one, others, short) for one in said["influences"]]
-        said["influences"] = [one | of_influences.get(k, {}) for k, one in enumerate(told) if one]
-        if not said["influences"]:
-            del said["influences"]
-    if "readings" in said:
-        said["readings"] = _with(
-            said["readings"],
+    if "influences" in settings:
+        influences_written = [_of_chosen(entry, unused, short) for entry in settings["influences"]]
+        settings["influences"] = [
+            entry | of_influences.get(k, {}) for k, entry in enumerate(influences_written) if entry
+        ]
+        if not settings["influences"]:
+            del settings["influences"]
+    if "readings" in settings:
+        settings["readings"] = _with(
+            settings["readings"],
             "columns",
-            lambda columns: _with(columns, "position", lambda one: renamed_of_all(one, short)),
+            lambda columns: _with(columns, "position", lambda entry: renamed_of_all(entry, short)),
         )
     # What a choice adds goes where it belongs.
-    known = [key for key in ExperimentSettings.model_fields if key in said]
+    keys = [key for key in ExperimentSettings.model_fields if key in settings]
     order = (
-        sorted(said, key=known.index)
+        sorted(settings, key=keys.index)
         if {"positions", "calibration"} - set(tree.items)
-        else list(said)
+        else list(settings)
     )
     return {
-        key: said[key]
+        key: settings[key]
         for key in order
-        if key not in LEFT_OUT and (said[key] != [] or key == "positions")
+        if key not in LEFT_OUT and (settings[key] != [] or key == "positions")
     }
 
 
-def _times(said: Mapping[str, Any], pool: Pool, chosen: Sequence[Candidate]) -> dict[str, Any]:
+def _times(settings: Mapping[str, Any], pool: Pool, chosen: Sequence[Candidate]) -> dict[str, Any]:
     """How long things take, and chosen positions where that is other for them, as a pool has it."""
     times = {
-        key: one for key, one in said.get("pool", {}).get("times", {}).items() if key != "positions"
+        key: entry
+        for key, entry in settings.get("pool", {}).get("times", {}).items()
+        if key != "positions"
     }
     common = TimesSettings.model_validate(times)
-    own: dict[str, dict[str, str]] = {}
-    for one in chosen:
-        if isinstance(one.item, Position):
-            changes = (len(one.item.probes) - 1) * pool.changes.probe
-            set_up = one.seconds - one.readings * one.reading_seconds - changes
-            stated = {"set_up": (set_up, common.set_up, SET_UP)}
-            stated["reading"] = (one.reading_seconds, common.reading, READING)
+    own_times: dict[str, dict[str, str]] = {}
+    for entry in chosen:
+        if isinstance(entry.item, Position):
+            changes = (len(entry.item.probes) - 1) * pool.changes.probe
+            set_up = entry.seconds - entry.readings * entry.reading_seconds - changes
+            defaults = {"set_up": (set_up, common.set_up, SET_UP)}
+            defaults["reading"] = (entry.reading_seconds, common.reading, READING)
             differ = {
                 key: format_duration(value)
-                for key, (value, given, default) in stated.items()
-                if abs(value - (default if given is None else given)) > 1e-6
+                for key, (value, given_value, default) in defaults.items()
+                if abs(value - (default if given_value is None else given_value)) > 1e-6
             }
-            own |= {one.name: differ} if differ else {}
-    return {**times, **({"positions": own} if own else {})}
+            own_times |= {entry.name: differ} if differ else {}
+    return {**times, **({"positions": own_times} if own_times else {})}
 
 
 def _moved(content: Mapping[str, Any], source: Path, folder: Path) -> dict[str, Any]:
@@ -241,26 +247,26 @@ def _moved(content: Mapping[str, Any], source: Path, folder: Path) -> dict[str, 
             return settings
         return {**settings, "folder": there(settings.get("folder", "."))}
 
-    found = dict(content)
-    found["error_model"] = model(found["error_model"])
-    truth = _with(found.get("true_machine"), "file", there)
+    moved = dict(content)
+    moved["error_model"] = model(moved["error_model"])
+    truth = _with(moved.get("true_machine"), "file", there)
     truth = _with(truth, "files", all_there)
     truth = _with(truth, "error_model", model)
-    found |= {"true_machine": truth} if truth is not None else {}
-    found["artefacts"] = {
-        name: _with(one, "file", there) for name, one in found["artefacts"].items()
+    moved |= {"true_machine": truth} if truth is not None else {}
+    moved["artefacts"] = {
+        name: _with(item, "file", there) for name, item in moved["artefacts"].items()
     }
-    for key in {"calibration", "stars", "influences"} & found.keys():
-        items = [model(_with(one, "values", there)) for one in found[key]]
-        found[key] = [_with(one, "covariance", there) for one in items]
-    if "readings" in found:
-        readings = _with(found["readings"], "files", all_there)
-        found["readings"] = _with(readings, "compensation", lambda on: _with(on, "file", there))
-    if "evaluation" in found:
-        found["evaluation"] = _with(
-            found["evaluation"], "points", lambda points: _with(points, "file", there)
+    for key in {"calibration", "stars", "influences"} & moved.keys():
+        items = [model(_with(item, "values", there)) for item in moved[key]]
+        moved[key] = [_with(item, "covariance", there) for item in items]
+    if "readings" in moved:
+        readings = _with(moved["readings"], "files", all_there)
+        moved["readings"] = _with(readings, "compensation", lambda on: _with(on, "file", there))
+    if "evaluation" in moved:
+        moved["evaluation"] = _with(
+            moved["evaluation"], "points", lambda points: _with(points, "file", there)
         )
-    return found
+    return moved
 
 
 def _with(settings: Any, key: str, change: Callable[[Any], Any]) -> Any:
@@ -336,9 +342,9 @@ _Dumper.add_representer(
 def _section(key: str, value: Any) -> str:
     """A section written anew, each of its entries in one line where it fits."""
     if isinstance(value, dict):
-        value = {name: _in_line(one) for name, one in value.items()}
+        value = {name: _in_line(entry) for name, entry in value.items()}
     elif isinstance(value, list):
-        value = [_in_line(one) for one in value]
+        value = [_in_line(entry) for entry in value]
     text = yaml.dump(
         {key: value},
         Dumper=_Dumper,
@@ -361,15 +367,17 @@ def _in_line(value: Any) -> Any:
 
 
 def _of_chosen(
-    influence: dict[str, Any], others: Collection[str], short: Mapping[str, str]
+    influence: dict[str, Any], unused: Collection[str], short: Mapping[str, str]
 ) -> dict[str, Any]:
     """What is said of an influence quantity, less `others` among its positions; nothing where it is
     of these alone.
     """
-    said = influence.get("positions", {})
-    rest = {key: one for key, one in influence.items() if key != "positions"}
-    if isinstance(said, Mapping):
-        left = {name: at for name, at in said.items() if name not in others}
-        return rest | ({"positions": renamed(left, short)} if left else {})
-    names = renamed([name for name in said if name not in others], short)
-    return rest | {"positions": names} if names else {}
+    position_settings = influence.get("positions", {})
+    settings = {key: setting for key, setting in influence.items() if key != "positions"}
+    if isinstance(position_settings, Mapping):
+        kept_positions = {
+            name: effect for name, effect in position_settings.items() if name not in unused
+        }
+        return settings | ({"positions": renamed(kept_positions, short)} if kept_positions else {})
+    names = renamed([name for name in position_settings if name not in unused], short)
+    return settings | {"positions": names} if names else {}

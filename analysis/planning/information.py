@@ -123,8 +123,8 @@ class Information:
         design, open_ = self.drawn.design, self.basis.balls @ self.basis.ball_open
         motions = _motions(design).reshape(design.balls.places.size, -1)
         open_ = open_.reshape(len(motions), -1)
-        left = np.linalg.svd(open_ - motions @ (motions.T @ open_), compute_uv=False)
-        return int((left > SAME).sum())
+        singular_values = np.linalg.svd(open_ - motions @ (motions.T @ open_), compute_uv=False)
+        return int((singular_values > SAME).sum())
 
     @cached_property
     def shared(self) -> slice:
@@ -179,13 +179,13 @@ class Frames:
     def _held_motions(self, members: Iterable[int]) -> Array:
         if not self.fixed:
             return np.zeros((self.rows.shape[1],) * 2)
-        told = np.concatenate([self.base, *(self.fixed[k] for k in members if k in self.fixed)])
-        _, values, directions = np.linalg.svd(np.concatenate([told, np.zeros((1, told.shape[1]))]))
+        rows = np.concatenate([self.base, *(self.fixed[k] for k in members if k in self.fixed)])
+        _, values, directions = np.linalg.svd(np.concatenate([rows, np.zeros((1, rows.shape[1]))]))
         rank = int((values > 1e-9 * values.max(initial=0.0)).sum())
-        left = directions[rank:] @ self.rows
-        size = np.linalg.norm(left, axis=1)
-        left = left[size > 1e-9] / size[size > 1e-9, None]
-        return left.T @ left
+        directions_left = directions[rank:] @ self.rows
+        size = np.linalg.norm(directions_left, axis=1)
+        directions_left = directions_left[size > 1e-9] / size[size > 1e-9, None]
+        return directions_left.T @ directions_left
 
 
 # In one piece: two sets of rows, as stated and evenly weighted, pass through the same steps.
@@ -217,14 +217,14 @@ def pool_information(
         for k, candidate in enumerate(candidates)
         if not isinstance(candidate.item, Position)
     }
-    known = always(drawn)
+    rows_always = always(drawn)
     # What is spanned and what is open does not depend on weights, but to see it these must not
     # differ too much.
-    even_known, even_items, is_even = known, items, True
+    even_known, even_items, is_even = rows_always, items, True
     weight = _position_weight(drawn)
-    if any(_differs(rows, weight) for rows in [*known, *chain(*items.values())]):
+    if any(_differs(rows, weight) for rows in [*rows_always, *chain(*items.values())]):
         is_even = False
-        even_known = [_weighted(rows, weight, weight) for rows in known]
+        even_known = [_weighted(rows, weight, weight) for rows in rows_always]
         even_items = {
             k: [_weighted(rows, weight, weight) for rows in item] for k, item in items.items()
         }
@@ -235,35 +235,35 @@ def pool_information(
     certificates = [*even_known, *chain(*even_items.values())]
     balls = _combinations(drawn, certificates, all_balls)
     size = balls.shape[2] + drawn.shared
-    each = 8 * size**2
-    if len(candidates) * each > MOST_BYTES:
-        taken = f"{len(candidates) * each / 1e9:.3g} GB of memory"
+    bytes_each = 8 * size**2
+    if len(candidates) * bytes_each > MOST_BYTES:
+        memory = f"{len(candidates) * bytes_each / 1e9:.3g} GB of memory"
         text = (
-            f"{len(candidates)} candidates with {size} parameters each take {taken}; offer at most "
-            f"{MOST_BYTES // each}, positions of the experiment and certificates counted"
+            f"{len(candidates)} candidates with {size} parameters each take {memory};"
+            f" offer at most {MOST_BYTES // bytes_each}, positions of the experiment and certificates counted"
         )
         raise refused(experiment.source, text, "pool")
 
-    base = np.concatenate([_in_amounts(rows, balls) for rows in known])
+    base = np.concatenate([_in_amounts(rows, balls) for rows in rows_always])
     of_positions = position_rows(drawn)
-    own: list[Array] = []
+    pool_rows: list[Array] = []
     pose_ranks: list[int] = []
     pose_open: list[int] = []
     for k in counted(range(len(candidates)), "candidates", len(candidates), report):
         if k in items:
-            own.append(np.concatenate([_in_amounts(r, balls) for r in items[k]]))
+            pool_rows.append(np.concatenate([_in_amounts(r, balls) for r in items[k]]))
             pose_ranks.append(0)
             pose_open.append(0)
             continue
         rows = next(of_positions)
-        own.append(_reduced(_in_amounts(rows, balls)))
+        pool_rows.append(_reduced(_in_amounts(rows, balls)))
         pose_ranks.append(_range(rows.by_pose).shape[1])
         pose_open.append(rows.by_pose.shape[1] - pose_ranks[-1])
     if is_even:
-        basis, open_ = _basis(balls, drawn.shared, [base, *own])
+        basis, open_ = _basis(balls, drawn.shared, [base, *pool_rows])
     else:
-        even = [np.concatenate([_in_amounts(rows, balls) for rows in even_known]), *own]
-        mild = [base, *own]
+        even = [np.concatenate([_in_amounts(rows, balls) for rows in even_known]), *pool_rows]
+        mild = [base, *pool_rows]
         for k, item in even_items.items():
             even[k + 1] = np.concatenate([_in_amounts(rows, balls) for rows in item])
             mild[k + 1] = np.concatenate(
@@ -275,13 +275,13 @@ def pool_information(
         return basis.rows(rows[:, : balls.shape[2]], rows[:, balls.shape[2] :])
 
     matrices = np.zeros((len(candidates), basis.size, basis.size))
-    for k, reduced in enumerate(own):
+    for k, reduced in enumerate(pool_rows):
         transformed = in_basis(reduced)
         matrices[k] = transformed.T @ transformed
     for whole, part in (completed or {}).items():
         matrices[whole] -= matrices[part]
     transformed = in_basis(base)
-    has_rows = tuple(len(rows) > 0 for rows in own)
+    has_rows = tuple(len(rows) > 0 for rows in pool_rows)
     unplaced = _unplaced(drawn, candidates, basis, all_balls, has_rows)
     frames = replace(_frames(drawn, even_known, even_items, basis), artefacts=unplaced)
     own_base = transformed.T @ transformed
@@ -304,14 +304,14 @@ def _in_amounts(rows: CandidateRows, balls: Array) -> Array:
     out.
     """
     y = balls.shape[2]
-    found = np.zeros((len(rows), y + rows.by_shared.shape[1]))
-    found[:, y:] = rows.by_shared
+    amounts = np.zeros((len(rows), y + rows.by_shared.shape[1]))
+    amounts[:, y:] = rows.by_shared
     for ball, slope in zip(rows.balls.T, rows.by_ball.swapaxes(0, 1), strict=True):
-        found[:, :y] += np.einsum("md,mdy->my", slope, balls[ball])
+        amounts[:, :y] += np.einsum("md,mdy->my", slope, balls[ball])
     if rows.by_pose.shape[1]:
         along = _range(rows.by_pose)
-        found -= along @ (along.T @ found)
-    return found
+        amounts -= along @ (along.T @ amounts)
+    return amounts
 
 
 def _position_weight(drawn: PoolDesign) -> float:
@@ -367,13 +367,13 @@ def _motions(design: Design) -> Array:
     n, d = design.balls.places.shape
     parts = []
     for artefact in design.artefacts.plates:
-        own = design.balls.of(artefact)
-        places = design.balls.places[own]
-        shifts = np.broadcast_to(np.eye(d), (len(own), d, d))
+        motions = design.balls.of(artefact)
+        places = design.balls.places[motions]
+        shifts = np.broadcast_to(np.eye(d), (len(motions), d, d))
         turns = rotation_sensitivity(places - places.mean(axis=0))
-        moved = _range(np.concatenate([shifts, turns], axis=2).reshape(len(own) * d, -1))
+        moved = _range(np.concatenate([shifts, turns], axis=2).reshape(len(motions) * d, -1))
         parts.append(np.zeros((n, d, moved.shape[1])))
-        parts[-1][own] = moved.reshape(len(own), d, -1)
+        parts[-1][motions] = moved.reshape(len(motions), d, -1)
     return np.concatenate([np.zeros((n, d, 0)), *parts], axis=2)
 
 
@@ -388,31 +388,31 @@ def _combinations(drawn: PoolDesign, certificates: list[CandidateRows], all_ball
     n, d = drawn.design.balls.places.shape
     of_plates = np.repeat(np.isin(np.arange(n), drawn.design.plate_balls), d)
     every, most = np.eye(n * d)[:, of_plates], int(of_plates.sum())
-    found = _Span(
+    span = _Span(
         _motions(drawn.design).reshape(n * d, -1),
         keeps=any(rows.frame for rows in certificates),
     )
     if all_balls:
-        found.add(every)
+        span.add(every)
     for rows in certificates:
-        found.add(_by_balls(rows, np.eye(len(rows)), n) if len(rows) <= n * d else every)
+        span.add(_by_balls(rows, np.eye(len(rows)), n) if len(rows) <= n * d else every)
     kinds: dict[bytes, Array] = {}
     for rows in position_rows(drawn):
-        if found.rank >= most:
+        if span.rank >= most:
             break
-        found.add(_by_balls(rows, np.concatenate([rows.by_shared, STEP * rows.by_pose], axis=1), n))
+        span.add(_by_balls(rows, np.concatenate([rows.by_shared, STEP * rows.by_pose], axis=1), n))
         kind = _kind(rows, n)
         kinds.setdefault(kind.round(9).tobytes(), kind)
         if len(kinds) > MOST_KINDS:
-            found.add(every)
+            span.add(every)
     grown = -1
-    while grown != found.rank and found.rank < most:
-        grown = found.rank
+    while grown != span.rank and span.rank < most:
+        grown = span.rank
         for kind in kinds.values():
-            found.add(
-                np.einsum("nij,njy->niy", kind, found.vectors.reshape(n, d, -1)).reshape(n * d, -1)
+            span.add(
+                np.einsum("nij,njy->niy", kind, span.vectors.reshape(n, d, -1)).reshape(n * d, -1)
             )
-    return found.vectors.reshape(n, d, -1)
+    return span.vectors.reshape(n, d, -1)
 
 
 def _by_balls(rows: CandidateRows, columns: Array, n: int) -> Array:
@@ -457,13 +457,13 @@ class _Span:
         if not columns.shape[1]:
             return
         vectors, values, _ = np.linalg.svd(columns, full_matrices=False)
-        found = self._new(vectors[:, values > ROUNDING * self._largest])
-        if found.shape[1]:
-            self.vectors = np.concatenate([self.vectors, np.linalg.qr(found)[0]], axis=1)
+        new_vectors = self._new(vectors[:, values > ROUNDING * self._largest])
+        if new_vectors.shape[1]:
+            self.vectors = np.concatenate([self.vectors, np.linalg.qr(new_vectors)[0]], axis=1)
 
     def _new(self, columns: Array) -> Array:
-        for known in (self._without, self.vectors, self._without, self.vectors):
-            columns = columns - known @ (known.T @ columns)
+        for basis in (self._without, self.vectors, self._without, self.vectors):
+            columns = columns - basis @ (basis.T @ columns)
         return columns
 
 
@@ -480,36 +480,36 @@ def _basis(
     for some in _batches(every if even is None else even, 4 * (y + shared)):
         triangle = np.asarray(np.linalg.qr(np.concatenate([triangle, *some]), mode="r"))
     triangle = np.concatenate([triangle, np.zeros((y + shared, y + shared))])[: y + shared]
-    left, of_balls, by_balls = np.linalg.svd(triangle[:y, :y])
-    kept = of_balls > EXACT * of_balls.max(initial=0.0)
+    decomposition, of_balls, by_balls = np.linalg.svd(triangle[:y, :y])
+    is_read = of_balls > EXACT * of_balls.max(initial=0.0)
     # What balls leave of the rows above belongs to shared columns.
-    below = np.concatenate([left[:, ~kept].T @ triangle[:y, y:], triangle[y:, y:]])
+    below = np.concatenate([decomposition[:, ~is_read].T @ triangle[:y, y:], triangle[y:, y:]])
     _, values, right = np.linalg.svd(below, full_matrices=True)
     values = np.concatenate([values, np.zeros(shared - len(values))])
     # Where balls take up all of them, the largest that is left is rounding, too.
-    known = values > EXACT * np.linalg.norm(triangle[:, y:])
-    ball_open, open_ = by_balls[~kept].T, right[~known].T
+    is_known = values > EXACT * np.linalg.norm(triangle[:, y:])
+    ball_open, open_ = by_balls[~is_read].T, right[~is_known].T
     if even is None:
-        ball_root = by_balls[kept].T / of_balls[kept]
-        ball_shared = ball_root @ left[:, kept].T @ triangle[:y, y:]
+        ball_root = by_balls[is_read].T / of_balls[is_read]
+        ball_shared = ball_root @ decomposition[:, is_read].T @ triangle[:y, y:]
         return (
             InformationBasis(
-                balls, ball_root, ball_shared, right[known].T / values[known], ball_open
+                balls, ball_root, ball_shared, right[is_known].T / values[is_known], ball_open
             ),
             open_,
         )
-    collected = Collected(int(kept.sum()), shared)
+    collected = Collected(int(is_read.sum()), shared)
     for rows in every:
-        collected.add(np.concatenate([rows[:, :y] @ by_balls[kept].T, rows[:, y:]], axis=1))
-    found = collected.found()
-    ball_root = by_balls[kept].T @ _inverse(found)
-    of_shared = triangular(found.rest @ right[known].T, np.zeros((len(found.rest), 0)))
+        collected.add(np.concatenate([rows[:, :y] @ by_balls[is_read].T, rows[:, y:]], axis=1))
+    combined = collected.found()
+    ball_root = by_balls[is_read].T @ _inverse(combined)
+    of_shared = triangular(combined.rest @ right[is_known].T, np.zeros((len(combined.rest), 0)))
     return (
         InformationBasis(
             balls,
             ball_root,
-            ball_root @ found.side,
-            right[known].T @ _inverse(of_shared),
+            ball_root @ combined.side,
+            right[is_known].T @ _inverse(of_shared),
             ball_open,
         ),
         open_,
@@ -538,8 +538,8 @@ def _batches(every: list[Array], size: int) -> Iterator[list[Array]]:
 def _placing(candidates: Sequence[Candidate], artefact: str) -> tuple[int, ...]:
     return tuple(
         k
-        for k, one in enumerate(candidates)
-        if isinstance(one.item, Position) and one.item.artefact == artefact
+        for k, candidate in enumerate(candidates)
+        if isinstance(candidate.item, Position) and candidate.item.artefact == artefact
     )
 
 
@@ -553,15 +553,15 @@ def _unplaced(
     """For each artefact, which candidates place it, and what holds the parameters that are its
     own.
     """
-    design, found = drawn.design, []
+    design, unplaced = drawn.design, []
     n, d = design.balls.places.shape
     for number, name in enumerate(design.artefacts.names):
         if all_balls and design.artefacts.is_plate[number] and _placing(candidates, name):
             continue
         # A standard of which no length has been read is not there.
         placing = frozenset(k for k in _placing(candidates, name) if has_rows[k])
-        own = design.balls.of(number)
-        by_ball = basis.balls[own].reshape(len(own) * d, -1)
+        balls = design.balls.of(number)
+        by_ball = basis.balls[balls].reshape(len(balls) * d, -1)
         # Of balls that no combination moves there is nothing to hold, and rounding must not be
         # taken for it.
         by_ball = by_ball[np.abs(by_ball).max(axis=1, initial=0.0) > ROUNDING]
@@ -578,13 +578,13 @@ def _unplaced(
         )
         size = float(np.abs(rows).max(initial=0.0))
         if size > 0.0:
-            found.append((placing, rows.T @ rows / size**2))
-    return tuple(found)
+            unplaced.append((placing, rows.T @ rows / size**2))
+    return tuple(unplaced)
 
 
 def _frames(
     drawn: PoolDesign,
-    known: list[CandidateRows],
+    candidate_rows: list[CandidateRows],
     items: dict[int, list[CandidateRows]],
     basis: InformationBasis,
 ) -> Frames:
@@ -596,7 +596,7 @@ def _frames(
         parts = [np.einsum("md,mdk->mk", r.by_ball[:, 0], motions[r.balls[:, 0]]) for r in framed]
         return np.concatenate([np.zeros((0, motions.shape[2])), *parts])
 
-    told = {k: found for k, rows in items.items() if len(found := fixed(rows))}
+    fixed_rows = {k: fixed_part for k, rows in items.items() if len(fixed_part := fixed(rows))}
     amounts = np.einsum("ndk,ndy->ky", motions, basis.balls)
     rows = basis.rows(amounts, np.zeros((len(amounts), drawn.shared)))
-    return Frames(told, fixed(known), rows)
+    return Frames(fixed_rows, fixed(candidate_rows), rows)

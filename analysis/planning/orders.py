@@ -40,7 +40,9 @@ LEAST_CHANGE_OVER = ReadingOrder()
 Sequenced = tuple[tuple[Candidate, tuple[str, ...]], ...]
 
 
-def in_order(own: Sequence[Candidate], changes: ChangeTimes, order: ReadingOrder) -> Sequenced:
+def in_order(
+    candidates: Sequence[Candidate], changes: ChangeTimes, order: ReadingOrder
+) -> Sequenced:
     """Positions mirrored or random in blocks, their probes in the order that costs least, or all in
     a stated sequence.
 
@@ -49,10 +51,10 @@ def in_order(own: Sequence[Candidate], changes: ChangeTimes, order: ReadingOrder
     position of each kind that is left, in random order.
     """
     if order.sequence:
-        by_name = {candidate.name: candidate for candidate in own}
+        by_name = {candidate.name: candidate for candidate in candidates}
         return tuple((by_name[name], probes) for name, probes in order.sequence)
     kinds: dict[Setup, list[Candidate]] = {}
-    for candidate in own:
+    for candidate in candidates:
         kinds.setdefault(kind_of(candidate), []).append(candidate)
     if order.name == "blocks":
         return with_probes(_blocks(list(kinds.values()), order.seed), changes)
@@ -83,11 +85,11 @@ def _blocks(groups: Sequence[Sequence[Candidate]], seed: int) -> list[Candidate]
     """Blocks of one of each group that is left, in random order; so is the order in a group."""
     generator = np.random.default_rng(np.random.SeedSequence(seed))
     mixed = [[some[k] for k in generator.permutation(len(some))] for some in groups]
-    found = []
+    blocks = []
     for block in zip_longest(*mixed):
         here = [candidate for candidate in block if candidate is not None]
-        found += [here[k] for k in generator.permutation(len(here))]
-    return found
+        blocks += [here[k] for k in generator.permutation(len(here))]
+    return blocks
 
 
 def with_probes(sequence: Sequence[Candidate], changes: ChangeTimes) -> Sequenced:
@@ -99,7 +101,7 @@ def with_probes(sequence: Sequence[Candidate], changes: ChangeTimes) -> Sequence
     for k, candidate in enumerate(sequence):
         assert isinstance(candidate.item, Position)
         probes = candidate.item.probes
-        found: dict[str, tuple[float, tuple[tuple[str, ...], ...]]] = {}
+        cheapest: dict[str, tuple[float, tuple[tuple[str, ...], ...]]] = {}
         for first in probes:
             before = min(
                 (
@@ -112,9 +114,9 @@ def with_probes(sequence: Sequence[Candidate], changes: ChangeTimes) -> Sequence
                 if (first == last) != (len(probes) == 1):
                     continue
                 between = tuple(probe for probe in probes if probe not in (first, last))
-                own = (first,) if len(probes) == 1 else (first, *between, last)
-                if k == 0 or last not in found or before[0] < found[last][0]:
-                    found[last] = (before[0], (*before[2], own))
-        states = found
-    _, orders = min(states.values(), key=lambda one: one[0], default=(0.0, ()))
+                probe_order = (first,) if len(probes) == 1 else (first, *between, last)
+                if k == 0 or last not in cheapest or before[0] < cheapest[last][0]:
+                    cheapest[last] = (before[0], (*before[2], probe_order))
+        states = cheapest
+    _, orders = min(states.values(), key=lambda state: state[0], default=(0.0, ()))
     return tuple(zip(sequence, orders, strict=True))

@@ -55,7 +55,14 @@ class Offer:
     @property
     def standing(self) -> Interrupted | None:
         """The interrupted position that may be completed."""
-        return next((one for one in self.interrupted if one.rest is not None), None)
+        return next(
+            (
+                interrupted_position
+                for interrupted_position in self.interrupted
+                if interrupted_position.rest is not None
+            ),
+            None,
+        )
 
     @property
     def weighed(self) -> tuple[list[Candidate], dict[int, int]]:
@@ -63,25 +70,25 @@ class Offer:
         that is.
         """
         candidates, completed = list(self.candidates), {}
-        for one in self.interrupted:
-            if one.rest is not None:
-                candidates[one.rest] = one.whole
-                completed[one.rest] = one.part
+        for interrupted_position in self.interrupted:
+            if interrupted_position.rest is not None:
+                candidates[interrupted_position.rest] = interrupted_position.whole
+                completed[interrupted_position.rest] = interrupted_position.part
         return candidates, completed
 
     def together(self, chosen: Sequence[int]) -> list[Candidate]:
         """Chosen candidates in order, a position that is completed as one, those left interrupted
         at the end.
         """
-        found = {k: self.candidates[k] for k in chosen}
-        for one in self.interrupted:
-            part = found.pop(one.part)
-            if one.rest is not None and one.rest in found:
-                del found[one.rest]
-                found[one.part] = one.whole
+        by_index = {k: self.candidates[k] for k in chosen}
+        for interrupted_position in self.interrupted:
+            part = by_index.pop(interrupted_position.part)
+            if interrupted_position.rest is not None and interrupted_position.rest in by_index:
+                del by_index[interrupted_position.rest]
+                by_index[interrupted_position.part] = interrupted_position.whole
             else:
-                found[len(self.candidates) + one.part] = part
-        return [found[k] for k in sorted(found)]
+                by_index[len(self.candidates) + interrupted_position.part] = part
+        return [by_index[k] for k in sorted(by_index)]
 
     def begun(self, experiment: Experiment) -> dict[str, tuple[int, ...]]:
         """Plates of which some balls alone have been read, and the candidates that read all the
@@ -92,32 +99,36 @@ class Offer:
             balls.setdefault(self.candidates[k].item.artefact, set()).update(
                 _balls(self.candidates[k])
             )
-        found = {}
+        begun_by = {}
         for name in dict.fromkeys(
-            self.candidates[one.part].item.artefact for one in self.interrupted
+            self.candidates[candidate.part].item.artefact for candidate in self.interrupted
         ):
             unread = set(range(len(experiment.layouts[name].names))) - balls[name]
             if unread and experiment.artefacts[name].role == "plate":
-                found[name] = tuple(
+                begun_by[name] = tuple(
                     k
-                    for k, one in enumerate(self.candidates)
-                    if k not in self.done and one.item.artefact == name and unread <= _balls(one)
+                    for k, candidate in enumerate(self.candidates)
+                    if k not in self.done
+                    and candidate.item.artefact == name
+                    and unread <= _balls(candidate)
                 )
-        return found
+        return begun_by
 
     def without_begun(self, experiment: Experiment) -> Offer:
         """The offer as if nothing had been read in part of plates that were only begun."""
         plates = self.begun(experiment)
         if not plates:
             return self
-        left = [
-            one for one in self.taken if one.rest is None or one.read.item.artefact not in plates
+        set_ups = [
+            set_up
+            for set_up in self.taken
+            if set_up.rest is None or set_up.read.item.artefact not in plates
         ]
-        return offer(self.pool, left, self.is_standing, self.names)
+        return offer(self.pool, set_ups, self.is_standing, self.names)
 
     def find(self, names: Sequence[str]) -> list[int]:
         """Candidates by name, or those of the pool that they go back to."""
-        index = {one.name: k for k, one in enumerate(self.candidates)}
+        index = {candidate.name: k for k, candidate in enumerate(self.candidates)}
         bases = [index.get(name, index.get(base_name(name.removeprefix(REST)))) for name in names]
         return sorted({k for k in bases if k is not None})
 
@@ -132,9 +143,9 @@ class Offer:
 
 def offer(
     pool: Pool,
-    taken: Sequence[SetUp] = (),
+    set_ups: Sequence[SetUp] = (),
     standing: bool = True,
-    known: Mapping[str, str] | None = None,
+    known_names: Mapping[str, str] | None = None,
 ) -> Offer:
     """What may be chosen from a pool after some set-ups have been read.
 
@@ -143,19 +154,19 @@ def offer(
     """
     candidates = list(pool.candidates)
     index: dict[str, int] = {}
-    for one in taken:
-        index[one.name] = one.base
-        if one.name == pool.candidates[one.base].name:
-            candidates[one.base] = one.read
+    for candidate in set_ups:
+        index[candidate.name] = candidate.base
+        if candidate.name == pool.candidates[candidate.base].name:
+            candidates[candidate.base] = candidate.read
         else:
-            index[one.name] = len(candidates)
-            candidates.append(one.read)
-    names = [one.name for one in candidates]
+            index[candidate.name] = len(candidates)
+            candidates.append(candidate.read)
+    names = [candidate.name for candidate in candidates]
     interrupted: list[Interrupted] = []
     replaced: dict[int, tuple[int, ...]] = {}
-    for base in dict.fromkeys(one.base for one in taken):
-        own = [one for one in taken if one.base == base]
-        complete = [index[one.name] for one in own if one.rest is None]
+    for base in dict.fromkeys(candidate.base for candidate in set_ups):
+        of_base = [candidate for candidate in set_ups if candidate.base == base]
+        complete = [index[candidate.name] for candidate in of_base if candidate.rest is None]
         if complete:
             replaced[base] = (
                 (complete[0],)
@@ -170,30 +181,34 @@ def offer(
             again = len(candidates)
             candidates.append(renamed(pool.candidates[base], name))
         replaced[base] = (again,)
-        for one in own:
-            rest = None
-            if standing and one.is_last and one.rest is not None:
-                rest = len(candidates)
-                candidates.append(one.rest)
-                replaced[base] = (rest, again)
-            interrupted.append(Interrupted(index[one.name], rest, again, one.whole))
-    done = tuple(index[one.name] for one in taken)
-    left = [replaced.get(k, (k,)) for k in pool.must]
+        for candidate in of_base:
+            rest_index = None
+            if standing and candidate.is_last and candidate.rest is not None:
+                rest_index = len(candidates)
+                candidates.append(candidate.rest)
+                replaced[base] = (rest_index, again)
+            interrupted.append(
+                Interrupted(index[candidate.name], rest_index, again, candidate.whole)
+            )
+    done_indices = tuple(index[candidate.name] for candidate in set_ups)
+    must = [replaced.get(k, (k,)) for k in pool.must]
     return Offer(
         tuple(candidates),
-        done,
-        tuple(one[0] for one in left if len(one) == 1),
+        done_indices,
+        tuple(candidate[0] for candidate in must if len(candidate) == 1),
         tuple(
-            AtMost(tuple(m for k in one.members for m in replaced.get(k, (k,))), one.count)
-            for one in pool.at_most
+            AtMost(
+                tuple(m for k in candidate.members for m in replaced.get(k, (k,))), candidate.count
+            )
+            for candidate in pool.at_most
         ),
-        tuple(one for one in left if len(one) > 1),
+        tuple(candidate for candidate in must if len(candidate) > 1),
         tuple(interrupted),
         replaced,
         pool,
-        tuple(taken),
+        tuple(set_ups),
         standing,
-        known or {},
+        known_names or {},
     )
 
 
@@ -204,13 +219,25 @@ def open_directions(offered: Offer, information: Information, chosen: Collection
     These are parameters that nothing else depends on: of a pose that too few balls were read in,
     and the unknown length of a standard of which no length was read.
     """
-    left = [one for one in offered.interrupted if one.rest is None or one.rest not in chosen]
+    unfinished = [
+        interrupted_position
+        for interrupted_position in offered.interrupted
+        if interrupted_position.rest is None or interrupted_position.rest not in chosen
+    ]
     ranks, design = information.pose_ranks, information.drawn.design
-    poses = sum(max(ranks[one.again] - ranks[one.part], 0) for one in left)
-    placed = {offered.candidates[one.part].item.artefact for one in left}
-    told = {offered.candidates[k].item.artefact for k in chosen if information.has_rows[k]}
+    poses = sum(
+        max(ranks[interrupted_position.again] - ranks[interrupted_position.part], 0)
+        for interrupted_position in unfinished
+    )
+    placed = {
+        offered.candidates[interrupted_position.part].item.artefact
+        for interrupted_position in unfinished
+    }
+    read_artefacts = {
+        offered.candidates[k].item.artefact for k in chosen if information.has_rows[k]
+    }
     standards = [design.artefacts.names[k] for k in design.unknown_lengths.artefact]
-    return poses + sum(name in placed - told for name in standards)
+    return poses + sum(name in placed - read_artefacts for name in standards)
 
 
 def _balls(candidate: Candidate) -> set[int]:

@@ -33,7 +33,10 @@ def sheet_lines(sheet: RunSheet) -> list[str]:
         for number, step in enumerate(sheet.steps, 1)
         if not step.done
     ]
-    lines += [f"calibration {one.name}: {price(one.seconds)}" for one in sheet.calibration]
+    lines += [
+        f"calibration {calibration.name}: {price(calibration.seconds)}"
+        for calibration in sheet.calibration
+    ]
     return [in_one_line(line) for line in (*lines, summary(sheet))]
 
 
@@ -56,7 +59,10 @@ def sheet_data(sheet: RunSheet) -> dict[str, Any]:
             }
             for step in sheet.steps
         ],
-        "calibration": [{"name": one.name, "seconds": one.seconds} for one in sheet.calibration],
+        "calibration": [
+            {"name": calibration.name, "seconds": calibration.seconds}
+            for calibration in sheet.calibration
+        ],
         "seconds": sheet.seconds if sheet.timed else None,
         "above_least_change_seconds": sheet.gap if sheet.timed else None,
     }
@@ -65,7 +71,7 @@ def sheet_data(sheet: RunSheet) -> dict[str, Any]:
 def summary(sheet: RunSheet) -> str:
     """What there is to do, in a sentence."""
     todo = [step for step in sheet.steps if not step.done]
-    done = len(sheet.steps) - len(todo)
+    done_count = len(sheet.steps) - len(todo)
     words = [
         number_of(len(todo), "position"),
         number_of(sum(step.readings for step in todo), "reading"),
@@ -80,7 +86,7 @@ def summary(sheet: RunSheet) -> str:
         text += f", including change-over {change / 3600.0:.2f} h" if change else ""
         more = f" (at most {sheet.gap / 60.0:.1f} min more than the least of any order)"
         text += more if sheet.gap > SLACK else ""
-    return f"{text}; {number_of(done, 'position')} done before" if done else text
+    return f"{text}; {number_of(done_count, 'position')} done before" if done_count else text
 
 
 def times(step: Step) -> tuple[str, str]:

@@ -117,8 +117,8 @@ class RunSheet:
         """
         todo = [step for step in self.steps if not step.done]
         sequence = tuple((step.candidate, step.probes) for step in todo)
-        found = first_readings(sequence, self.changes)
-        return {step.name: start for step, start in zip(todo, found, strict=True)}
+        steps = first_readings(sequence, self.changes)
+        return {step.name: start for step, start in zip(todo, steps, strict=True)}
 
     @property
     def written(self) -> tuple[Candidate, ...]:
@@ -127,7 +127,7 @@ class RunSheet:
             step.position.name: with_short_name(step.position, step.name, step.probes)
             for step in self.steps
         }
-        return tuple(named.get(one.name, one) for one in self.chosen)
+        return tuple(named.get(candidate.name, candidate) for candidate in self.chosen)
 
     @property
     def seconds(self) -> float:
@@ -135,7 +135,7 @@ class RunSheet:
         calibration.
         """
         of_positions = sum(step.seconds + step.change_seconds for step in self.steps)
-        return of_positions + sum(one.seconds for one in self.calibration)
+        return of_positions + sum(calibration.seconds for calibration in self.calibration)
 
     @property
     def hours(self) -> float:
@@ -146,7 +146,7 @@ class RunSheet:
 def run_sheet(
     chosen: Sequence[Candidate],
     changes: ChangeTimes,
-    done: Sequence[Candidate] = (),
+    done_candidates: Sequence[Candidate] = (),
     completed: Completion | None = None,
     interrupted: Collection[Candidate] = (),
     names: Mapping[str, str] | None = None,
@@ -161,11 +161,17 @@ def run_sheet(
     else is `interrupted` stays as it is. `names` are short names by those of candidates.
     """
     again = set() if completed is None else {completed.whole.name}
-    before = [one for one in done if isinstance(one.item, Position) and one.name not in again]
+    before = [
+        listed_candidate
+        for listed_candidate in done_candidates
+        if isinstance(listed_candidate.item, Position) and listed_candidate.name not in again
+    ]
     earlier = {candidate.name for candidate in before} | again
-    left = {one.name for one in interrupted} - again
+    interrupted_names = {listed_candidate.name for listed_candidate in interrupted} - again
     positions = [
-        one for one in chosen if isinstance(one.item, Position) and one.name not in earlier
+        listed_candidate
+        for listed_candidate in chosen
+        if isinstance(listed_candidate.item, Position) and listed_candidate.name not in earlier
     ]
     first = None if completed is None else completed.rest
     if order.name == "change-over":
@@ -186,7 +192,7 @@ def run_sheet(
             whole = completed.whole
             place = f"as it stands: {place}"
             balls = f"the rest, {candidate.readings} of {whole.readings} readings: {balls}"
-        is_left = is_done and candidate.name in left
+        is_left = is_done and candidate.name in interrupted_names
         balls += "; left so" if is_left else ""
         steps.append(
             Step(
@@ -207,7 +213,11 @@ def run_sheet(
         elapsed += change + seconds
     return RunSheet(
         tuple(steps),
-        tuple(one for one in chosen if not isinstance(one.item, Position)),
+        tuple(
+            listed_candidate
+            for listed_candidate in chosen
+            if not isinstance(listed_candidate.item, Position)
+        ),
         changes=changes,
         gap=gap,
     )
@@ -215,39 +225,41 @@ def run_sheet(
 
 def first_readings(sequence: Sequenced, changes: ChangeTimes) -> list[float]:
     """When the first reading of each position in a sequence begins, in seconds."""
-    found, elapsed = [], 0.0
+    best, elapsed = [], 0.0
     for k, (candidate, probes) in enumerate(sequence):
         elapsed += change_over(sequence[k - 1], sequence[k], changes)[0] if k else 0.0
         elapsed += candidate.seconds
-        taken = (len(probes) - 1) * changes.probe + candidate.readings * candidate.reading_seconds
-        found.append(elapsed - min(taken, candidate.seconds))
-    return found
+        seconds_taken = (
+            len(probes) - 1
+        ) * changes.probe + candidate.readings * candidate.reading_seconds
+        best.append(elapsed - min(seconds_taken, candidate.seconds))
+    return best
 
 
 def change_over(
-    one: tuple[Candidate, tuple[str, ...]],
-    other: tuple[Candidate, tuple[str, ...]],
+    from_visit: tuple[Candidate, tuple[str, ...]],
+    to_visit: tuple[Candidate, tuple[str, ...]],
     changes: ChangeTimes,
 ) -> tuple[float, str]:
     """Seconds of the change from one position to another, and what is changed in words."""
-    before, after = kind_of(one[0]), kind_of(other[0])
+    before, after = kind_of(from_visit[0]), kind_of(to_visit[0])
     words = []
     if before.artefact != after.artefact:
         words.append(f"artefact: {after.artefact}")
     if before.plane != after.plane:
         words.append(f"plane: across {after.plane}" if after.plane else "plane: free")
     seconds = changes.plane if words else 0.0
-    if one[1][-1] != other[1][0]:
-        words.append(f"probe: {other[1][0]}")
+    if from_visit[1][-1] != to_visit[1][0]:
+        words.append(f"probe: {to_visit[1][0]}")
         seconds += changes.probe
     return seconds, ", ".join(words)
 
 
 def place_words(candidate: Candidate) -> str:
     """How the artefact is set up, in words; lengths are those of the file."""
-    said: Mapping[str, Any] = candidate.settings
-    if said.get("pose") is not None:
-        pose = said["pose"]
+    settings: Mapping[str, Any] = candidate.settings
+    if settings.get("pose") is not None:
+        pose = settings["pose"]
         rotation = pose.get("rotation")
         turned = "not turned"
         if rotation is not None:
@@ -261,15 +273,16 @@ def place_words(candidate: Candidate) -> str:
             f"origin of the artefact at {_at(dict(zip('xyz', pose['origin'], strict=False)))},"
             f" {turned}"
         )
-    plane = said.get("plane")
+    plane = settings.get("plane")
     words = []
     if plane is not None:
         words.append(
-            f"{'flat' if plane == 'z' else 'upright'}, across {plane} at {plane} = {said['level']}"
+            f"{'flat' if plane == 'z' else 'upright'}, across {plane}"
+            f" at {plane} = {settings['level']}"
         )
-    anchor = "corner" if said.get("corner") is not None else "centre"
-    words.append(f"{'lower corner' if anchor == 'corner' else 'centre'} at {_at(said[anchor])}")
-    turns = int(said.get("quarter_turns") or 0) % 4
+    anchor = "corner" if settings.get("corner") is not None else "centre"
+    words.append(f"{'lower corner' if anchor == 'corner' else 'centre'} at {_at(settings[anchor])}")
+    turns = int(settings.get("quarter_turns") or 0) % 4
     words.append(
         f"turned {90 * turns} deg counter-clockwise seen from +{plane or 'z'}"
         if turns
@@ -286,11 +299,14 @@ def ball_words(candidate: Candidate) -> str:
     """Which balls are read, in words; with several groups of readings, by which probes."""
     assert isinstance(candidate.item, Position)
     groups = candidate.item.readings
-    stated: Sequence[Any] = candidate.settings.get("readings") or [candidate.settings]
+    reading_settings: Sequence[Any] = candidate.settings.get("readings") or [candidate.settings]
     words = []
     for k, group in enumerate(groups):
         # Of what is done, other readings may have been taken than the file says.
-        is_all = len(stated) == len(groups) and stated[k].get("balls") in (None, "all")
+        is_all = len(reading_settings) == len(groups) and reading_settings[k].get("balls") in (
+            None,
+            "all",
+        )
         text = f"all {len(group.balls)}" if is_all else listing(group.balls, 50)
         text += f", {group.repeats} times each" if group.repeats > 1 else ""
         words.append(f"{text} with {', '.join(group.probes)}" if len(groups) > 1 else text)
@@ -300,7 +316,7 @@ def ball_words(candidate: Candidate) -> str:
 def ordered(
     chosen: Sequence[Candidate],
     changes: ChangeTimes,
-    done: Sequence[Candidate] = (),
+    done_candidates: Sequence[Candidate] = (),
     first: Candidate | None = None,
 ) -> tuple[Sequenced, float]:
     """Positions, those `done` first, in the order that costs least change-over, each with the order
@@ -309,24 +325,29 @@ def ordered(
     Positions of equal kind keep the order they are given in. Of those that are not done, one may
     have to be `first`.
     """
-    own = [candidate for candidate in chosen if isinstance(candidate.item, Position)]
-    after = first if first is not None else done[-1] if done else None
+    positions = [candidate for candidate in chosen if isinstance(candidate.item, Position)]
+    after = first if first is not None else done_candidates[-1] if done_candidates else None
     order = cheapest(
-        Counter(map(kind_of, own)).items(),
+        Counter(map(kind_of, positions)).items(),
         changes,
         None if after is None else kind_of(after),
         is_paid=first is not None,
     )
-    found = [(one, one.item.probes) for one in done if isinstance(one.item, Position)]
+    visits = [
+        (visited, visited.item.probes)
+        for visited in done_candidates
+        if isinstance(visited.item, Position)
+    ]
     if first is not None:
-        found.append((first, _ending_with(first, order.before)))
+        visits.append((first, _ending_with(first, order.before)))
     members: dict[Setup, Iterator[Candidate]] = {
-        kind: iter([one for one in own if kind_of(one) == kind]) for kind in set(map(kind_of, own))
+        kind: iter([visited for visited in positions if kind_of(visited) == kind])
+        for kind in set(map(kind_of, positions))
     }
     for visit in order.visits:
         candidate = next(members[visit.kind])
-        found.append((candidate, _sequence(candidate, visit.first, visit.last)))
-    return tuple(found), order.seconds - order.bound
+        visits.append((candidate, _sequence(candidate, visit.first, visit.last)))
+    return tuple(visits), order.seconds - order.bound
 
 
 def _ending_with(candidate: Candidate, last: str | None) -> tuple[str, ...]:

@@ -71,7 +71,7 @@ class SelectionProblem:
 
     def lacking(self, chosen: Collection[int]) -> list[tuple[int, ...]]:
         """Sets of candidates of which one has to be chosen, and none is."""
-        return [one for one in self.limits.at_least if set(one).isdisjoint(chosen)]
+        return [at_least for at_least in self.limits.at_least if set(at_least).isdisjoint(chosen)]
 
     def value(self, root: Array) -> float:
         """The criterion where root root' is the covariance of all z."""
@@ -127,8 +127,8 @@ def value(problem: SelectionProblem, chosen: Collection[int]) -> float:
 
 
 def _inverse(triangle: Array) -> Array:
-    found: Array = scipy_linalg().lapack.dtrtri(triangle, lower=1)[0]
-    return found
+    inverse: Array = scipy_linalg().lapack.dtrtri(triangle, lower=1)[0]
+    return inverse
 
 
 def _is_deficient(inverse: Array) -> bool:
@@ -159,27 +159,27 @@ class Losses:
 
     def sieved(self, members: frozenset[int], added: Integers) -> tuple[Integers, Array]:
         """Candidates that may be the best to add to a selection, and the tangent with each."""
-        found = self._sieved.get(members)
-        if found is None:
+        losses_sieved = self._sieved.get(members)
+        if losses_sieved is None:
             information = self._problem.information.of(members)
-            found = _sieve(self._problem, information, added, self.by_pivots)
-            self._sieved[members] = found
-        return found
+            losses_sieved = _sieve(self._problem, information, added, self.by_pivots)
+            self._sieved[members] = losses_sieved
+        return losses_sieved
 
     def of(self, members: frozenset[int]) -> float:
-        found = self._known.get(members)
-        if found is None:
+        loss = self._known.get(members)
+        if loss is None:
             information = self._problem.information.of(members)
             lacking = LARGE * 2 * len(self._problem.lacking(members))
             # By the same root as the value, so that no selection counts here that has none.
             root = _ridged_root(information) if self.by_pivots else full_root(information)
             if root is None:
-                found = lacking + _in_place(information)
+                loss = lacking + _in_place(information)
             else:
-                found = lacking or self._problem.value(root)
-            found = float(comparable(found, COMPARED))
-            self._known[members] = found
-        return found
+                loss = lacking or self._problem.value(root)
+            loss = float(comparable(loss, COMPARED))
+            self._known[members] = loss
+        return loss
 
 
 def _ridged_root(information: Array) -> Array | None:
@@ -201,8 +201,8 @@ def _in_place(information: Array) -> float:
     root = np.sqrt(scale)
     sizes = np.linalg.eigvalsh(information / (root[:, None] * root))
     # What is undetermined is rounding.
-    known = np.log(np.where(sizes < UNDETERMINED, RIDGE, sizes)) + np.log(scale)
-    return float(LARGE * (1.0 + known.mean() / np.log(RIDGE)))
+    logarithms = np.log(np.where(sizes < UNDETERMINED, RIDGE, sizes)) + np.log(scale)
+    return float(LARGE * (1.0 + logarithms.mean() / np.log(RIDGE)))
 
 
 def _scale(information: Array) -> Array:
@@ -232,12 +232,12 @@ def _sieve(
     # All candidates together have the identity, up to what the base has.
     mean = (whole - problem.information.base) / len(matrices)
     root = _inverse(np.asarray(np.linalg.cholesky(_ridged(information + mean)), float)).T
-    own, (_, _, half) = problem.counted, problem.tangent(root)
+    weights, (_, _, half) = problem.counted, problem.tangent(root)
     if len(added) > SLOPED:
-        spread = root @ (root[own].T @ half)
+        spread = root @ (root[weights].T @ half)
         slope = np.tensordot(matrices, spread @ spread.T, axes=2)[added]
         added = np.sort(added[np.argsort(-comparable(slope), kind="stable")[:SLOPED]])
-    found = np.zeros(len(added))
+    losses = np.zeros(len(added))
     for start in range(0, len(added), AT_ONCE):
         some = added[start : start + AT_ONCE]
         factors = np.asarray(np.linalg.cholesky(_ridged(information + matrices[some])), float)
@@ -245,10 +245,10 @@ def _sieve(
             inverse = _inverse(factor)
             pivots = np.diagonal(factor) ** 2
             if (pivots.min() < UNDETERMINED) if by_pivots else _is_deficient(inverse):
-                found[start + k] = _in_place(information + matrices[some[k]])
+                losses[start + k] = _in_place(information + matrices[some[k]])
             else:
-                found[start + k] = ((inverse[own, own] @ half) ** 2).sum()
-    return added, found
+                losses[start + k] = ((inverse[weights, weights] @ half) ** 2).sum()
+    return added, losses
 
 
 def best_addition(
@@ -262,17 +262,17 @@ def best_addition(
     lacking = problem.lacking(members)
     if lacking:
         # What every choice needs comes first, as long as there is room for it.
-        wanted = added[np.isin(added, [k for one in lacking for k in one])]
+        wanted = added[np.isin(added, [k for needed in lacking for k in needed])]
         added = wanted if len(wanted) else added
     if not len(added):
         return None
     seconds = np.maximum(problem.constraints.seconds, 1.0)
     framed = np.isin(added, list(problem.information.frames.fixed))
     if len(added) > SMALL_POOL and not framed.any():
-        added, left = losses.sieved(members, added)
+        added, sieved = losses.sieved(members, added)
         if per_second:
-            left = (left - left.max()) / seconds[added]
-        added = added[np.argsort(comparable(left), kind="stable")[:SIEVED]]
+            sieved = (sieved - sieved.max()) / seconds[added]
+        added = added[np.argsort(comparable(sieved), kind="stable")[:SIEVED]]
     after = np.array([losses.of(members | {int(k)}) for k in added])
     gain = after - losses.of(members)
     best = int(comparable(gain / seconds[added] if per_second else gain).argmin())
@@ -298,8 +298,8 @@ def fill(
 def _filled(
     problem: SelectionProblem, members: frozenset[int], losses: Losses, per_second: bool
 ) -> frozenset[int]:
-    while (found := best_addition(problem, members, losses, per_second)) is not None:
-        addition, after = found
+    while (best := best_addition(problem, members, losses, per_second)) is not None:
+        addition, after = best
         if after >= losses.of(members) * (1 - GAIN):
             break
         members |= {addition}
@@ -326,25 +326,25 @@ def improve(
         before = members
         for gone in combinations(sorted(members - problem.constraints.must), size):
             if members.issuperset(gone):
-                left = members.difference(gone)
-                found = fill(problem, left, losses, thorough)
+                without = members.difference(gone)
+                candidates_found = fill(problem, without, losses, thorough)
                 if thorough:
                     begun = [
-                        fill(problem, left | {int(k)}, losses)
-                        for k in problem.constraints.additions(left)
+                        fill(problem, without | {int(k)}, losses)
+                        for k in problem.constraints.additions(without)
                     ]
-                    found = min([found, *begun], key=losses.of)
-                if losses.of(found) < losses.of(members) * (1 - GAIN):
-                    members = found
+                    candidates_found = min([candidates_found, *begun], key=losses.of)
+                if losses.of(candidates_found) < losses.of(members) * (1 - GAIN):
+                    members = candidates_found
         size = size + 1 if members == before else 1
     return judged(problem, members)
 
 
 def judged(problem: SelectionProblem, members: frozenset[int]) -> Found:
     """A selection with its criterion, or what compares it with other deficient ones."""
-    found = value(problem, members)
-    lack = 0.0 if np.isfinite(found) else Losses(problem).of(members)
-    return Found(tuple(sorted(members)), found, lack)
+    loss = value(problem, members)
+    lack = 0.0 if np.isfinite(loss) else Losses(problem).of(members)
+    return Found(tuple(sorted(members)), loss, lack)
 
 
 def ranked_additions(problem: SelectionProblem, chosen: Collection[int]) -> list[tuple[int, float]]:
@@ -363,7 +363,7 @@ def starts(
     random order.
     """
     must = problem.constraints.must
-    found = [must]
+    begun_sets = [must]
     generator = np.random.default_rng(np.random.SeedSequence(seed))
     orders = [
         list(ranked),
@@ -374,5 +374,5 @@ def starts(
         for k in order:
             if k not in members and problem.constraints.allows(members | {k}):
                 members |= {k}
-        found.append(members)
-    return list(dict.fromkeys(found))
+        begun_sets.append(members)
+    return list(dict.fromkeys(begun_sets))

@@ -73,9 +73,9 @@ class Campaign(Selection, Result):
         source = self.experiment.source.name
         header = f"Chosen by ballplate plan from {source}: {self.criterion}, no more"
         header += f" than {self.budget}."
-        deficiency, stated = self.left_open or None, self.experiment.expected_rank_deficiency
-        if stated == self.prediction.verdict.deficiency:
-            deficiency = stated
+        deficiency, open_expected = self.left_open or None, self.experiment.expected_rank_deficiency
+        if open_expected == self.prediction.verdict.deficiency:
+            deficiency = open_expected
         written = self.sheet.written
         return experiment_text(
             self.experiment,
@@ -158,7 +158,7 @@ class Campaign(Selection, Result):
             "chosen": _names(self.chosen),
             "names": dict(self.names),
             "done": _names(self.done),
-            "interrupted": [picked(one, "name", "readings") for one in self.interrupted],
+            "interrupted": [picked(position, "name", "readings") for position in self.interrupted],
             "completed": self.completed and self.completed.whole.name,
             "left_open": self.left_open,
             "whole_pool": self.gap and self.gap.to_dict(),
@@ -198,16 +198,17 @@ class Campaign(Selection, Result):
 
 def _interrupted(campaign: Campaign) -> list[str]:
     """What becomes of positions that were read in part."""
-    names = {one.name for one in campaign.chosen}
+    names = {position.name for position in campaign.chosen}
     lines = []
-    for one in campaign.interrupted:
-        text = (
-            f"{campaign.title_of(one)} was interrupted after {number_of(one.readings, 'reading')}"
-        )
-        if campaign.completed is not None and campaign.completed.whole.name == one.name:
+    for position in campaign.interrupted:
+        count = number_of(position.readings, "reading")
+        text = f"{campaign.title_of(position)} was interrupted after {count}"
+        if campaign.completed is not None and campaign.completed.whole.name == position.name:
             text += f"; {campaign.completed.rest.readings} more complete it"
         elif again := [
-            name for name in names if name != one.name and base_name(name) == base_name(one.name)
+            name
+            for name in names
+            if name != position.name and base_name(name) == base_name(position.name)
         ]:
             text += f'; it is set up again as "{again[0]}"'
         else:
@@ -219,10 +220,10 @@ def _interrupted(campaign: Campaign) -> list[str]:
             f"too little was read there to determine {count} of its pose; nothing else"
             " depends on that"
         )
-    for one in campaign.ignored:
+    for position in campaign.ignored:
         lines.append(
-            f"{one.name} is left out: nothing else worth its time reads the other balls of"
-            f" {one.item.artefact}; delete its readings from the file"
+            f"{position.name} is left out: nothing else worth its time reads the other balls of"
+            f" {position.item.artefact}; delete its readings from the file"
         )
     return lines
 

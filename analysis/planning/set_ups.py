@@ -46,17 +46,17 @@ def renamed(candidate: Candidate, name: str) -> Candidate:
     )
 
 
-def next_name(name: str, taken: Sequence[str]) -> str:
+def next_name(name: str, names_taken: Sequence[str]) -> str:
     """The name of a further set-up of a position, which nothing else has.
 
     >>> next_name("low", ["low"]), next_name("low", ["low", "low again"])
     ('low again', 'low again 2')
     """
-    found, k = f"{name} again", 1
-    while found in taken:
+    name_found, k = f"{name} again", 1
+    while name_found in names_taken:
         k += 1
-        found = f"{name} again {k}"
-    return found
+        name_found = f"{name} again {k}"
+    return name_found
 
 
 def base_name(name: str) -> str:

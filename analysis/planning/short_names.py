@@ -15,7 +15,7 @@ OF_ALL = "="
 
 
 def short_names(
-    order: Iterable[Candidate], known: Mapping[str, str], taken: Collection[str]
+    order: Iterable[Candidate], names_known: Mapping[str, str], names_taken: Collection[str]
 ) -> dict[str, str]:
     """Short names by the names of candidates, P1, P2 … by place in the order of measuring.
 
@@ -23,19 +23,19 @@ def short_names(
     they were called there. No name is `taken`, nor differs from another in capitals alone; a number
     in use is passed over, so that no number means two places.
     """
-    used = {name.casefold() for name in (*taken, *known.values())}
-    found: dict[str, str] = {}
+    used = {name.casefold() for name in (*names_taken, *names_known.values())}
+    names_found: dict[str, str] = {}
     number = 0
     for place, candidate in enumerate(order, 1):
-        if candidate.name in known:
-            found[candidate.name] = known[candidate.name]
+        if candidate.name in names_known:
+            names_found[candidate.name] = names_known[candidate.name]
         elif is_composed(candidate):
             number = max(number + 1, place)
             while f"p{number}" in used:
                 number += 1
-            found[candidate.name] = f"P{number}"
+            names_found[candidate.name] = f"P{number}"
             used.add(f"p{number}")
-    return found
+    return names_found
 
 
 def is_composed(candidate: Candidate) -> bool:
@@ -55,33 +55,33 @@ def with_short_name(candidate: Candidate, name: str, probes: tuple[str, ...]) ->
     """
     item = candidate.item
     assert isinstance(item, Position)
-    said = dict(candidate.settings)
+    settings = dict(candidate.settings)
     description = item.description
     if name != candidate.name:
         description = candidate.name
-        said = {"name": name, "description": description} | {
-            key: value for key, value in said.items() if key not in ("name", "description")
+        settings = {"name": name, "description": description} | {
+            key: value for key, value in settings.items() if key not in ("name", "description")
         }
     readings = item.readings
-    if len(readings) == 1 and said.get("probes") and set(probes) == set(readings[0].probes):
-        said["probes"] = list(probes)
+    if len(readings) == 1 and settings.get("probes") and set(probes) == set(readings[0].probes):
+        settings["probes"] = list(probes)
         readings = (replace(readings[0], probes=probes),)
     item = replace(item, name=name, description=description, readings=readings)
-    return replace(candidate, name=name, item=item, settings=said)
+    return replace(candidate, name=name, item=item, settings=settings)
 
 
 def with_names(experiment: Experiment, names: Mapping[str, str]) -> Experiment:
     """The experiment with what it says of single positions under their short names."""
     influences = tuple(
-        one.model_copy(update={"positions": renamed(stated, names)})
-        if (stated := getattr(one, "positions", None)) is not None
-        else one
-        for one in experiment.influences
+        influence.model_copy(update={"positions": renamed(old_positions, names)})
+        if (old_positions := getattr(influence, "positions", None)) is not None
+        else influence
+        for influence in experiment.influences
     )
     readings = experiment.readings
     if readings.columns is not None:
-        stated = renamed_of_all(readings.columns.position, names)
-        columns = readings.columns.model_copy(update={"position": stated})
+        old_positions = renamed_of_all(readings.columns.position, names)
+        columns = readings.columns.model_copy(update={"position": old_positions})
         readings = readings.model_copy(update={"columns": columns})
     return replace(experiment, influences=influences, readings=readings)
 
@@ -96,18 +96,18 @@ def renamed_of_all(column: str | None, names: Mapping[str, str]) -> str | None:
     return OF_ALL + names.get(name, name)
 
 
-def renamed(stated: Mapping[str, Any] | Sequence[str], names: Mapping[str, str]) -> Any:
+def renamed(settings: Mapping[str, Any] | Sequence[str], names: Mapping[str, str]) -> Any:
     """What is stated by position, or a list of positions, by short names."""
-    if isinstance(stated, Mapping):
-        return {names.get(name, name): one for name, one in stated.items()}
-    found = [names.get(name, name) for name in stated]
-    return tuple(found) if isinstance(stated, tuple) else found
+    if isinstance(settings, Mapping):
+        return {names.get(name, name): value for name, value in settings.items()}
+    new_names = [names.get(name, name) for name in settings]
+    return tuple(new_names) if isinstance(settings, tuple) else new_names
 
 
 def names_of_plan(chosen: Experiment, candidates: Collection[str]) -> dict[str, str]:
     """What the file of an earlier plan calls candidates, by their names in the pool."""
     return {
-        one.description: one.name
-        for one in chosen.positions
-        if one.description and one.name not in candidates
+        position.description: position.name
+        for position in chosen.positions
+        if position.description and position.name not in candidates
     }

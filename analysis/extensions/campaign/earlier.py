@@ -124,7 +124,7 @@ def begun(
             names = names_of_plan(before, {one.name for one in pool.candidates})
     except ExperimentError as error:
         messages += error.messages
-    offered = offer(pool, known=names)
+    offered = offer(pool, known_names=names)
     try:
         if done is not None:
             taken = done_candidates(done, experiment, names)

@@ -41,7 +41,7 @@ def annotation_lines(checked: CheckedFile, workspace: Path | None = None) -> lis
 
 def _design_lines(file: str, design: CheckedDesign, workspace: Path | None) -> list[str]:
     prediction = design.prediction
-    told = [
+    lines = [
         *verdict_lines(prediction.verdict, lengths=prediction.lengths),
         *target_lines(prediction.lengths),
         *scale_lines(prediction.scale),
@@ -52,7 +52,7 @@ def _design_lines(file: str, design: CheckedDesign, workspace: Path | None) -> l
     if design.place is None:
         # What stands before the name keeps it from being read as a command, and so does the space
         # after a hash.
-        first = "; ".join([told[0], *(line for line in told if line.startswith("warning:"))])
+        first = "; ".join([lines[0], *(line for line in lines if line.startswith("warning:"))])
         start = f"as expected: {file}: {design.prediction.label}: "
         return [
             in_one_line(f"{start}{line}").replace("##[", "# #[") for line in (first, *suggested)
@@ -61,13 +61,13 @@ def _design_lines(file: str, design: CheckedDesign, workspace: Path | None) -> l
     # The log of a run shows only the message, so that it names the place again.
     text = "\n".join(
         [
-            f"{place.file}:{place.line}:{place.column}: {prediction.label}: {told[0]}",
-            *told[1:],
+            f"{place.file}:{place.line}:{place.column}: {prediction.label}: {lines[0]}",
+            *lines[1:],
             *suggested,
         ]
     )
-    what = f"{'rank' if prediction.verdict.complaint else 'goals'} of {prediction.label}"
-    return [_error(place.file, place.line, place.column, what, text, workspace)]
+    subject = f"{'rank' if prediction.verdict.complaint else 'goals'} of {prediction.label}"
+    return [_error(place.file, place.line, place.column, subject, text, workspace)]
 
 
 def _error(file: str, line: int, column: int, title: str, text: str, workspace: Path | None) -> str:

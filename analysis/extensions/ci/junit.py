@@ -48,16 +48,16 @@ def _case(file: str, design: CheckedDesign) -> ElementTree.Element:
     case = ElementTree.Element("testcase", {"classname": file, "name": _clean(prediction.label)})
     # Outside attributes a line's end is one, and the log of a build server may take what follows
     # for a command.
-    told = [_clean(in_one_line(line)) for line in prediction.lines()]
+    lines = [_clean(in_one_line(line)) for line in prediction.lines()]
     if design.place is None:
-        ElementTree.SubElement(case, "system-out").text = "\n".join(told)
+        ElementTree.SubElement(case, "system-out").text = "\n".join(lines)
         return case
     is_rank = bool(prediction.verdict.complaint)
     message = _clean(verdict_lines(prediction.verdict)[0] if is_rank else "; ".join(design.missed))
     kind = "rank" if is_rank else "goal"
     failure = ElementTree.SubElement(case, "failure", {"type": kind, "message": message})
     place = f"{design.place.file}:{design.place.line}:{design.place.column}"
-    failure.text = "\n".join([_clean(in_one_line(place)), *told])
+    failure.text = "\n".join([_clean(in_one_line(place)), *lines])
     return case
 
 

@@ -36,13 +36,13 @@ def certificates(experiment: Experiment) -> Iterator[Change]:
             continue
         if settings.role != "plate" and not isinstance(settings, TwoSpheresSettings):
             continue
-        known = [item for item in experiment.calibration if item.artefact == name]
-        if settings.role != "plate" and known:
+        calibrations = [item for item in experiment.calibration if item.artefact == name]
+        if settings.role != "plate" and calibrations:
             continue
         like = like_distances(experiment, name)
         calibrated = {
             frozenset(pair)
-            for item in known
+            for item in calibrations
             if isinstance(item, DistanceCalibration)
             for pair in item.pairs.tolist()
         }
@@ -59,23 +59,27 @@ def better_certificates(experiment: Experiment) -> Iterator[Change]:
             continue
         for factor in (0.5, 0.1):
             better, layout = item.times_as_uncertain(factor), experiment.layout_of(item)
-            least = min(one.standard_uncertainty for one in better.certified_values(layout))
+            least = min(value.standard_uncertainty for value in better.certified_values(layout))
             if not least:
                 # What is exact cannot be calibrated better.
                 break
-            what = "radius" if isinstance(item, RadiusCalibration) else "co-ordinates"
+            quantity = "radius" if isinstance(item, RadiusCalibration) else "co-ordinates"
             words = format_length(least)
             if isinstance(better, DistanceCalibration):
-                what = f"distances ({pair_set(layout, better.pairs) or len(better.pairs)})"
+                quantity = f"distances ({pair_set(layout, better.pairs) or len(better.pairs)})"
                 assert better.standard_uncertainty is not None
                 words = length_words(better.standard_uncertainty)
-            told = (
-                f"calibrate the {what} of {item.artefact} to {words} ({factor:g} times the standard"
-                " uncertainty)"
+            change_words = (
+                f"calibrate the {quantity} of {item.artefact} to {words} ({factor:g} times the"
+                " standard uncertainty)"
             )
             apply = partial(_with_better, k=k, item=better)
             yield Change(
-                ChangeKind.CERTIFICATE, told, 1.0 / factor, frozenset({f"calibration {k}"}), apply
+                ChangeKind.CERTIFICATE,
+                change_words,
+                1.0 / factor,
+                frozenset({f"calibration {k}"}),
+                apply,
             )
 
 
@@ -83,13 +87,13 @@ def calibrated_distances(artefact: str, words: str, item: DistanceCalibration) -
     """The change of calibrating distances."""
     assert item.standard_uncertainty is not None
     u = length_words(item.standard_uncertainty)
-    told = f"calibrate the {words.replace('{}', artefact)} to {u}"
+    change_words = f"calibrate the {words.replace('{}', artefact)} to {u}"
     touched = frozenset(
         f"distance {artefact} {min(pair)} {max(pair)}" for pair in item.pairs.tolist()
     )
     return Change(
         ChangeKind.CERTIFICATE,
-        told,
+        change_words,
         float(len(item.pairs)),
         touched,
         partial(with_calibration, item=item),
@@ -99,7 +103,7 @@ def calibrated_distances(artefact: str, words: str, item: DistanceCalibration) -
 
 def like_distances(experiment: Experiment, artefact: str) -> DistanceCalibration:
     """Distances of an artefact, none yet, as certain as others of it, or else as readings."""
-    own = [
+    calibrations = [
         c
         for c in experiment.calibration
         if isinstance(c, DistanceCalibration)
@@ -107,8 +111,8 @@ def like_distances(experiment: Experiment, artefact: str) -> DistanceCalibration
         and c.standard_uncertainty not in (None, LengthFunction(0.0))
     ]
     uncertainty = (
-        own[0].standard_uncertainty
-        if own
+        calibrations[0].standard_uncertainty
+        if calibrations
         else LengthFunction(float(experiment.machine.repeatability.min()))
     )
     none, no_pairs = np.zeros(0), np.zeros((0, 2), np.intp)
@@ -139,8 +143,8 @@ def natural_distances(layout: BallLayout) -> Iterator[tuple[str, Indices]]:
         singles = [(int(i), int(j)) for i, j in np.column_stack(np.triu_indices(n, 1))[order]]
     singles += row_pairs(layout)
     for pair in dict.fromkeys(singles):
-        one, other = (layout.names[k] for k in pair)
-        yield f"distance {one}-{other} of {{}}", np.array([pair], np.intp)
+        first, second = (layout.names[k] for k in pair)
+        yield f"distance {first}-{second} of {{}}", np.array([pair], np.intp)
     for name, words in (
         ("corner sides", "four sides of {}"),
         ("corner diagonals", "two diagonals of {}"),
@@ -155,16 +159,18 @@ def row_pairs(layout: BallLayout) -> list[tuple[int, int]]:
     """Balls on the same line along x or y as an outer ball of it, no more than `MOST_DISTANCES`,
     evenly from all.
     """
-    found = []
+    chosen_pairs = []
     xy = np.round(layout.coordinates[:, :2], 9)
     for across, along in ((1, 0), (0, 1)):
         for line in np.unique(xy[:, across]):
             members = np.flatnonzero(xy[:, across] == line)
             members = members[np.argsort(xy[members, along], kind="stable")]
-            found += [(int(members[0]), int(one)) for one in members[:0:-1]]
-    if len(found) <= MOST_DISTANCES:
-        return found
-    return [found[k] for k in np.linspace(0, len(found) - 1, MOST_DISTANCES).astype(int)]
+            chosen_pairs += [(int(members[0]), int(member)) for member in members[:0:-1]]
+    if len(chosen_pairs) <= MOST_DISTANCES:
+        return chosen_pairs
+    return [
+        chosen_pairs[k] for k in np.linspace(0, len(chosen_pairs) - 1, MOST_DISTANCES).astype(int)
+    ]
 
 
 def length_words(value: LengthFunction) -> str:

@@ -94,16 +94,18 @@ def is_inside(
     lower, upper = volume.of_readings
     for group in position.readings:
         for name in group.probes:
-            read = places[group.ball_indices] - probes[name].offset
-            if (read < lower).any() or (read > upper).any():
+            centres = places[group.ball_indices] - probes[name].offset
+            if (centres < lower).any() or (centres > upper).any():
                 return False
     return True
 
 
 def with_position(experiment: Experiment, position: Position) -> Experiment:
     """The experiment with the position of that name replaced, or with it as the last one."""
-    places = tuple(position if one.name == position.name else one for one in experiment.positions)
-    if all(one.name != position.name for one in experiment.positions):
+    places = tuple(
+        position if place.name == position.name else place for place in experiment.positions
+    )
+    if all(place.name != position.name for place in experiment.positions):
         places = (*experiment.positions, position)
     return replace(experiment, positions=places)
 
@@ -143,8 +145,9 @@ def with_further(
     position = _named(experiment, name)
     same = [
         k
-        for k, one in enumerate(position.readings)
-        if np.array_equal(one.ball_indices, group.ball_indices) and one.repeats == group.repeats
+        for k, reading in enumerate(position.readings)
+        if np.array_equal(reading.ball_indices, group.ball_indices)
+        and reading.repeats == group.repeats
     ]
     groups = [*position.readings]
     if same and len(groups) == 1:
@@ -168,7 +171,7 @@ def with_repeats(experiment: Experiment, name: str, times: int) -> Experiment:
 
 
 def _named(experiment: Experiment, name: str) -> Position:
-    return next(one for one in experiment.positions if one.name == name)
+    return next(position for position in experiment.positions if position.name == name)
 
 
 def pair_set(layout: BallLayout, chosen: Indices) -> str | None:
@@ -177,8 +180,11 @@ def pair_set(layout: BallLayout, chosen: Indices) -> str | None:
     for name in (*layout.pair_sets, "all"):
         if name == "all" and len(wanted) != len(layout.names) * (len(layout.names) - 1) // 2:
             continue
-        found = pairs(layout, name)
-        if len(found) == len(wanted) and {frozenset(pair) for pair in found.tolist()} == wanted:
+        candidate_pairs = pairs(layout, name)
+        if (
+            len(candidate_pairs) == len(wanted)
+            and {frozenset(pair) for pair in candidate_pairs.tolist()} == wanted
+        ):
             return name
     return None
 
@@ -212,10 +218,10 @@ def with_artefact(
     items: list[Calibration] = []
     for item in experiment.calibration:
         if item.artefact == name:
-            found = _carried_over(item, old, new)
-            if found is None:
+            carried = _carried_over(item, old, new)
+            if carried is None:
                 return None
-            item = found
+            item = carried
         items.append(item)
     return replace(
         experiment,

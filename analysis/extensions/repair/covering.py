@@ -14,14 +14,14 @@ from .screening import SEEN, rank_of
 MOST_PAIRED = 60
 
 
-def different(additions: Sequence[Change], seen: Mapping[Change, Array]) -> list[Change]:
+def different(additions: Sequence[Change], effects: Mapping[Change, Array]) -> list[Change]:
     """The first of additions, less those that cost the same and say the same as one before."""
-    found: dict[tuple[int, float, bytes], Change] = {}
-    for one in additions:
-        said = seen[one].T @ seen[one]
-        digits = np.round(said / max(float(np.abs(said).max()), SEEN), 6) + 0.0
-        found.setdefault((one.kind, one.cost, digits.tobytes()), one)
-    return list(found.values())[:MOST_PAIRED]
+    distinct: dict[tuple[int, float, bytes], Change] = {}
+    for addition in additions:
+        gram = effects[addition].T @ effects[addition]
+        digits = np.round(gram / max(float(np.abs(gram).max()), SEEN), 6) + 0.0
+        distinct.setdefault((addition.kind, addition.cost, digits.tobytes()), addition)
+    return list(distinct.values())[:MOST_PAIRED]
 
 
 def covering_pairs(triangles: Sequence[Array]) -> list[tuple[int, int]]:
@@ -31,26 +31,28 @@ def covering_pairs(triangles: Sequence[Array]) -> list[tuple[int, int]]:
     >>> covering_pairs([x, y, x, x + y])
     [(0, 1), (1, 2)]
     """
-    found = []
-    rest = [open_of(one) for one in triangles]
+    covering = []
+    unseen_by = [open_of(addition) for addition in triangles]
     stack = np.array(triangles)
-    for i, left in enumerate(rest):
-        if not left.shape[1]:
+    for i, unseen in enumerate(unseen_by):
+        if not unseen.shape[1]:
             continue
-        others = [
-            k for k in range(i + 1, len(rest)) if rest[k].shape[1] and _may_cover(rest[k], left)
+        candidates = [
+            k
+            for k in range(i + 1, len(unseen_by))
+            if unseen_by[k].shape[1] and _may_cover(unseen_by[k], unseen)
         ]
-        found += [
+        covering += [
             (i, k)
-            for k, rank in zip(others, _ranks(stack[others] @ left), strict=True)
-            if rank == left.shape[1]
+            for k, rank in zip(candidates, _ranks(stack[candidates] @ unseen), strict=True)
+            if rank == unseen.shape[1]
         ]
-    return found
+    return covering
 
 
 def covering_set(
     additions: Sequence[Change],
-    seen: Mapping[Change, Array],
+    effects: Mapping[Change, Array],
     effort: Callable[[Change], float],
     may_be: Callable[[Sequence[Change]], bool],
 ) -> tuple[Change, ...]:
@@ -61,20 +63,22 @@ def covering_set(
     """
     if not additions:
         return ()
-    stack = np.array([seen[one] for one in additions])
+    stack = np.array([effects[addition] for addition in additions])
     k = stack.shape[2]
-    left, built = np.eye(k), list[Change]()
-    while left.shape[1]:
-        gains = _ranks(stack @ left)
-        possible = [i for i, one in enumerate(additions) if gains[i] and may_be((*built, one))]
+    state, built = np.eye(k), list[Change]()
+    while state.shape[1]:
+        gains = _ranks(stack @ state)
+        possible = [
+            i for i, addition in enumerate(additions) if gains[i] and may_be((*built, addition))
+        ]
         if not possible:
             return ()
         best = max(possible, key=lambda i, of=gains: (of[i] / effort(additions[i]), of[i]))  # type: ignore[misc]
         built.append(additions[best])
-        left = left @ open_of(stack[best] @ left)
-    for one in sorted(built, key=effort, reverse=True):
-        without = [other for other in built if other is not one]
-        if rank_of([seen[other] for other in without]) == k:
+        state = state @ open_of(stack[best] @ state)
+    for addition in sorted(built, key=effort, reverse=True):
+        without = [rival for rival in built if rival is not addition]
+        if rank_of([effects[rival] for rival in without]) == k:
             built = without
     return tuple(built)
 
@@ -85,9 +89,9 @@ def open_of(rows: Array) -> Array:
     return directions[int((values > SEEN).sum()) :].T
 
 
-def _may_cover(one: Array, other: Array) -> bool:
+def _may_cover(first: Array, second: Array) -> bool:
     """Whether what two leave open each is not too much for them to leave nothing together."""
-    return one.shape[1] + other.shape[1] <= len(one)
+    return first.shape[1] + second.shape[1] <= len(first)
 
 
 def _ranks(stack: Array) -> list[int]:

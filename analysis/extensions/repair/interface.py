@@ -34,13 +34,13 @@ def repair(path: PathLike, variant: str | None = None) -> str:
 
     ensure_path("path", path)
     text = read_text(Path(path))
-    for one in load_all(path) if variant is None else [load(path, variant)]:
-        judged = check(one).verdict
+    for experiment in load_all(path) if variant is None else [load(path, variant)]:
+        judged = check(experiment).verdict
         if not judged.deficiency:
             continue
-        found = to_write(repairs(with_pool(one)), judged)
-        if found is None:
+        chosen_repair = to_write(repairs(with_pool(experiment)), judged)
+        if chosen_repair is None:
             words = "no changes were found that determine everything"
-            raise one.refused((), words)
-        text = mended(text, Path(path), one.name, found, one.trust)
+            raise experiment.refused((), words)
+        text = mended(text, Path(path), experiment.name, chosen_repair, experiment.trust)
     return text

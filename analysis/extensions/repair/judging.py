@@ -58,16 +58,16 @@ class Examined:
     @cached_property
     def judged(self) -> Judged:
         """The summary."""
-        found, model = self.at.spectrum, self.at.layout.model
+        known_spectrum, model = self.at.spectrum, self.at.layout.model
         effect = effects(self.at)
         limit = weak_limit(self.at.design, self.experiment.target_uncertainty)
         return Judged(
-            found.deficiency,
+            known_spectrum.deficiency,
             int(above(effect, limit).sum()),
             float(effect.max(initial=0.0)),
             float(np.sqrt((effect**2).sum())),
-            float(found.values[found.rank - 1]) if found.rank else 0.0,
-            found.null[model] / found.scale[model, None],
+            float(known_spectrum.values[known_spectrum.rank - 1]) if known_spectrum.rank else 0.0,
+            known_spectrum.null[model] / known_spectrum.scale[model, None],
         )
 
 

@@ -31,15 +31,15 @@ PLACEMENT = ("plane", "level", "corner", "centre", "quarter_turns", "pose")
 READINGS = ("probes", "balls", "repeats", "standard_uncertainty", "readings")
 
 
-def to_write(found: Repairs | None, judged: Verdict, nothing_weak: bool = False) -> Repair | None:
+def to_write(repairs: Repairs | None, judged: Verdict, nothing_weak: bool = False) -> Repair | None:
     """The repair of a design that may be written without being asked about: the cheapest; None
     where none is needed, or where it repairs the design in name only.
 
     A design that leaves nothing undetermined needs one where `nothing_weak` is to be left either.
     """
-    if found is None or not found.complete or not (judged.deficiency or nothing_weak):
+    if repairs is None or not repairs.complete or not (judged.deficiency or nothing_weak):
         return None
-    cheapest = found.complete[0]
+    cheapest = repairs.complete[0]
     is_enough = judged.deficiency or not cheapest.weak
     return cheapest if is_enough and not cheapest.is_faint else None
 
@@ -56,7 +56,9 @@ def mended(
         what others refer to.
     """
     loaded = load(source, True, trust, text)
-    (experiment,) = (one for one in loaded if one.name == variant)
+    (experiment,) = (
+        loaded_experiment for loaded_experiment in loaded if loaded_experiment.name == variant
+    )
     changed = apply_all(repair.changes, experiment)
     # Nothing is left undetermined, whatever the file expected until now.
     extra = (
@@ -66,7 +68,11 @@ def mended(
     )
     extra += _taken_from_pool(experiment, repair)
     new = with_experiment(text, source, experiment, changed, repair.edits, extra)
-    (checked,) = (one for one in load(source, False, trust, new) if one.name == variant)
+    (checked,) = (
+        loaded_experiment
+        for loaded_experiment in load(source, False, trust, new)
+        if loaded_experiment.name == variant
+    )
     verdict = check(checked).verdict
     if verdict.deficiency or len(verdict.weak) > repair.weak:
         text = "the repaired file does not have the rank that was found; nothing is changed"
@@ -76,12 +82,12 @@ def mended(
 
 def _taken_from_pool(experiment: Experiment, repair: Repair) -> Iterator[TextChange]:
     """What the pool no longer offers, as it is in the experiment now."""
-    said, pool = to_python(experiment.tree).get("pool") or {}, experiment.pool
+    settings, pool = to_python(experiment.tree).get("pool") or {}, experiment.pool
     indices = [change.candidate for change in repair.changes if change.candidate >= 0]
-    taken = {pool.candidates[k].name for k in indices} if pool is not None else set()
+    in_pool = {pool.candidates[k].name for k in indices} if pool is not None else set()
     for key in ("candidates", "calibration"):
-        entries = said.get(key) or ()
-        gone = [k for k, one in enumerate(entries) if str(one.get("name")) in taken]
+        entries = settings.get(key) or ()
+        gone = [k for k, entry in enumerate(entries) if str(entry.get("name")) in in_pool]
         if gone and len(gone) == len(entries):
             yield TextChange(("pool", key), [])
             continue
@@ -107,7 +113,10 @@ def with_experiment(
     """
     before = {experiment.name: experiment}
     if experiment.name is not None:
-        before = {one.name: one for one in load(source, True, experiment.trust, text)}
+        before = {
+            variant_experiment.name: variant_experiment
+            for variant_experiment in load(source, True, experiment.trust, text)
+        }
     # A variant with more entries of a list has a list of its own, in which the others are changed.
     changes = sorted(
         [
@@ -115,13 +124,19 @@ def with_experiment(
             *extra,
         ],
         # What the pool no longer offers is left out last, so that the others keep their numbers.
-        key=lambda one: (one.steps[0] == "pool" and len(one.steps) < 4, len(one.steps)),
+        key=lambda variant_experiment: (
+            variant_experiment.steps[0] == "pool" and len(variant_experiment.steps) < 4,
+            len(variant_experiment.steps),
+        ),
     )
     new = with_text_changes(text, source, experiment.name, changes)
-    after = {one.name: one for one in load(source, True, experiment.trust, new)}
+    after = {
+        variant_experiment.name: variant_experiment
+        for variant_experiment in load(source, True, experiment.trust, new)
+    }
     others_differ = before.keys() != after.keys() or any(
-        to_python(before[name].tree) != to_python(one.tree)
-        for name, one in after.items()
+        to_python(before[name].tree) != to_python(variant_experiment.tree)
+        for name, variant_experiment in after.items()
         if name != experiment.name
     )
     written_as = after.get(experiment.name, experiment)
@@ -139,42 +154,48 @@ def with_text_changes(
     :raises ExperimentError: as `with_experiment` does.
     """
     for change in changes:
-        for one in _in_file(parse_tree(text, str(source)), variant, change):
-            text = with_changes(text, str(source), [one])
+        for path in _in_file(parse_tree(text, str(source)), variant, change):
+            text = with_changes(text, str(source), [path])
     return text
 
 
 def changes_of(experiment: Experiment, needed: Iterable[Edit]) -> Iterator[TextChange]:
     """What the experiment's own file would have to say otherwise, of a variant's its tree."""
-    said = to_python(experiment.tree)
+    experiment_settings = to_python(experiment.tree)
     places = {place.name: place for place in experiment.positions}
     needed = tuple(needed)
     if len(experiment.probes) == 1 and any(edit.steps[0] == "probes" for edit in needed):
         # With more probes than one, what a pool offers has to name its own, too.
-        offered = (said.get("pool") or {}).get("candidates") or ()
-        for k, one in enumerate(offered):
-            for i, group in enumerate(one.get("readings", [one])):
+        offered = (experiment_settings.get("pool") or {}).get("candidates") or ()
+        for k, entry in enumerate(offered):
+            for i, group in enumerate(entry.get("readings", [entry])):
                 if "probes" not in group:
-                    inner = ("readings", i) if "readings" in one else ()
+                    inner = ("readings", i) if "readings" in entry else ()
                     yield TextChange(
                         ("pool", "candidates", k, *inner, "probes"), [*experiment.probes]
                     )
     for edit in needed:
         if edit.steps[0] == "positions" and not edit.is_new:
             name = str(edit.steps[1])
-            at = next(i for i, one in enumerate(said["positions"]) if str(one["name"]) == name)
+            index = next(
+                i
+                for i, entry in enumerate(experiment_settings["positions"])
+                if str(entry["name"]) == name
+            )
             settings = position_settings(experiment, places[name])
-            steps: Steps = ("positions", at)
-            if lacks_probes(said["positions"][at]):
+            steps: Steps = ("positions", index)
+            if lacks_probes(experiment_settings["positions"][index]):
                 for group in settings.get("readings", [settings]):
                     group.pop("probes", None)
-            yield from _of_position(steps, said["positions"][at], settings, edit.value)
+            yield from _of_position(
+                steps, experiment_settings["positions"][index], settings, edit.value
+            )
         else:
             yield TextChange(edit.steps, edit.value, "append" if edit.is_new else "set")
 
 
 def _of_position(
-    steps: Steps, said: Mapping[str, Any], before: dict[str, Any], after: dict[str, Any]
+    steps: Steps, settings: Mapping[str, Any], before: dict[str, Any], after: dict[str, Any]
 ) -> Iterator[TextChange]:
     """Changes of what a file says of a position, whose settings were `before`, however it says
     them.
@@ -183,26 +204,29 @@ def _of_position(
         if {key: before.get(key) for key in group} == {key: after.get(key) for key in group}:
             continue
         for key in group:
-            if key in said and key not in after:
+            if key in settings and key not in after:
                 yield TextChange((*steps, key), kind="remove")
         for key in group:
             if key in after:
-                yield from _of_value((*steps, key), said.get(key), before.get(key), after[key])
+                yield from _of_value((*steps, key), settings.get(key), before.get(key), after[key])
 
 
-def _of_value(steps: Steps, said: Any, before: Any, after: Any) -> Iterator[TextChange]:
+def _of_value(steps: Steps, setting: Any, before: Any, after: Any) -> Iterator[TextChange]:
     """The smallest changes of a value that lead from `before` to `after`."""
-    if said is not None and before == after:
+    if setting is not None and before == after:
         return
-    forms = (said, before, after)
-    if all(isinstance(one, dict) for one in forms) and said.keys() == before.keys() == after.keys():
+    forms = (setting, before, after)
+    if (
+        all(isinstance(form, dict) for form in forms)
+        and setting.keys() == before.keys() == after.keys()
+    ):
         for key, value in after.items():
-            yield from _of_value((*steps, key), said[key], before[key], value)
+            yield from _of_value((*steps, key), setting[key], before[key], value)
         return
-    if all(isinstance(one, list | tuple) for one in forms) and len(said) == len(before):
+    if all(isinstance(form, list | tuple) for form in forms) and len(setting) == len(before):
         if len(after) == len(before):
             for i, value in enumerate(after):
-                yield from _of_value((*steps, i), said[i], before[i], value)
+                yield from _of_value((*steps, i), setting[i], before[i], value)
             return
         if after[: len(before)] == before:
             yield from (TextChange(steps, value, "append") for value in after[len(before) :])
@@ -224,20 +248,20 @@ def _in_file(root: Node, variant: str | None, change: TextChange) -> Iterator[Te
     # A new value is one for a whole entry, and cannot take one away.
     whole = change.steps[: -1 if change.kind == "remove" else 3]
     for path in overrides.items:
-        own = place_of(root, path)
-        if place[: len(own)] == own:
-            steps = ("variants", variant, path, *change.steps[len(own) :])
+        own_place = place_of(root, path)
+        if place[: len(own_place)] == own_place:
+            steps = ("variants", variant, path, *change.steps[len(own_place) :])
             yield TextChange(steps, change.value, change.kind)
             return
-        if own[: len(whole)] == tuple(map(str, whole)):
+        if own_place[: len(whole)] == tuple(map(str, whole)):
             mark = mark_of(root, ("variants", variant, path), of_key=True)
             place_text = format_path(whole)
             text = f"the repair changes {place_text}, which includes this; write it by hand"
             raise mark.refused(text, format_path(("variants", variant)))
-    said: Any = changed_data(to_python(root), change)
+    settings: Any = changed_data(to_python(root), change)
     for step in whole:
-        said = said[step]
-    yield TextChange(("variants", variant, _path_of(root, whole)), said)
+        settings = settings[step]
+    yield TextChange(("variants", variant, _path_of(root, whole)), settings)
 
 
 def _path_of(root: Node, steps: Steps) -> str:

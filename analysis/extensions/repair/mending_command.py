@@ -38,18 +38,18 @@ def with_repairs(
     path = Path(checked.file)
     repaired: set[str | None] = set()
     messages: list[Message] = []
-    told: list[str] = []
+    statuses: list[str] = []
     status = 0
     try:
         mark, text = _text(path) if checked.designs else ("", "")
         new = text
         for design in checked.designs:
-            found = _suggestions(design).repairs
-            repair = to_write(found, design.prediction.verdict, wanted.nothing_weak)
+            repairs_found = _suggestions(design).repairs
+            repair = to_write(repairs_found, design.prediction.verdict, wanted.nothing_weak)
             name = f"{path}: {design.prediction.label}"
             if repair is None:
                 if not design.prediction.verdict.deficiency:
-                    told.append(f"{name}: nothing to repair")
+                    statuses.append(f"{name}: nothing to repair")
                 continue
             try:
                 new = mended(new, path, design.variant, repair, wanted.trust(path))
@@ -57,7 +57,9 @@ def with_repairs(
                 messages += error.messages
                 continue
             repaired.add(design.variant)
-            told.append(f"{name}: {'would be ' * options.diff}repaired: {changes_in_words(repair)}")
+            statuses.append(
+                f"{name}: {'would be ' * options.diff}repaired: {changes_in_words(repair)}"
+            )
         if options.diff:
             print("".join(difference(mark + text, mark + new, str(path))), end="", flush=True)
             status, repaired = int(bool(repaired)), set()
@@ -66,7 +68,7 @@ def with_repairs(
     except ExperimentError as error:
         status = BAD_FILE
         messages += error.messages
-    for line in told if status != BAD_FILE else ():
+    for line in statuses if status != BAD_FILE else ():
         note(options, line)
     after: dict[str | None, CheckedDesign] = {}
     if repaired and not status:
@@ -78,7 +80,8 @@ def with_repairs(
         }
         messages += again.messages
     designs = tuple(
-        after.get(one.variant, _as_asked(one, options.suggest)) for one in checked.designs
+        after.get(checked_design.variant, _as_asked(checked_design, options.suggest))
+        for checked_design in checked.designs
     )
     return replace(checked, designs=designs, messages=(*checked.messages, *messages)), status
 
@@ -92,8 +95,8 @@ def _as_asked(design: CheckedDesign, with_suggestions: bool) -> CheckedDesign:
 
 def _suggestions(design: CheckedDesign) -> Suggestions:
     """What was suggested of a design; nothing where nothing was looked for."""
-    given = design.suggestions
-    return given if isinstance(given, Suggestions) else Suggestions()
+    suggestions = design.suggestions
+    return suggestions if isinstance(suggestions, Suggestions) else Suggestions()
 
 
 def _text(path: Path) -> tuple[str, str]:
@@ -136,7 +139,7 @@ def difference(text: str, new: str, file: str) -> Iterator[str]:
      b: 2
     \ No newline at end of file
     """
-    before, after = ([*_lines(one)] for one in (text, new))
+    before, after = ([*_lines(content)] for content in (text, new))
     for line in difflib.unified_diff(before, after, file, file):
         yield line if line.endswith("\n") else f"{line}\n\\ No newline at end of file\n"
 

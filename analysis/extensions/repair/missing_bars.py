@@ -31,23 +31,23 @@ def bar_reasons(design: Design, layout: SharedLayout, open_: Array) -> tuple[str
     strains = _open_strains(design, layout, open_)
     if not strains.shape[1]:
         return ()
-    found = []
+    reasons = []
     unknown = not design.of(Lengths).is_known.any()
     overall = _unit_strain(np.eye(design.dimension))
     is_free = unknown and _is_among(overall, strains)
     if is_free:
         names = " and ".join(design.unknown_lengths.names)
-        found.append(
+        reasons.append(
             f"no length is known ({names}): the overall scale of the machine is undetermined"
             " until one is calibrated"
         )
-    left = _less(strains, overall) if is_free else strains
-    missing = _what_is_missing(design, strains, left) if left.shape[1] else ""
+    unseen = _less(strains, overall) if is_free else strains
+    missing = _what_is_missing(design, strains, unseen) if unseen.shape[1] else ""
     if missing:
-        told = _told(strains, design.dimension, is_free)
+        lines = _told(strains, design.dimension, is_free)
         cure = bars_to_add(design, strains, overall if is_free else None)
-        found.append(f"{missing}: nothing determines {told}{f'; {cure}' if cure else ''}")
-    return tuple(found)
+        reasons.append(f"{missing}: nothing determines {lines}{f'; {cure}' if cure else ''}")
+    return tuple(reasons)
 
 
 def _open_strains(design: Design, layout: SharedLayout, open_: Array) -> Array:
@@ -57,7 +57,10 @@ def _open_strains(design: Design, layout: SharedLayout, open_: Array) -> Array:
     points = design.evaluation.points
     fields = relative_changes(design, layout, open_)
     basis = np.stack(
-        [points @ _matrix(one, design.dimension) for one in np.eye(_size(design.dimension))],
+        [
+            points @ _matrix(unit_strain, design.dimension)
+            for unit_strain in np.eye(_size(design.dimension))
+        ],
         2,
     )
     wanted = without_rigid_motion(points, basis)
@@ -68,47 +71,47 @@ def _open_strains(design: Design, layout: SharedLayout, open_: Array) -> Array:
     u, values, _ = np.linalg.svd(flat / np.linalg.norm(flat, axis=0), full_matrices=False)
     spanned = u[:, values > MISSING * values[0]]
     strain = wanted.reshape(len(flat), -1)
-    left = strain - spanned @ (spanned.T @ strain)
-    return _null_space(left, float(np.linalg.norm(strain, 2)))
+    unspanned = strain - spanned @ (spanned.T @ strain)
+    return _null_space(unspanned, float(np.linalg.norm(strain, 2)))
 
 
-def _what_is_missing(design: Design, strains: Array, left: Array) -> str:
+def _what_is_missing(design: Design, strains: Array, unseen: Array) -> str:
     """What all directions have in common that leaves strains open; empty where another reason must
     do.
 
     `left` is what remains of the open strains without the overall scale of a machine whose lengths
     are all unknown.
     """
-    given, d = design.of(Lengths), design.dimension
-    position = design.readings.position[given.first]
-    directions = given.direction.copy()
-    for k in np.unique(position[given.to_pivot]):
-        mine = given.to_pivot & (position == k)
+    lengths, d = design.of(Lengths), design.dimension
+    position = design.readings.position[lengths.first]
+    directions = lengths.direction.copy()
+    for k in np.unique(position[lengths.to_pivot]):
+        mine = lengths.to_pivot & (position == k)
         directions[mine] -= directions[mine].mean(axis=0)
     normals = _null_space(directions)
-    only_gauges = bool(given.to_pivot.all())
+    only_gauges = bool(lengths.to_pivot.all())
     # Any three places lie in a plane.
     few = only_gauges and np.bincount(position).max() <= d
     with_plates = bool(design.artefacts.is_plate.any())
     if with_plates:
         # What else bars would have to do, plates may do.
         normals = normals[:, [_is_among(_unit_strain(np.outer(n, n)), strains) for n in normals.T]]
-    what = "every place of the ball" if only_gauges else "every bar"
-    if given.to_pivot.any() and not only_gauges:
-        what = "every bar, and every place of a gauge's ball,"
+    subject = "every place of the ball" if only_gauges else "every bar"
+    if lengths.to_pivot.any() and not only_gauges:
+        subject = "every bar, and every place of a gauge's ball,"
     if d == 3 and normals.shape[1] == 1 and not few:
         lies = "lies in a plane parallel to" if only_gauges else "lies parallel to"
-        return f"{what} {lies} {_plane(normals[:, 0])}"
+        return f"{subject} {lies} {_plane(normals[:, 0])}"
     if d - normals.shape[1] == 1 and not few:
-        return f"{what} lies along {_axis(np.linalg.svd(directions)[2][0])}"
+        return f"{subject} lies along {_axis(np.linalg.svd(directions)[2][0])}"
     if with_plates:
         return ""
-    if left.shape[1] == 1:
+    if unseen.shape[1] == 1:
         # With an unknown length the form need not be zero, only the same.
-        form = _matrix(left[:, 0], d)
-        values = np.einsum("mi,ij,mj->m", given.direction, form, given.direction)
+        form = _matrix(unseen[:, 0], d)
+        values = np.einsum("mi,ij,mj->m", lengths.direction, form, lengths.direction)
         if np.ptp(values) < MISSING:
-            who = "every direction of the bar" if given.to_pivot.any() else "every bar"
+            who = "every direction of the bar" if lengths.to_pivot.any() else "every bar"
             return f"{who} {_quadric(form - values.mean() * np.eye(d))}"
     who = "places of the ball" if only_gauges else "bars' directions"
     return f"the {who} are too few or too similar"
@@ -127,9 +130,9 @@ def _quadric(form: Array) -> str:
         )
         return f"lies parallel to {planes[0]} or {planes[1]}"
     for i in range(len(values)):
-        others = np.delete(values, i)
-        if len(values) == 3 and abs(others[0] - others[1]) < MISSING * size:
-            angle = np.degrees(np.arctan(np.sqrt(-values[i] / others[0])))
+        remaining_values = np.delete(values, i)
+        if len(values) == 3 and abs(remaining_values[0] - remaining_values[1]) < MISSING * size:
+            angle = np.degrees(np.arctan(np.sqrt(-values[i] / remaining_values[0])))
             return f"is at {angle:.3g} deg to {_axis(vectors[:, i])}"
     return "lies on one cone"
 
@@ -148,8 +151,8 @@ def _told(strains: Array, d: int, without_one: bool) -> str:
     square = [(AXES[i].upper(), AXES[j].upper()) for i, j in pure if i < j]
     words = []
     if len(scales) == 1 and square and all(scales[0] in pair for pair in square):
-        others = [a if b == scales[0] else b for a, b in square]
-        words.append(f"the scale of {scales[0]} nor its squareness to {' and '.join(others)}")
+        axes_named = [a if b == scales[0] else b for a, b in square]
+        words.append(f"the scale of {scales[0]} nor its squareness to {' and '.join(axes_named)}")
     else:
         if scales:
             words.append(f"the {'scales' if len(scales) > 1 else 'scale'} of {listed(scales)}")
@@ -166,8 +169,8 @@ def _told(strains: Array, d: int, without_one: bool) -> str:
                 if i == j
                 else f"the squareness of {AXES[j].upper()} to {AXES[i].upper()}"
             )
-            for (i, j), one in zip(pairs, touched, strict=True)
-            if one
+            for (i, j), component in zip(pairs, touched, strict=True)
+            if component
         ]
         words.append(
             f"{'a combination' if more == 1 else f'{more} combinations'} of {listed(names)}"
@@ -179,9 +182,9 @@ def _axis(vector: Array) -> str:
     k = int(comparable(np.abs(vector)).argmax())
     if abs(vector[k]) > 1.0 - MISSING**2:
         return AXES[k]
-    told = np.where(np.abs(vector) > MISSING, vector, 0.0)
-    told *= np.sign(told[np.flatnonzero(told)[0]])
-    return f"({', '.join(f'{v + 0.0:.3g}' for v in told)})"
+    vector_shown = np.where(np.abs(vector) > MISSING, vector, 0.0)
+    vector_shown *= np.sign(vector_shown[np.flatnonzero(vector_shown)[0]])
+    return f"({', '.join(f'{v + 0.0:.3g}' for v in vector_shown)})"
 
 
 def _plane(normal: Array) -> str:
@@ -199,11 +202,11 @@ def _size(d: int) -> int:
 
 def _matrix(strain: Array, d: int) -> Array:
     """Symmetric matrix (d, d) of a strain: the coefficients of u_i u_j, i <= j, in u' S u."""
-    found = np.zeros((d, d))
+    matrix = np.zeros((d, d))
     for value, (i, j) in zip(strain, combinations_with_replacement(range(d), 2), strict=True):
-        found[i, j] += 0.5 * value
-        found[j, i] += 0.5 * value
-    return found
+        matrix[i, j] += 0.5 * value
+        matrix[j, i] += 0.5 * value
+    return matrix
 
 
 def _unit_strain(form: Array) -> Array:

@@ -46,10 +46,10 @@ def moves(experiment: Experiment) -> Iterator[Change]:
         ):
             new = moved(place, *pose)
             if is_inside(new, layout, volume, experiment.probes):
-                told = words.format(f'position "{place.name}"')
+                description = words.format(f'position "{place.name}"')
                 apply = partial(with_pose, name=place.name, pose=new.pose)
                 yield Change(
-                    ChangeKind.MOVE, told, 0.0, frozenset({f"position {place.name}"}), apply
+                    ChangeKind.MOVE, description, 0.0, frozenset({f"position {place.name}"}), apply
                 )
 
 

@@ -33,13 +33,15 @@ def offers(experiment: Experiment, is_deficient: bool = True) -> dict[ChangeKind
     else:
         makers += [(ChangeKind.CERTIFICATE, certificates), (ChangeKind.ADD_POSITION, positions)]
     makers += [(ChangeKind.ARTEFACT, more_balls), (ChangeKind.MODEL, fewer_coefficients)]
-    found: dict[ChangeKind, list[Change]] = {
-        kind: [] for kind, _ in sorted(makers, key=lambda one: one[0])
+    by_kind: dict[ChangeKind, list[Change]] = {
+        kind: [] for kind, _ in sorted(makers, key=lambda change: change[0])
     }
     placed = placed_only(experiment)
     for kind, maker in makers:
-        found[kind] += maker(experiment if kind == ChangeKind.POOL else placed)
-    return {kind: sorted(changes, key=lambda one: one.cost) for kind, changes in found.items()}
+        by_kind[kind] += maker(experiment if kind == ChangeKind.POOL else placed)
+    return {
+        kind: sorted(changes, key=lambda change: change.cost) for kind, changes in by_kind.items()
+    }
 
 
 def pool_additions(experiment: Experiment) -> Iterator[Change]:
@@ -48,30 +50,30 @@ def pool_additions(experiment: Experiment) -> Iterator[Change]:
     assert pool is not None
     order = sorted(range(len(pool.candidates)), key=lambda k: pool.candidates[k].seconds)
     for k in order:
-        one = pool.candidates[k]
-        if one.drawn or not allowed(pool, (k,)):
+        candidate = pool.candidates[k]
+        if candidate.drawn or not allowed(pool, (k,)):
             continue
         add = (
-            partial(with_position, position=one.item)
-            if isinstance(one.item, Position)
-            else partial(with_calibration, item=one.item)
+            partial(with_position, position=candidate.item)
+            if isinstance(candidate.item, Position)
+            else partial(with_calibration, item=candidate.item)
         )
-        words = f'add "{one.name}" of the pool ({duration(one.seconds)})'
+        words = f'add "{candidate.name}" of the pool ({duration(candidate.seconds)})'
         yield Change(
             ChangeKind.POOL,
             words,
-            one.seconds,
+            candidate.seconds,
             frozenset({f"candidate {k}"}),
             add,
-            one.item,
+            candidate.item,
             candidate=k,
         )
 
 
 def allowed(pool: Pool, chosen: tuple[int, ...]) -> bool:
     """Whether the pool's limits allow candidates beside those that are drawn."""
-    own = {k for k, one in enumerate(pool.candidates) if one.drawn} | set(chosen)
-    return all(len(own & set(limit.members)) <= limit.count for limit in pool.at_most)
+    drawn = {k for k, candidate in enumerate(pool.candidates) if candidate.drawn} | set(chosen)
+    return all(len(drawn & set(limit.members)) <= limit.count for limit in pool.at_most)
 
 
 def duration(seconds: float) -> str:

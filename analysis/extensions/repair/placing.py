@@ -13,8 +13,8 @@ from .proposed_bars import bar_directions
 
 
 def bars(d: int) -> Iterator[tuple[str, Array]]:
-    for kind, what, along in bar_directions(d):
-        yield f"{kind} {what}".strip(), along[0]
+    for kind, description, along in bar_directions(d):
+        yield f"{kind} {description}".strip(), along[0]
 
 
 def along_rotation(direction: Array) -> Array:

@@ -39,14 +39,14 @@ def positions(experiment: Experiment) -> Iterator[Change]:
                     name, artefact, Pose(*pose), (ReadingGroup(names, layout.names, every, 1),)
                 )
                 if d == len(pose[1]) and is_inside(new, layout, volume, experiment.probes):
-                    told = f"read {artefact} once more {words}"
+                    description = f"read {artefact} once more {words}"
                     if d == 3 and len(experiment.probes) > 1:
                         probes = "probe" if len(names) == 1 else "probes"
-                        told += f", with {probes} {' and '.join(names)}"
+                        description += f", with {probes} {' and '.join(names)}"
                     add = partial(with_added, position=new)
                     yield Change(
                         ChangeKind.ADD_POSITION,
-                        told,
+                        description,
                         float(new.count),
                         frozenset({f"more {words}"}),
                         add,
@@ -61,11 +61,11 @@ def with_added(experiment: Experiment, position: Position) -> Experiment:
 
 
 def _free_name(experiment: Experiment, name: str) -> str:
-    taken = {place.name for place in experiment.positions}
+    names = {place.name for place in experiment.positions}
     return next(
-        one
-        for k in range(len(taken) + 1)
-        if (one := name if not k else f"{name} {k + 1}") not in taken
+        candidate_name
+        for k in range(len(names) + 1)
+        if (candidate_name := name if not k else f"{name} {k + 1}") not in names
     )
 
 
@@ -82,7 +82,7 @@ def _plate_poses(
     for shift, turns in product((0.0, 0.5), range(4)):
         for level, plane in product(LEVELS if d == 3 else (0.5,), PLANES if d == 3 else PLANES[2:]):
             rotation = plane_rotation(plane, turns, d)
-            at = centre + np.round(shift * step, 4)
+            origin = centre + np.round(shift * step, 4)
             words = (
                 f"in the middle of the volume, turned by {90 * turns} deg"
                 if turns
@@ -95,11 +95,11 @@ def _plate_poses(
                 )
             if d == 3:
                 normal = AXIS_INDEX[plane]
-                at[normal] = volume.lower[normal] + level * (
+                origin[normal] = volume.lower[normal] + level * (
                     volume.upper[normal] - volume.lower[normal]
                 )
-                words = f"in plane {plane} at {format_length(at[normal])}, {words}"
-            yield words, plane if d == 3 else None, (rotation, clean(at - rotation @ middle))
+                words = f"in plane {plane} at {format_length(origin[normal])}, {words}"
+            yield words, plane if d == 3 else None, (rotation, clean(origin - rotation @ middle))
 
 
 def _bar_poses(
@@ -123,10 +123,10 @@ def _bar_poses(
 
 def _probes_across(experiment: Experiment, artefact: str, plane: Axis | None) -> tuple[str, ...]:
     """Probes that read the artefact in that plane, or those that reach across it, or the first."""
-    own = [place for place in experiment.positions if place.artefact == artefact]
-    for place in own:
-        found = plane_of(place.pose.rotation)
-        if plane is None or (found is not None and found[0] == plane):
+    places = [place for place in experiment.positions if place.artefact == artefact]
+    for place in places:
+        plane_axes = plane_of(place.pose.rotation)
+        if plane is None or (plane_axes is not None and plane_axes[0] == plane):
             return place.probes
     normal = AXIS_INDEX[plane or "z"]
     across = [

@@ -37,13 +37,13 @@ def bars_to_add(design: Design, strains: Array, overall: Array | None) -> str:
     Every proposal is verified by the rank of what all lengths together tell of strains, pivots and
     unknown lengths.
     """
-    given = design.of(Lengths)
-    gauge_only = bool(given.to_pivot.all())
+    lengths = design.of(Lengths)
+    gauge_only = bool(lengths.to_pivot.all())
     if gauge_only and design.dimension != 3:
         return ""
-    like = int(np.flatnonzero(given.to_pivot == gauge_only)[0])
+    like = int(np.flatnonzero(lengths.to_pivot == gauge_only)[0])
     pool = list(_places() if gauge_only else bar_directions(design.dimension))
-    rows = _rows(design, given.direction, np.arange(len(given)))
+    rows = _rows(design, lengths.direction, np.arange(len(lengths)))
     # Strains are open also where these lengths tell too little of them, which is not to count.
     rows[:, : len(strains)] -= _what_is_told(rows, strains) @ strains.T
     more = [_rows(design, u, np.full(len(u), like)) for _, _, u in pool]
@@ -62,17 +62,17 @@ def _rows(design: Design, u: Array, like: np.ndarray) -> Array:
     """Derivatives (m, products + pivots + lengths) of lengths in directions u (m, d) that are
     otherwise as others.
     """
-    given, d = design.of(Lengths), design.dimension
-    position = design.readings.position[given.first[like]]
+    lengths_of_design, d = design.of(Lengths), design.dimension
+    position = design.readings.position[lengths_of_design.first[like]]
     pivots = np.zeros((len(u), len(design.positions.names), d))
-    pivoted = np.flatnonzero(given.to_pivot[like])
+    pivoted = np.flatnonzero(lengths_of_design.to_pivot[like])
     pivots[pivoted, position[pivoted]] = -u[pivoted]
     lengths = np.zeros((len(u), len(design.unknown_lengths.names)))
-    if given.free is not None:
-        free = np.flatnonzero(given.free[like] >= 0)
-        lengths[free, given.free[like][free]] = -1.0
-    own = np.array([products(one) for one in u])
-    return np.concatenate([own, pivots.reshape(len(u), -1), lengths], axis=1)
+    if lengths_of_design.free is not None:
+        free = np.flatnonzero(lengths_of_design.free[like] >= 0)
+        lengths[free, lengths_of_design.free[like][free]] = -1.0
+    product_rows = np.array([products(direction) for direction in u])
+    return np.concatenate([product_rows, pivots.reshape(len(u), -1), lengths], axis=1)
 
 
 def _leave_open(rows: Array, strains: Array) -> int:
@@ -85,9 +85,9 @@ def _what_is_told(rows: Array, strains: Array) -> Array:
     """What rows tell of strains (m, k), pivots and lengths taking up what they can."""
     size = len(strains)
     u, values, _ = np.linalg.svd(rows[:, size:], full_matrices=False)
-    taken = u[:, values > SINGULAR_VALUE_TOLERANCE * max(values.max(initial=0.0), 1.0)]
-    told = rows[:, :size] @ strains
-    return np.asarray(told - taken @ (taken.T @ told))
+    determined = u[:, values > SINGULAR_VALUE_TOLERANCE * max(values.max(initial=0.0), 1.0)]
+    strain_effects = rows[:, :size] @ strains
+    return np.asarray(strain_effects - determined @ (determined.T @ strain_effects))
 
 
 def bar_directions(d: int) -> Iterator[tuple[str, str, Array]]:
@@ -128,12 +128,12 @@ def _places() -> Iterator[tuple[str, str, Array]]:
 
 def _in_words(chosen: list[tuple[str, str]], gauge_only: bool) -> str:
     if not gauge_only:
-        words = [f"{kind} {what}".strip() for kind, what in chosen]
+        words = [f"{kind} {description}".strip() for kind, description in chosen]
         return "add for example " + listed(
-            [f"{'one' if k else 'a bar'} {one}" for k, one in enumerate(words)]
+            [f"{'one' if k else 'a bar'} {word}" for k, word in enumerate(words)]
         )
-    rings = [what for kind, what in chosen if kind == "elevation"]
-    sides = [what for kind, what in chosen if kind == "azimuth"]
+    rings = [description for kind, description in chosen if kind == "elevation"]
+    sides = [description for kind, description in chosen if kind == "azimuth"]
     height = "an elevation" if len(rings) == 1 else "elevations"
     parts = [f"all round at {height} of {listed(rings)} deg"] if rings else []
     parts += [f"at several elevations at azimuths of {listed(sides)} deg"] if sides else []

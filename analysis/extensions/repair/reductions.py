@@ -45,8 +45,8 @@ def more_balls(experiment: Experiment) -> Iterator[Change]:
             changed = with_artefact(experiment, name, new)
             if changed is not None:
                 cost = float(
-                    sum(one.count for one in changed.positions)
-                    - sum(one.count for one in experiment.positions)
+                    sum(position.count for position in changed.positions)
+                    - sum(position.count for position in experiment.positions)
                 )
                 apply = partial(_with_artefact, name=name, settings=new)
                 yield Change(
@@ -90,10 +90,14 @@ def fewer_coefficients(experiment: Experiment) -> Iterator[Change]:
         for value in range(now - 1, max(now - MOST_COEFFICIENTS_LESS, least) - 1, -1):
             new = model.model_copy(update={key: value})
             apply = partial(replace, error_model=new)
-            what = (
+            coefficients = (
                 words
                 if value != 1
                 else words.replace("coefficients", "coefficient").replace("knots", "knot")
             )
-            told = f"ask for {value} {what} instead of {now}, taking the others as zero"
-            yield Change(ChangeKind.MODEL, told, float(now - value), frozenset({"model"}), apply)
+            description = (
+                f"ask for {value} {coefficients} instead of {now}, taking the others as zero"
+            )
+            yield Change(
+                ChangeKind.MODEL, description, float(now - value), frozenset({"model"}), apply
+            )

@@ -132,33 +132,36 @@ class _Search:
         self.at_most = int(np.clip(WORK / work(base), FEWEST, MOST))
 
     def run(self, report: Report) -> Repairs:
-        found = offers(self.base.experiment, self.before.deficiency > 0)
-        self.seen = seen_by(self.base, [one for changes in found.values() for one in changes])
-        self.ranks = {one: rank_of([said]) for one, said in self.seen.items()}
+        candidates = offers(self.base.experiment, self.before.deficiency > 0)
+        self.seen = seen_by(
+            self.base, [change for changes in candidates.values() for change in changes]
+        )
+        self.ranks = {change: rank_of([effect]) for change, effect in self.seen.items()}
         best: dict[ChangeKind, tuple[Change, ...]] = {}
         singles: list[Change] = []
-        steps = counted(found.items(), "kinds of changes", len(found), report)
+        steps = counted(candidates.items(), "kinds of changes", len(candidates), report)
         for kind, changes in steps:
-            sound = sum(self.is_sound(self.judge(one)) for one in best.values())
+            sound = sum(self.is_sound(self.judge(change)) for change in best.values())
             if sound >= self.most or (kind == ChangeKind.MODEL and sound > 1):
                 # To ask for less is the last resort.
                 break
             whole, part = self.singles(kind, changes)
             singles += [*whole, *part]
             possible: list[tuple[Change, ...]] = [
-                (one,) for one in whole if not self.judge((one,)).deficiency
+                (change,) for change in whole if not self.judge((change,)).deficiency
             ]
             together = self.set_of_additions(changes) if self.is_worth_more(possible) else ()
             possible += [together] if together else []
             if possible:
                 best[kind] = self.best_of(possible)
-        for together in self.mixed(found, best):
-            best[max(one.kind for one in together)] = together
+        for together in self.mixed(candidates, best):
+            best[max(change.kind for change in together)] = together
         order = sorted(best, key=lambda kind: (not self.is_sound(self.judge(best[kind])), kind))
-        told = [self.told(best[kind]) for kind in order if self.helps(best[kind])]
-        complete = self.ranked(told)
+        repairs = [self.told(best[kind]) for kind in order if self.helps(best[kind])]
+        complete = self.ranked(repairs)
         is_single = any(
-            len(one.changes) == 1 and not one.weak and not one.is_faint for one in complete
+            len(change.changes) == 1 and not change.weak and not change.is_faint
+            for change in complete
         )
         partial = () if is_single else self.of_single_directions(singles)
         return Repairs(
@@ -168,18 +171,18 @@ class _Search:
             self.sets,
         )
 
-    def ranked(self, told: Sequence[Repair]) -> tuple[Repair, ...]:
+    def ranked(self, repairs: Sequence[Repair]) -> tuple[Repair, ...]:
         """The best repairs first; where even scale of the best rests on probe offsets, that with a
         calibrated distance besides comes before it.
         """
-        order = sorted(told, key=lambda one: one.order)
+        order = sorted(repairs, key=lambda repair: repair.order)
         if order and order[0].rests_on_offsets and self.base.experiment.pool is None:
             assert order[0].prediction is not None
             changed = apply_all(order[0].changes, self.base.experiment)
             certificate = scale_certificate(changed, order[0].prediction.scale)
             if certificate is not None and certificate.change is not None:
                 with_length = self.told((*order[0].changes, certificate.change))
-                order = sorted([with_length, *order], key=lambda one: one.order)
+                order = sorted([with_length, *order], key=lambda repair: repair.order)
         return tuple(order[: self.most])
 
     def is_worth_more(self, possible: Sequence[tuple[Change, ...]]) -> bool:
@@ -189,7 +192,7 @@ class _Search:
 
     def mixed(
         self,
-        found: Mapping[ChangeKind, Sequence[Change]],
+        offered: Mapping[ChangeKind, Sequence[Change]],
         best: Mapping[ChangeKind, tuple[Change, ...]],
     ) -> Iterator[tuple[Change, ...]]:
         """Sets of changes where no sound repair is known but to ask for less: additions first, then
@@ -197,11 +200,11 @@ class _Search:
         """
 
         def is_enough(some: Iterable[tuple[Change, ...]]) -> bool:
-            return any(self.is_sound(self.judge(one)) for one in some)
+            return any(self.is_sound(self.judge(change)) for change in some)
 
-        if is_enough(one for kind, one in best.items() if kind < ChangeKind.ARTEFACT):
+        if is_enough(change for kind, change in best.items() if kind < ChangeKind.ARTEFACT):
             return
-        additions = [one for changes in found.values() for one in changes]
+        additions = [change for changes in offered.values() for change in changes]
         together = self.set_of_additions(additions)
         if together:
             yield together
@@ -212,13 +215,13 @@ class _Search:
             *(() if is_enough(best.values()) else (ChangeKind.ARTEFACT, ChangeKind.MODEL)),
         ):
             changes = [
-                one
-                for other in found
-                if other <= kind
-                for one in self.thinned(self.useful(found[other]))
+                change
+                for second_kind in offered
+                if second_kind <= kind
+                for change in self.thinned(self.useful(offered[second_kind]))
             ]
             together = self.greedy(
-                found.get(ChangeKind.MOVE, []) if kind == ChangeKind.MOVE else changes
+                offered.get(ChangeKind.MOVE, []) if kind == ChangeKind.MOVE else changes
             )
             together = together or (self.greedy(changes) if kind == ChangeKind.MOVE else ())
             if together:
@@ -227,7 +230,7 @@ class _Search:
 
     def useful(self, changes: Sequence[Change]) -> list[Change]:
         """Changes less those that add nothing that is missing."""
-        return [one for one in changes if one not in self.seen or self.ranks[one]]
+        return [change for change in changes if change not in self.seen or self.ranks[change]]
 
     def is_faint(self, after: Judged) -> bool:
         """Whether what was undetermined is so little determined now that nobody would call it
@@ -262,7 +265,7 @@ class _Search:
         after = self.judge(changes)
         return (
             not self.is_sound(after),
-            sum(one.cost for one in changes),
+            sum(change.cost for change in changes),
             len(changes),
             float(comparable(after.spread)),
         )
@@ -270,7 +273,11 @@ class _Search:
     def best_of(self, possible: Sequence[tuple[Change, ...]]) -> tuple[Change, ...]:
         """Of the cheapest repairs of a kind that with the smallest U6 with uncertain offsets."""
         order = sorted(possible, key=self.preference)
-        equal = [one for one in order if self.preference(one)[:3] == self.preference(order[0])[:3]]
+        equal = [
+            repair
+            for repair in order
+            if self.preference(repair)[:3] == self.preference(order[0])[:3]
+        ]
         return min(equal[:MOST_COMPARED], key=self.loosened) if len(equal) > 1 else order[0]
 
     def loosened(self, changes: tuple[Change, ...]) -> float:
@@ -291,27 +298,29 @@ class _Search:
         null directions.
         """
         useful = self.useful(changes)
-        self.tried.setdefault(kind, set()).update(one for one in changes if one in self.seen)
+        self.tried.setdefault(kind, set()).update(
+            change for change in changes if change in self.seen
+        )
         k = self.before.deficiency
-        whole = [one for one in useful if one not in self.seen or self.ranks[one] == k]
-        part = [one for one in useful if one in self.seen and self.ranks[one] < k]
+        whole = [change for change in useful if change not in self.seen or self.ranks[change] == k]
+        part = [change for change in useful if change in self.seen and self.ranks[change] < k]
         judged = self.cheapest(whole) if kind == ChangeKind.POOL else self.thinned(whole)
-        for one in judged:
-            self.judge((one,))
+        for change in judged:
+            self.judge((change,))
         return judged, part
 
     def cheapest(self, changes: Sequence[Change]) -> list[Change]:
         """The first of a list in order of cost up to one that cures, and none beyond."""
-        found = []
+        tried = []
         for change in changes[: self.at_most]:
-            found.append(change)
+            tried.append(change)
             if self.is_sound(self.judge((change,))):
                 break
-        return found
+        return tried
 
     def set_of_additions(self, changes: Sequence[Change]) -> tuple[Change, ...]:
         """Several additions that together leave nothing undetermined; empty if there are none."""
-        additions = [one for one in changes if one in self.seen and self.ranks[one]]
+        additions = [change for change in changes if change in self.seen and self.ranks[change]]
         nominal: tuple[Change, ...] = ()
         for together in self.cheapest_sets(additions):
             after = self.judge(together)
@@ -325,31 +334,31 @@ class _Search:
         that is built up.
         """
         few = different(additions, self.seen)
-        found: list[tuple[Change, ...]] = [
+        sets: list[tuple[Change, ...]] = [
             (few[i], few[k])
-            for i, k in covering_pairs([self.seen[one] for one in few])
+            for i, k in covering_pairs([self.seen[change] for change in few])
             if self.may_be((few[i], few[k]))
         ]
-        weakest = comparable([weakest_of([self.seen[one] for one in pair]) for pair in found])
-        order = sorted(range(len(found)), key=lambda k: (sum(map(effort, found[k])), -weakest[k]))
-        found = [found[k] for k in order]
+        weakest = comparable([weakest_of([self.seen[change] for change in pair]) for pair in sets])
+        order = sorted(range(len(sets)), key=lambda k: (sum(map(effort, sets[k])), -weakest[k]))
+        sets = [sets[k] for k in order]
         built = covering_set(additions, self.seen, effort, self.may_be)
-        return [*found[:MOST_VERIFIED], *([built] if len(built) > 1 else [])]
+        return [*sets[:MOST_VERIFIED], *([built] if len(built) > 1 else [])]
 
     def may_be(self, changes: Sequence[Change]) -> bool:
         """Whether changes go together, in the pool's limits and within the volume."""
         experiment = self.base.experiment
         pool = experiment.pool
-        chosen = tuple(one.candidate for one in changes if one.candidate >= 0)
+        chosen = tuple(change.candidate for change in changes if change.candidate >= 0)
         if not go_together(changes) or pool is not None and not allowed(pool, chosen):
             return False
         # Each alone stays inside; a further probe may not where the position is moved as well.
-        if not {ChangeKind.MOVE, ChangeKind.READ_MORE} <= {one.kind for one in changes}:
+        if not {ChangeKind.MOVE, ChangeKind.READ_MORE} <= {change.kind for change in changes}:
             return True
         changed, volume = apply_all(changes, experiment), experiment.machine.volume
         return all(
-            is_inside(one, changed.layouts[one.artefact], volume, changed.probes)
-            for one in changed.positions
+            is_inside(change, changed.layouts[change.artefact], volume, changed.probes)
+            for change in changed.positions
         )
 
     def greedy(self, changes: Sequence[Change]) -> tuple[Change, ...]:
@@ -359,8 +368,8 @@ class _Search:
         built: tuple[Change, ...] = ()
         after = self.before
         while not after.is_cured and len(built) < self.together:
-            possible = [(*built, one) for one in changes if self.may_be((*built, one))]
-            best = min(possible, key=lambda one: self.judge(one).order, default=())
+            possible = [(*built, change) for change in changes if self.may_be((*built, change))]
+            best = min(possible, key=lambda change: self.judge(change).order, default=())
             if not best or self.judge(best).order >= after.order:
                 break
             gain = after.deficiency - self.judge(best).deficiency
@@ -370,11 +379,11 @@ class _Search:
                 break
         if after.deficiency or not self.helps(built):
             return ()
-        for one in built:
-            without = tuple(other for other in built if other is not one)
-            left = self.judge(without) if without else self.before
-            if (left.deficiency, left.weak) <= (after.deficiency, after.weak):
-                built, after = without, left
+        for change in built:
+            without = tuple(rival for rival in built if rival is not change)
+            remaining = self.judge(without) if without else self.before
+            if (remaining.deficiency, remaining.weak) <= (after.deficiency, after.weak):
+                built, after = without, remaining
         return built
 
     def of_single_directions(self, singles: Sequence[Change]) -> tuple[Repair, ...]:
@@ -383,18 +392,20 @@ class _Search:
         """
         if not self.before.deficiency:
             return ()
-        told = self.open_errors()
-        order = self.thinned(sorted(singles, key=lambda one: (one.kind, one.cost)))
-        found: dict[Change, tuple[int, ...]] = {}
+        open_errors = self.open_errors()
+        order = self.thinned(sorted(singles, key=lambda change: (change.kind, change.cost)))
+        by_change: dict[Change, tuple[int, ...]] = {}
         for k in range(self.before.deficiency):
-            for one in order:
-                after = self.judge((one,))
-                if one.kind < ChangeKind.MODEL and 0 < after.deficiency < self.before.deficiency:
-                    gone = removed(told, after.open_errors)
+            for change in order:
+                after = self.judge((change,))
+                if change.kind < ChangeKind.MODEL and 0 < after.deficiency < self.before.deficiency:
+                    gone = removed(open_errors, after.open_errors)
                     if k in gone:
-                        found[one] = gone
+                        by_change[change] = gone
                         break
-        return tuple(self.told((one,), gone) for one, gone in list(found.items())[:MOST_PARTIAL])
+        return tuple(
+            self.told((change,), gone) for change, gone in list(by_change.items())[:MOST_PARTIAL]
+        )
 
     def open_errors(self) -> Array:
         """What the null directions do to the machine, in the form in which they are reported."""
@@ -419,8 +430,8 @@ class _Search:
             self.is_faint(after),
             planned,
             edits(experiment, changed),
-            sum(one.count for one in changed.positions)
-            - sum(one.count for one in experiment.positions),
+            sum(position.count for position in changed.positions)
+            - sum(position.count for position in experiment.positions),
             _seconds_more(experiment, changes),
             _loosened(changed) if removes is None else None,
         )
@@ -432,9 +443,9 @@ def _loosened(experiment: Experiment) -> PairSummary | None:
 
 def _seconds_more(experiment: Experiment, changes: Sequence[Change]) -> float:
     """Time that changes take, in seconds: what the pool states, else as long as usual."""
-    seconds = sum(one.cost for one in changes if one.kind == ChangeKind.POOL)
-    rest = [one for one in changes if one.kind != ChangeKind.POOL]
+    seconds = sum(change.cost for change in changes if change.kind == ChangeKind.POOL)
+    additions = [change for change in changes if change.kind != ChangeKind.POOL]
     before = {place.name: seconds_of(place) for place in experiment.positions}
-    for place in apply_all(rest, experiment).positions:
+    for place in apply_all(additions, experiment).positions:
         seconds += seconds_of(place) - before.get(place.name, 0.0)
     return seconds

@@ -27,18 +27,20 @@ def repair_lines(repairs: Repairs | None, judged: Verdict) -> list[str]:
     if repairs is None:
         return []
     lines = []
-    for k, one in enumerate(repairs.complete, start=1):
-        lines.append(f"repair {k}: {changes_in_words(one)}: {_worth(one, judged)}")
-        lines += [f"repair {k}, in the file: {edit}" for edit in one.edits]
+    for k, repair in enumerate(repairs.complete, start=1):
+        lines.append(f"repair {k}: {changes_in_words(repair)}: {_worth(repair, judged)}")
+        lines += [f"repair {k}, in the file: {edit}" for edit in repair.edits]
     if not repairs.complete:
         tried = _tried(repairs)
         lines.append(f"repair: no changes were found that determine everything; {tried}")
-    for one in repairs.partial:
+    for repair in repairs.partial:
         lines.append(
-            f"repair of {_directions(one, judged)} alone: {changes_in_words(one)}: leaves"
-            f" {_rank(one.deficiency)}"
+            f"repair of {_directions(repair, judged)} alone: {changes_in_words(repair)}: leaves"
+            f" {_rank(repair.deficiency)}"
         )
-        lines += [f"repair of {_numbers(one)} alone, in the file: {edit}" for edit in one.edits]
+        lines += [
+            f"repair of {_numbers(repair)} alone, in the file: {edit}" for edit in repair.edits
+        ]
     return lines
 
 
@@ -155,8 +157,8 @@ def repair_data(repairs: Repairs | None) -> dict[str, Any] | None:
     if repairs is None:
         return None
     return {
-        "complete": [_data(one) for one in repairs.complete],
-        "partial": [_data(one) for one in repairs.partial],
+        "complete": [_data(repair) for repair in repairs.complete],
+        "partial": [_data(repair) for repair in repairs.partial],
         "tried": {KINDS[kind]: count for kind, count in repairs.tried.items()},
         "sets_tried": repairs.sets,
     }

@@ -34,9 +34,9 @@ def seen_by(base: Examined, changes: Sequence[Change]) -> dict[Change, Array]:
     of plates that are read already are left out. A set of changes removes as many directions as the
     rank of its triangles together.
     """
-    found: dict[Change, Array] = {}
+    effects: dict[Change, Array] = {}
     if not base.at.deficiency:
-        return found
+        return effects
     experiment = base.experiment
     plates = {
         place.artefact
@@ -49,24 +49,24 @@ def seen_by(base: Examined, changes: Sequence[Change]) -> dict[Change, Array]:
         if item is None or item.artefact not in plates:
             continue
         if isinstance(item, DistanceCalibration):
-            found[change] = _by_distances(base, item)
+            effects[change] = _by_distances(base, item)
         elif isinstance(item, Position):
             added[change] = replace(item, name=f"candidate {len(added)}")
-    return found | _by_readings(base, added)
+    return effects | _by_readings(base, added)
 
 
 def _by_distances(base: Examined, item: DistanceCalibration) -> Array:
     design = base.at.design
-    own = np.flatnonzero(design.balls.artefact == design.artefacts.names.index(item.artefact))[
+    pairs = np.flatnonzero(design.balls.artefact == design.artefacts.names.index(item.artefact))[
         item.pairs
     ]
-    along = design.balls.places[own[:, 0]] - design.balls.places[own[:, 1]]
+    along = design.balls.places[pairs[:, 0]] - design.balls.places[pairs[:, 1]]
     along[:, item.dimensions :] = 0.0
     along /= (
         np.linalg.norm(along, axis=1)[:, None]
         * at_least_exact(item.standard_uncertainties)[:, None]
     )
-    moved = base.at.ball_null[own]
+    moved = base.at.ball_null[pairs]
     return _triangle(np.einsum("md,mdk->mk", along, moved[:, 0] - moved[:, 1]))
 
 
@@ -74,7 +74,7 @@ def _by_readings(base: Examined, added: dict[Change, Position]) -> dict[Change, 
     if not added:
         return {}
     experiment, null, layout = base.experiment, base.at.shared_null, base.at.layout
-    own = len(experiment.positions)
+    of_new = len(experiment.positions)
     together = replace(
         experiment,
         positions=(*experiment.positions, *added.values()),
@@ -84,12 +84,12 @@ def _by_readings(base: Examined, added: dict[Change, Position]) -> dict[Change, 
     extended = lay_out(placed_only(together), is_pool=True)
     state = nominal_state(extended)
     order = np.argsort(extended.readings.position, kind="stable")
-    first = np.searchsorted(extended.readings.position[order], np.arange(own + len(added) + 1))
+    first = np.searchsorted(extended.readings.position[order], np.arange(of_new + len(added) + 1))
     names = [place.name for place in experiment.positions]
     # What is held does not move.
     with_held = np.concatenate([null, np.zeros((1, null.shape[1]))])
-    found = {}
-    for k, change in enumerate(added, start=own):
+    effects = {}
+    for k, change in enumerate(added, start=of_new):
         readings = extended.readings.select(order[first[k] : first[k + 1]])
         blocks = reading_blocks(extended, state, readings, None)
         rows = (
@@ -103,21 +103,21 @@ def _by_readings(base: Examined, added: dict[Change, Position]) -> dict[Change, 
             rows = _without(rows, blocks.by_pose)
         else:
             rows = rows + blocks.by_pose @ with_held[layout.pose_columns[names.index(change.of)]]
-        found[change] = _triangle(rows.reshape(-1, rows.shape[2]))
-    return found
+        effects[change] = _triangle(rows.reshape(-1, rows.shape[2]))
+    return effects
 
 
 def _of_influences(base: Examined, extended: Design, null: Array) -> Array:
     """How null directions (s, k) change influence quantities (p, k) of a design with more
     positions; those of the latter alone stay.
     """
-    own = null[base.at.layout.influences]
-    names = [one.name for one in base.at.design.influence_parameters]
-    found = np.zeros((len(extended.influence_parameters), null.shape[1]))
-    for k, one in enumerate(extended.influence_parameters):
-        if one.name in names:
-            found[k] = own[names.index(one.name)]
-    return found
+    rows = null[base.at.layout.influences]
+    names = [parameter.name for parameter in base.at.design.influence_parameters]
+    effects = np.zeros((len(extended.influence_parameters), null.shape[1]))
+    for k, parameter in enumerate(extended.influence_parameters):
+        if parameter.name in names:
+            effects[k] = rows[names.index(parameter.name)]
+    return effects
 
 
 def _without(rows: Array, by_pose: Array) -> Array:
@@ -131,8 +131,8 @@ def _without(rows: Array, by_pose: Array) -> Array:
 def _triangle(rows: Array) -> Array:
     """A square factor with the same product R' R."""
     k = rows.shape[1]
-    found = np.linalg.qr(np.concatenate([rows, np.zeros((k, k))]), mode="r")
-    return np.asarray(found)
+    triangle = np.linalg.qr(np.concatenate([rows, np.zeros((k, k))]), mode="r")
+    return np.asarray(triangle)
 
 
 def rank_of(triangles: Sequence[Array]) -> int:

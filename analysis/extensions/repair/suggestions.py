@@ -36,5 +36,5 @@ class Suggestions:
 
 def suggested(experiment: Experiment, prediction: Prediction, report: Report) -> Suggestions:
     """What is suggested for an experiment with its pool, whose design is so predicted."""
-    found = repairs(experiment, report=report)
-    return Suggestions(found, scale_certificate(experiment, prediction.scale))
+    suggestions = repairs(experiment, report=report)
+    return Suggestions(suggestions, scale_certificate(experiment, prediction.scale))

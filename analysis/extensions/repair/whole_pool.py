@@ -73,22 +73,24 @@ class PoolGap:
         if not cures:
             return "no change was found that would determine it"
         all_of_it = "it" if self.cures else "part of it"
-        told = "; or ".join(changes_in_words(one) for one in cures[:MOST_CURES])
-        return f"what would determine {all_of_it}, offered or done beside these: {told}"
+        remedies = "; or ".join(changes_in_words(cure) for cure in cures[:MOST_CURES])
+        return f"what would determine {all_of_it}, offered or done beside these: {remedies}"
 
     def to_dict(self) -> dict[str, Any]:
         return {
             "deficiency": self.verdict.deficiency,
-            "undetermined": [str(one) for one in self.verdict.null],
-            "cures": [changes_in_words(one) for one in self.cures],
-            "partial_cures": [changes_in_words(one) for one in self.partial],
+            "undetermined": [str(cure) for cure in self.verdict.null],
+            "cures": [changes_in_words(cure) for cure in self.cures],
+            "partial_cures": [changes_in_words(cure) for cure in self.partial],
             "cures_sought": self.sought,
         }
 
     def refusing(self, error: ExperimentError) -> ExperimentError:
         """An error of the pool with what stays open, and what would determine it."""
-        told = f"{self.words}; {self.remedy}"
-        return ExperimentError(replace(one, text=f"{one.text}; {told}") for one in error.messages)
+        text = f"{self.words}; {self.remedy}"
+        return ExperimentError(
+            replace(message, text=f"{message.text}; {text}") for message in error.messages
+        )
 
 
 def pool_gap(
@@ -105,7 +107,7 @@ def pool_gap(
     which has the same observations and others. That two computations agree on how many directions
     the few leave open is the condition for telling anything.
     """
-    told = information.deficiency + information.balls_open
+    open_count = information.deficiency + information.balls_open
     # Words beside a plan, which is as good without them: nothing wrong with them is a reason to
     # withhold it.
     try:
@@ -114,15 +116,19 @@ def pool_gap(
         judged = check(design).verdict if few else None
     except UNTOLD:
         return None
-    if judged is None or judged.deficiency != told + sum(information.pose_open[k] for k in few):
+    if judged is None or judged.deficiency != open_count + sum(
+        information.pose_open[k] for k in few
+    ):
         return None
     size = judged.observations * judged.parameters * (judged.deficiency + BESIDES)
     is_sought = size <= MOST_WORK and not judged.as_expected
     try:
-        found = repairs(design, report=report) if is_sought else None
+        repairs_found = repairs(design, report=report) if is_sought else None
     except UNTOLD:
-        found = None
-    cures, partial = ((), ()) if found is None else (found.complete, found.partial)
+        repairs_found = None
+    cures, partial = (
+        ((), ()) if repairs_found is None else (repairs_found.complete, repairs_found.partial)
+    )
     return PoolGap(len(candidates), judged, cures, partial, is_sought)
 
 
@@ -135,7 +141,11 @@ def spanning(information: Information, candidates: Sequence[Candidate]) -> tuple
     least.
     """
     count = len(candidates)
-    unread = {k: _balls(one) for k, one in enumerate(candidates) if isinstance(one.item, Position)}
+    unread = {
+        k: _balls(candidate)
+        for k, candidate in enumerate(candidates)
+        if isinstance(candidate.item, Position)
+    }
     places = set(unread)
     few = [k for k in range(count) if k not in places or information.pose_open[k]]
     _take(unread, [k for k in few if k in places])
@@ -146,13 +156,17 @@ def spanning(information: Information, candidates: Sequence[Candidate]) -> tuple
     flat = information.matrices[:count].reshape(count, -1)
     while True:
         values, directions = np.linalg.eigh(information.of(few))
-        known, taken = values.min(initial=1.0), places.intersection(few)
-        is_even = known > EVEN * len(few) / count
-        if is_even or taken == places or len(taken) >= MOST_SPANNING:
-            return tuple(sorted(few)) if known > FAINT and len(taken) <= MOST_SPANNING else ()
+        smallest, shared_places = values.min(initial=1.0), places.intersection(few)
+        is_even = smallest > EVEN * len(few) / count
+        if is_even or shared_places == places or len(shared_places) >= MOST_SPANNING:
+            return (
+                tuple(sorted(few))
+                if smallest > FAINT and len(shared_places) <= MOST_SPANNING
+                else ()
+            )
         scaled = directions / (values.clip(0.0) + FAINT)
         gains = comparable(flat @ (scaled @ directions.T).ravel())
-        few.append(max(places - taken, key=lambda k: (gains[k], -k)))
+        few.append(max(places - shared_places, key=lambda k: (gains[k], -k)))
 
 
 def _balls(candidate: Candidate) -> set[tuple[str, int]]:
@@ -160,8 +174,8 @@ def _balls(candidate: Candidate) -> set[tuple[str, int]]:
     return {(candidate.item.artefact, ball) for ball in candidate.item.balls.tolist()}
 
 
-def _take(unread: dict[int, set[tuple[str, int]]], taken: Sequence[int]) -> None:
+def _take(unread: dict[int, set[tuple[str, int]]], members: Sequence[int]) -> None:
     """Count as read what candidates read."""
-    read = {ball for k in taken for ball in unread[k]}
+    read_balls = {ball for k in members for ball in unread[k]}
     for balls in unread.values():
-        balls -= read
+        balls -= read_balls

@@ -63,47 +63,53 @@ def edits(before: Experiment, after: Experiment) -> tuple[Edit, ...]:
 
     Positions, calibration, probes, sizes of artefacts and of the error model are compared.
     """
-    found = []
+    changes = []
     for name, artefact in after.artefacts.items():
-        found += _fields(("artefacts", name), before.artefacts[name], artefact)
-    found += _fields(("error_model",), before.error_model, after.error_model)
+        changes += _fields(("artefacts", name), before.artefacts[name], artefact)
+    changes += _fields(("error_model",), before.error_model, after.error_model)
     for name, probe in after.probes.items():
         if name not in before.probes:
-            found.append(Edit(("probes", name), [written_length(v) for v in probe.offset]))
-    known = {place.name: position_settings(before, place) for place in before.positions}
+            changes.append(Edit(("probes", name), [written_length(v) for v in probe.offset]))
+    settings_before = {place.name: position_settings(before, place) for place in before.positions}
     # With one probe, a file need not name it.
     named = to_python(before.tree).get("positions", ()) if len(after.probes) > 1 else ()
-    unnamed = {str(one["name"]) for one in named if len(before.probes) == 1 and lacks_probes(one)}
+    unnamed = {
+        str(candidate["name"])
+        for candidate in named
+        if len(before.probes) == 1 and lacks_probes(candidate)
+    }
     for place in after.positions:
         settings = position_settings(after, place)
-        if place.name not in known:
-            found.append(Edit(("positions",), settings, True))
-        elif settings != known[place.name] or place.name in unnamed:
-            found.append(Edit(("positions", place.name), settings))
+        if place.name not in settings_before:
+            changes.append(Edit(("positions",), settings, True))
+        elif settings != settings_before[place.name] or place.name in unnamed:
+            changes.append(Edit(("positions", place.name), settings))
     candidates = () if after.pool is None else after.pool.candidates
     for k, item in enumerate(after.calibration):
         if not can_be_written(item):
             # Only a candidate of the pool is added as the file states it; nothing else changes.
             if k >= len(before.calibration):
-                stated = next(one.settings for one in candidates if one.item is item)
-                found.append(Edit(("calibration",), to_list(stated), True))
+                item_settings = next(
+                    candidate.settings for candidate in candidates if candidate.item is item
+                )
+                changes.append(Edit(("calibration",), to_list(item_settings), True))
             continue
-        said = calibration_settings(after, item)
+        new_settings = calibration_settings(after, item)
         if k >= len(before.calibration):
-            found.append(Edit(("calibration",), said, True))
+            changes.append(Edit(("calibration",), new_settings, True))
             continue
         old = calibration_settings(before, before.calibration[k])
-        found += [
+        changes += [
             Edit(("calibration", k, key), value)
-            for key, value in said.items()
+            for key, value in new_settings.items()
             if value != old.get(key)
         ]
-    return tuple(found)
+    return tuple(changes)
 
 
-def lacks_probes(said: Mapping[str, Any]) -> bool:
+def lacks_probes(settings: Mapping[str, Any]) -> bool:
     """Whether what a file says of a position leaves out which probes read it."""
-    return any("probes" not in group for group in said.get("readings", [said]))
+    return any("probes" not in group for group in settings.get("readings", [settings]))
 
 
 def _fields(steps: tuple[Step, ...], before: Any, after: Any) -> list[Edit]:
@@ -115,34 +121,34 @@ def _fields(steps: tuple[Step, ...], before: Any, after: Any) -> list[Edit]:
 
 def position_settings(experiment: Experiment, position: Position) -> dict[str, Any]:
     """What a file says of a position."""
-    said: dict[str, Any] = {"name": position.name}
+    settings: dict[str, Any] = {"name": position.name}
     if len(experiment.artefacts) > 1:
-        said["artefact"] = position.artefact
-    said |= _placement(experiment, position)
+        settings["artefact"] = position.artefact
+    settings |= _placement(experiment, position)
     groups = [_group(experiment, position, group) for group in position.readings]
-    return said | (groups[0] if len(groups) == 1 else {"readings": groups})
+    return settings | (groups[0] if len(groups) == 1 else {"readings": groups})
 
 
 def _placement(experiment: Experiment, position: Position) -> dict[str, Any]:
     layout, pose, d = experiment.layouts[position.artefact], position.pose, experiment.dimension
-    found = plane_of(pose.rotation)
-    if found is None:
+    plane_axis = plane_of(pose.rotation)
+    if plane_axis is None:
         return {
             "pose": {
                 "origin": [written_length(v) for v in pose.origin],
                 "rotation": _angles(pose.rotation),
             }
         }
-    plane, turns = found
+    plane, turns = plane_axis
     normal = AXIS_INDEX[plane]
     lower = ball_coordinates(pose, layout).min(axis=0)
-    said: dict[str, Any] = (
+    settings: dict[str, Any] = (
         {} if d == 2 else {"plane": plane, "level": written_length(pose.origin[normal])}
     )
-    said["corner"] = {
+    settings["corner"] = {
         axis: written_length(lower[AXIS_INDEX[axis]]) for axis in IN_PLANE_AXES[plane]
     }
-    return said | ({"quarter_turns": turns} if turns else {})
+    return settings | ({"quarter_turns": turns} if turns else {})
 
 
 def plane_of(rotation: Array) -> tuple[Any, int] | None:
@@ -180,17 +186,17 @@ def _angle(value: float) -> str:
 
 
 def _group(experiment: Experiment, position: Position, group: ReadingGroup) -> dict[str, Any]:
-    said: dict[str, Any] = {}
+    settings: dict[str, Any] = {}
     if len(experiment.probes) > 1 or experiment.dimension == 3:
-        said["probes"] = list(group.probes)
+        settings["probes"] = list(group.probes)
     if ball_set(experiment.layouts[position.artefact], group.ball_indices) != "all":
-        said["balls"] = list(group.balls)
+        settings["balls"] = list(group.balls)
     if group.repeats > 1:
-        said["repeats"] = group.repeats
+        settings["repeats"] = group.repeats
     if group.standard_uncertainty is not None:
         values = map(written_length, group.standard_uncertainty)
-        said["standard_uncertainty"] = dict(zip(AXES, values, strict=False))
-    return said
+        settings["standard_uncertainty"] = dict(zip(AXES, values, strict=False))
+    return settings
 
 
 def can_be_written(item: Calibration) -> bool:
@@ -206,24 +212,24 @@ def can_be_written(item: Calibration) -> bool:
 def calibration_settings(experiment: Experiment, item: Calibration) -> dict[str, Any]:
     """What a file says of a calibration item that can be written, its certified values left out."""
     layout = experiment.layouts[item.artefact]
-    said: dict[str, Any] = {"kind": item.kind}
+    settings: dict[str, Any] = {"kind": item.kind}
     if len(experiment.artefacts) > 1:
-        said["artefact"] = item.artefact
+        settings["artefact"] = item.artefact
     if isinstance(item, DistanceCalibration):
         named = [[layout.names[i] for i in pair] for pair in item.pairs.tolist()]
-        said["pairs"] = pair_set(layout, item.pairs) or named
+        settings["pairs"] = pair_set(layout, item.pairs) or named
         if item.dimensions == 2 and experiment.dimension == 3:
-            said["dimensions"] = 2
+            settings["dimensions"] = 2
         assert item.standard_uncertainty is not None
-        said["standard_uncertainty"] = length_function(item.standard_uncertainty)
+        settings["standard_uncertainty"] = length_function(item.standard_uncertainty)
     elif isinstance(item, CoordinateCalibration):
         balls = ball_set(layout, item.balls)
-        said["balls"] = balls or [layout.names[i] for i in item.balls.tolist()]
+        settings["balls"] = balls or [layout.names[i] for i in item.balls.tolist()]
         by_axis = zip(item.axes, item.standard_uncertainties, strict=True)
-        said["standard_uncertainty"] = {AXES[axis]: written_length(u) for axis, u in by_axis}
+        settings["standard_uncertainty"] = {AXES[axis]: written_length(u) for axis, u in by_axis}
     elif isinstance(item, RadiusCalibration):
-        said["standard_uncertainty"] = written_length(item.standard_uncertainty)
-    return said
+        settings["standard_uncertainty"] = written_length(item.standard_uncertainty)
+    return settings
 
 
 def length_function(value: LengthFunction) -> str:

@@ -111,23 +111,23 @@ def changed_data(data: Any, change: TextChange) -> Any:
     >>> changed_data({"a": (1,)}, TextChange(("a",), 2, "append"))
     {'a': (1, 2)}
     """
-    step, rest = change.steps[0], change.steps[1:]
+    step, later = change.steps[0], change.steps[1:]
     if isinstance(data, tuple):
         assert isinstance(step, int)
         items = list(data)
-        if not rest and change.kind == "remove":
+        if not later and change.kind == "remove":
             return (*items[:step], *items[step + 1 :])
-        items[step] = _one_changed(items[step], rest, change)
+        items[step] = _one_changed(items[step], later, change)
         return tuple(items)
-    if not rest and change.kind == "remove":
+    if not later and change.kind == "remove":
         return {key: value for key, value in data.items() if key != step}
-    return {**data, step: _one_changed(data.get(step), rest, change)}
+    return {**data, step: _one_changed(data.get(step), later, change)}
 
 
-def _one_changed(data: Any, rest: Steps, change: TextChange) -> Any:
-    if rest:
+def _one_changed(data: Any, steps: Steps, change: TextChange) -> Any:
+    if steps:
         return changed_data(
-            {} if data is None else data, TextChange(rest, change.value, change.kind)
+            {} if data is None else data, TextChange(steps, change.value, change.kind)
         )
     value = _as_read(change.value)
     return (*(data or ()), value) if change.kind == "append" else value
@@ -210,13 +210,13 @@ def _spans(text: str, file: str) -> _Text:
 
 def _way(text: _Text, steps: Steps) -> list[_Span]:
     """The values that a path leads through, as far as there are any."""
-    found = [text.root]
+    way = [text.root]
     for step in steps:
-        below = next((value for key, _, value in found[-1].entries if key == step), None)
+        below = next((value for key, _, value in way[-1].entries if key == step), None)
         if below is None:
             break
-        found.append(below)
-    return found
+        way.append(below)
+    return way
 
 
 def _refusal(span: _Span, steps: Steps, text: str) -> ExperimentError:
@@ -254,38 +254,42 @@ def _changed(text: _Text, change: TextChange) -> str:
 
 def _with_value(text: _Text, above: _Span, span: _Span, change: TextChange, value: Any) -> str:
     _keep_what_is_told(text, span, span.start, span.end, change)
-    said, old = flow(value), text.text[span.start : span.end]
-    if old[:1] in ("'", '"') and isinstance(value, str) and not set(said) & set("'\"\\"):
-        said = old[0] + said + old[0]
+    written, old = flow(value), text.text[span.start : span.end]
+    if old[:1] in ("'", '"') and isinstance(value, str) and not set(written) & set("'\"\\"):
+        written = old[0] + written + old[0]
     if span.start and not text.text[span.start - 1].isspace() and not old:
-        said = f" {said}"
+        written = f" {written}"
     if not above.is_flow and span.mark.column - 1 <= above.column:
         # A list may begin below its key, and nothing else.
-        said = f"  {said}"
-    return text.text[: span.start] + said + text.text[span.end :]
+        written = f"  {written}"
+    return text.text[: span.start] + written + text.text[span.end :]
 
 
 def _with_entry(text: _Text, into: _Span, value: Any, key: str | None = None) -> str:
     """The text with an entry more at the end of a list or, with a key, of a mapping."""
     whole = text.text
     if into.is_flow:
-        said = flow(value) if key is None else flow({key: value})[1:-1]
+        written = flow(value) if key is None else flow({key: value})[1:-1]
         if not into.entries:
-            at = into.end - 1
-            return whole[:at] + said + whole[at:]
+            insert_at = into.end - 1
+            return whole[:insert_at] + written + whole[insert_at:]
         _, first, last = into.entries[-1]
-        line_start = max((one.end() for one in LINE_END.finditer(whole, 0, first.start)), default=0)
+        line_start = max(
+            (line_end.end() for line_end in LINE_END.finditer(whole, 0, first.start)), default=0
+        )
         indent = whole[line_start : first.start]
         if indent.strip() or len(into.entries) < 2:
-            return f"{whole[: last.end]}, {said}{whole[last.end :]}"
+            return f"{whole[: last.end]}, {written}{whole[last.end :]}"
         # One entry a line; what is told after the last one stays beside it.
         rest_end = _line_end(whole, last.end)
-        rest = whole[last.end : min(rest_end, into.end - 1)]
-        comma = "" if rest.lstrip().startswith(",") else ","
+        tail = whole[last.end : min(rest_end, into.end - 1)]
+        comma = "" if tail.lstrip().startswith(",") else ","
         if rest_end > into.end - 1:
-            return f"{whole[: last.end]}{comma}{_break(whole, 0)}{indent}{said}{whole[last.end :]}"
+            return (
+                f"{whole[: last.end]}{comma}{_break(whole, 0)}{indent}{written}{whole[last.end :]}"
+            )
         return (
-            f"{whole[: last.end]}{comma}{rest}{_break(whole, rest_end)}{indent}{said}"
+            f"{whole[: last.end]}{comma}{tail}{_break(whole, rest_end)}{indent}{written}"
             f"{whole[rest_end:]}"
         )
     indent = " " * into.column
@@ -294,21 +298,23 @@ def _with_entry(text: _Text, into: _Span, value: Any, key: str | None = None) ->
     if key is None:
         is_block = not into.entries[-1][2].is_flow and into.entries[-1][2].kind == "mapping"
         if is_block and isinstance(value, dict):
-            said = f"{new_line}  ".join(f"{_dumped(k)}: {flow(v)}" for k, v in value.items())
+            written = f"{new_line}  ".join(f"{_dumped(k)}: {flow(v)}" for k, v in value.items())
         else:
-            said = flow(value)
-        return f"{whole[:end]}{new_line}- {said}{whole[end:]}"
-    said = f"{_dumped(key)}: {flow(value)}"
+            written = flow(value)
+        return f"{whole[:end]}{new_line}- {written}{whole[end:]}"
+    written = f"{_dumped(key)}: {flow(value)}"
     if isinstance(value, list | tuple) and len(value) > 1 and isinstance(value[0], dict):
-        said = f"{_dumped(key)}:" + "".join(f"{new_line}  - {flow(item)}" for item in value)
-    return f"{whole[:end]}{new_line}{said}{whole[end:]}"
+        written = f"{_dumped(key)}:" + "".join(f"{new_line}  - {flow(item)}" for item in value)
+    return f"{whole[:end]}{new_line}{written}{whole[end:]}"
 
 
 def _without(text: _Text, above: _Span, span: _Span, change: TextChange) -> str:
     whole = text.text
     k = next(k for k, (_, _, value) in enumerate(above.entries) if value is span)
     key = above.entries[k][1]
-    line_start = max((one.end() for one in LINE_END.finditer(whole, 0, key.start)), default=0)
+    line_start = max(
+        (line_end.end() for line_end in LINE_END.finditer(whole, 0, key.start)), default=0
+    )
     if not above.is_flow and not whole[line_start : key.start].strip():
         start, end = line_start, _line_end(whole, span.end)
         following = LINE_END.match(whole, end)
@@ -326,28 +332,28 @@ def _keep_what_is_told(text: _Text, span: _Span, start: int, end: int, change: T
 
     :raises ExperimentError: there are some between the indices.
     """
-    inside = [one for one in text.scalars if start <= one[0] and one[1] <= end]
-    ends = [start, *(one[1] for one in inside)]
-    for gap_start, gap_end in zip(ends, [*(one[0] for one in inside), end], strict=True):
-        found = re.search("[#&*!]", text.text[gap_start:gap_end])
-        if found is not None:
-            what = {"#": "a comment", "&": "an anchor", "*": "an alias", "!": "a tag"}[found[0]]
-            before = text.text[: gap_start + found.start()]
+    inside = [scalar for scalar in text.scalars if start <= scalar[0] and scalar[1] <= end]
+    ends = [start, *(scalar[1] for scalar in inside)]
+    for gap_start, gap_end in zip(ends, [*(scalar[0] for scalar in inside), end], strict=True):
+        mark = re.search("[#&*!]", text.text[gap_start:gap_end])
+        if mark is not None:
+            subject = {"#": "a comment", "&": "an anchor", "*": "an alias", "!": "a tag"}[mark[0]]
+            before = text.text[: gap_start + mark.start()]
             lines = LINE_END.split(before)
             place = Mark(span.mark.file, len(lines), len(lines[-1]) + 1)
             raise place.refused(
-                f"{what} here would be lost by the change; change it by hand",
+                f"{subject} here would be lost by the change; change it by hand",
                 format_path(change.steps),
             )
 
 
 def _line_end(text: str, start: int) -> int:
     """Index of the end of the line that an index is in."""
-    found = LINE_END.search(text, start)
-    return len(text) if found is None else found.start()
+    line_end = LINE_END.search(text, start)
+    return len(text) if line_end is None else line_end.start()
 
 
-def _break(text: str, at: int) -> str:
+def _break(text: str, start: int) -> str:
     """What ends the line there, or else the first line."""
-    found = LINE_END.match(text, at) or LINE_END.search(text)
-    return "\n" if found is None else found[0]
+    line_break = LINE_END.match(text, start) or LINE_END.search(text)
+    return "\n" if line_break is None else line_break[0]

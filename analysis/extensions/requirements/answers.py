@@ -83,32 +83,32 @@ class Reach(Result):
         }
         lines += ["", *table_lines(columns, self.answers)]
         notes = []
-        for one in self.answers:
-            notes += [f"{one.name}: {one.beside}"] if one.beside else []
-            notes += [f"{one.name}: {remark}" for remark in one.remarks]
+        for answer in self.answers:
+            notes += [f"{answer.name}: {answer.beside}"] if answer.beside else []
+            notes += [f"{answer.name}: {remark}" for remark in answer.remarks]
         return lines + ["", *notes] if notes else lines
 
     def data(self) -> dict[str, Any]:
         """The same as plain data, values in metres or as numbers."""
         goal = self.goal
-        told: dict[str, Any] = {"kind": goal.kind}
+        goal_data: dict[str, Any] = {"kind": goal.kind}
         if goal.kind == "lengths":
-            told["share"] = goal.share
+            goal_data["share"] = goal.share
         if goal.kind == "quantity":
-            told |= {"symbol": goal.symbol, "statistic": goal.statistic, "limit": goal.limit}
+            goal_data |= {"symbol": goal.symbol, "statistic": goal.statistic, "limit": goal.limit}
         return {
             **self.named,
-            "goal": told,
+            "goal": goal_data,
             "is_met": self.present.is_met,
             "as_drawn": self.present.words,
             "rank_deficiency": self.deficiency,
             "undetermined": self.present.undetermined,
-            "answers": {one.name: _answer_data(one) for one in self.answers},
+            "answers": {answer.name: _answer_data(answer) for answer in self.answers},
         }
 
     def rows(self) -> list[dict[str, Any]]:
         """One row for each unknown."""
-        return [{"unknown": one.name, **_answer_data(one)} for one in self.answers]
+        return [{"unknown": answer.name, **_answer_data(answer)} for answer in self.answers]
 
     def plot(self, path: str | Path | None = None) -> Figure:
         """How far from the goal the values are that were tried of each unknown.
@@ -118,7 +118,7 @@ class Reach(Result):
         :raises ImportError: matplotlib is missing.
         :raises ValueError: the path ends in something else, or there is nothing to be drawn.
         """
-        panels = [_panel(one) for one in self.answers if one.tried]
+        panels = [_panel(answer) for answer in self.answers if answer.tried]
         if not panels:
             raise ValueError("no value was tried of any unknown, so that there is nothing to draw")
         goal, limit = self.goal, 1.0
@@ -141,16 +141,16 @@ def _panel(answer: Answer) -> TriedValues:
     return TriedValues(answer.title, unit, factor * values, distances, is_met)
 
 
-def _answer_data(one: Answer) -> dict[str, Any]:
+def _answer_data(answer: Answer) -> dict[str, Any]:
     return {
-        "status": {"varied": "cannot be varied"}.get(one.status, one.status),
-        "as_drawn": one.present or None,
-        "needed": one.words if one.is_met else None,
-        "needed_value": one.value if one.is_met else None,
-        "limit": one.words if one.status == "none" else None,
-        "outcome": one.outcome or None,
-        "next": one.beside or None,
-        "remarks": list(one.remarks),
+        "status": {"varied": "cannot be varied"}.get(answer.status, answer.status),
+        "as_drawn": answer.present or None,
+        "needed": answer.words if answer.is_met else None,
+        "needed_value": answer.value if answer.is_met else None,
+        "limit": answer.words if answer.status == "none" else None,
+        "outcome": answer.outcome or None,
+        "next": answer.beside or None,
+        "remarks": list(answer.remarks),
     }
 
 

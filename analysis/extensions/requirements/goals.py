@@ -86,10 +86,10 @@ def parse_goal(text: str, share: float | None = None) -> Goal:
         if share is not None and text == "tasks":
             raise GoalError("a share goes with the goal lengths; leave it out")
         return Goal(text, 1.0 if share is None else share)  # type: ignore[arg-type]
-    found = PATTERN.fullmatch(text)
-    if found is None:
+    match = PATTERN.fullmatch(text)
+    if match is None:
         raise GoalError(f'"{text}" is not a goal; write {FORMS}')
-    symbol, statistic, limit = found.groups()
+    symbol, statistic, limit = match.groups()
     if symbol not in SYMBOLS:
         advice = (
             f"give {symbol} lengths or {symbol} angles"
@@ -140,26 +140,28 @@ def judge(goal: Goal, prediction: Prediction | PlannedUncertainty) -> Judgement:
     if goal.kind == "tasks":
         return _judge_tasks(prediction)
     if goal.kind == "quantity":
-        found = prediction.quantities[goal.symbol]
-        value = getattr(found, goal.statistic)
-        is_met = not found.undetermined and value <= goal.limit
-        words = f"{goal.statistic} {goal.symbol} {number(1e6 * value)} {shown_unit(found.unit)}"
+        summary = prediction.quantities[goal.symbol]
+        value = getattr(summary, goal.statistic)
+        is_met = not summary.undetermined and value <= goal.limit
+        words = f"{goal.statistic} {goal.symbol} {number(1e6 * value)} {shown_unit(summary.unit)}"
         # A file whose targets are of expanded uncertainties may make one think that this is one.
-        words += "" if found.coverage_factor == 1.0 else " (standard uncertainty)"
+        words += "" if summary.coverage_factor == 1.0 else " (standard uncertainty)"
         distance = math.inf if math.isnan(value) else value / goal.limit
         return Judgement(
-            is_met, distance + found.undetermined, words + _open(found), found.undetermined
+            is_met, distance + summary.undetermined, words + _open(summary), summary.undetermined
         )
-    found = prediction.quantities["U6"]
-    share = found.within_target or 0.0
-    average = "" if math.isnan(found.average) else f", average U6 {number(1e6 * found.average)} µm"
+    summary = prediction.quantities["U6"]
+    share = summary.within_target or 0.0
+    average = (
+        "" if math.isnan(summary.average) else f", average U6 {number(1e6 * summary.average)} µm"
+    )
     # An exact count: the share is a ratio of two whole numbers.
-    missing = found.count - round(share * found.count)
-    is_met = missing <= (1.0 - goal.share) * found.count * (1.0 + 1e-12)
-    by = uncertainty_words(found.coverage_factor)
+    missing = summary.count - round(share * summary.count)
+    is_met = missing <= (1.0 - goal.share) * summary.count * (1.0 + 1e-12)
+    by = uncertainty_words(summary.coverage_factor)
     share_words = "all" if not missing else f"{percent(share)} of"
-    words = f"{share_words} lengths within the target by the {by}{average}{_open(found)}"
-    return Judgement(is_met, 1.0 - share, words, found.undetermined)
+    words = f"{share_words} lengths within the target by the {by}{average}{_open(summary)}"
+    return Judgement(is_met, 1.0 - share, words, summary.undetermined)
 
 
 def _judge_tasks(prediction: Prediction | PlannedUncertainty) -> Judgement:

@@ -14,16 +14,16 @@ def judged_goals(
     experiment: Experiment, goals: Sequence[Goal]
 ) -> tuple[tuple[str, ...], tuple[str, ...]]:
     """How goals are met, in words, and those of them that are not."""
-    found = planned_uncertainty(experiment)
-    told, missed = [], []
+    planned = planned_uncertainty(experiment)
+    parts, missed = [], []
     for goal in goals:
         try:
-            check_goal(goal, found)
+            check_goal(goal, planned)
         except GoalError as error:
-            told.append(f"goal not met: {goal}; {error}")
-            missed.append(told[-1])
+            parts.append(f"goal not met: {goal}; {error}")
+            missed.append(parts[-1])
             continue
-        judged = judge(goal, found)
-        told.append(f"goal {'met' if judged.is_met else 'not met'}: {goal}; {judged.words}")
-        missed += [] if judged.is_met else [told[-1]]
-    return tuple(told), tuple(missed)
+        judged = judge(goal, planned)
+        parts.append(f"goal {'met' if judged.is_met else 'not met'}: {goal}; {judged.words}")
+        missed += [] if judged.is_met else [parts[-1]]
+    return tuple(parts), tuple(missed)

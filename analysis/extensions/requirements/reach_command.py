@@ -64,7 +64,7 @@ def run(options: Namespace) -> int:
         names = tuple(dict.fromkeys(options.by or UNKNOWNS))
         experiment = single(options)
         with progress(options) as shown:
-            found = reach(
+            result = reach(
                 experiment,
                 goal,
                 names,
@@ -75,8 +75,8 @@ def run(options: Namespace) -> int:
             )
     except (GoalError, NotVariableError, QuantityError) as error:
         raise UsageError(error) from None
-    show(options, found)
+    show(options, result)
     if options.fail:
-        return 0 if found.present.is_met else 1
-    met = [one.is_met for one in found.answers]
+        return 0 if result.present.is_met else 1
+    met = [answer.is_met for answer in result.answers]
     return 0 if (all if options.by else any)(met) else 1

@@ -88,13 +88,13 @@ def reach(
     answers = []
     for name in counted(names, "unknowns", len(names), report):
         try:
-            one = unknown(name, experiment, root, artefact, calibration)
+            sought = unknown(name, experiment, root, artefact, calibration)
         except NotVariableError as error:
             if len(names) == 1:
                 raise
             answers.append(Answer(name, name, "varied", remarks=(str(error),)))
             continue
-        answers.append(_answer(one, searched, judged, present.deficiency))
+        answers.append(_answer(sought, searched, judged, present.deficiency))
     return Reach(
         experiment.label, experiment.title, goal, judged, present.deficiency, tuple(answers)
     )
@@ -131,11 +131,11 @@ class _Trials:
     def _tried(self, step: int) -> Tried:
         words = self.one.words(step)
         try:
-            found = self.searched.uncertainty(self.one.tree(step))
+            uncertainty = self.searched.uncertainty(self.one.tree(step))
         except ExperimentError as error:
             first = error.messages[0]
             return Tried(words, None, 0, f"{first.path}: {first.text}")
-        return Tried(words, judge(self.searched.goal, found), found.deficiency, "")
+        return Tried(words, judge(self.searched.goal, uncertainty), uncertainty.deficiency, "")
 
     @property
     def tried(self) -> tuple[tuple[float, float, bool], ...]:
@@ -145,17 +145,19 @@ class _Trials:
         judged = ((self.one.value(step), tried.judgement) for step, tried in self.known.items())
         return tuple(
             sorted(
-                (value, found.distance, found.is_met)
-                for value, found in judged
-                if value is not None and found is not None and np.isfinite(found.distance)
+                (value, uncertainty.distance, uncertainty.is_met)
+                for value, uncertainty in judged
+                if value is not None
+                and uncertainty is not None
+                and np.isfinite(uncertainty.distance)
             )
         )
 
     def judgement(self, step: int) -> Judgement:
         """How the goal is met with a value with which the file is right."""
-        found = self.at(step).judgement
-        assert found is not None
-        return found
+        reached = self.at(step).judgement
+        assert reached is not None
+        return reached
 
     def nearest(self, steps: list[int]) -> int:
         """Which of some values with which the file is right comes nearest to the goal."""
@@ -186,21 +188,25 @@ def _answer(unknown: Unknown, searched: _Searched, present: Judgement, deficienc
         )
         return _without_value(unknown, "undetermined", reason)
     trials = _Trials(unknown, searched)
-    found = _monotone(trials, deficiency) if unknown.is_monotone else _scanned(trials)
-    return replace(found, tried=trials.tried, unit=unknown.unit)
+    answers = _monotone(trials, deficiency) if unknown.is_monotone else _scanned(trials)
+    return replace(answers, tried=trials.tried, unit=unknown.unit)
 
 
-def _without_value(one: Unknown, status: Literal["undetermined", "varied"], remark: str) -> Answer:
-    return Answer(one.name, one.title, status, one.present, one.grows, remarks=(remark,))
+def _without_value(
+    searched: Unknown, status: Literal["undetermined", "varied"], remark: str
+) -> Answer:
+    return Answer(
+        searched.name, searched.title, status, searched.present, searched.grows, remarks=(remark,)
+    )
 
 
 def _told(
     trials: _Trials, status: Literal["found", "any", "none"], step: int, remarks: list[str]
 ) -> Answer:
-    one, found = trials.one, trials.verified(step)
-    assert found.is_met is (status != "none")
-    needed = one.words(step), one.value(step), found.words, "", tuple(remarks)
-    return Answer(one.name, one.title, status, one.present, one.grows, *needed)
+    searched, verified = trials.one, trials.verified(step)
+    assert verified.is_met is (status != "none")
+    needed = searched.words(step), searched.value(step), verified.words, "", tuple(remarks)
+    return Answer(searched.name, searched.title, status, searched.present, searched.grows, *needed)
 
 
 def _found(trials: _Trials, met: int, failed: int, remarks: list[str]) -> Answer:
@@ -217,30 +223,34 @@ def _found(trials: _Trials, met: int, failed: int, remarks: list[str]) -> Answer
 
 def _monotone(trials: _Trials, deficiency: int) -> Answer:
     """The largest uncertainty, or the smallest number, that does."""
-    one = trials.one
-    best, worst = (one.last, one.first) if one.grows else (one.first, one.last)
+    searched = trials.one
+    best, worst = (
+        (searched.last, searched.first) if searched.grows else (searched.first, searched.last)
+    )
     remarks = []
-    if not one.grows and not trials.is_right(worst):
+    if not searched.grows and not trials.is_right(worst):
         # An uncertainty that grows with length has an end where no file may state it.
-        worst = _border(trials, one.drawn, worst)
+        worst = _border(trials, searched.drawn, worst)
         remarks.append(
-            f"more than {one.words(worst)} is not possible: {trials.at(worst + 1).refusal}"
+            f"more than {searched.words(worst)} is not possible: {trials.at(worst + 1).refusal}"
         )
     if trials.at(worst).is_met:
         return _told(trials, "any", worst, remarks)
     remarks = []
-    if one.grows and not trials.is_right(best):
-        best = _border(trials, one.first, best)
+    if searched.grows and not trials.is_right(best):
+        best = _border(trials, searched.first, best)
         remarks.append(
-            f"more than {one.words(best)} are not possible: {trials.at(best + 1).refusal}"
+            f"more than {searched.words(best)} are not possible: {trials.at(best + 1).refusal}"
         )
     # Where an extreme drowns everything else in rounding, it tells nothing.
     while (
-        not one.grows and trials.at(best).deficiency > deficiency and best + PER_DECADE < one.last
+        not searched.grows
+        and trials.at(best).deficiency > deficiency
+        and best + PER_DECADE < searched.last
     ):
         best += PER_DECADE
     if not trials.at(best).is_met:
-        remarks += [] if one.grows else _convergence(trials, best)
+        remarks += [] if searched.grows else _convergence(trials, best)
         return _told(trials, "none", best, remarks)
     return _found(trials, best, worst, [])
 
@@ -255,36 +265,36 @@ def _border(trials: _Trials, right: int, wrong: int) -> int:
 
 def _convergence(trials: _Trials, extreme: int) -> list[str]:
     """Whether an extreme is as good as exact."""
-    found, before = trials.at(extreme).judgement, trials.at(extreme + PER_DECADE).judgement
-    if found is None or before is None:
+    judgements, before = trials.at(extreme).judgement, trials.at(extreme + PER_DECADE).judgement
+    if judgements is None or before is None:
         return []
-    if abs(before.distance - found.distance) <= CONVERGED * found.distance:
+    if abs(before.distance - judgements.distance) <= CONVERGED * judgements.distance:
         return ["an exact one would not be better: ten times that gives the same result"]
     return ["a smaller one would still change the figure"]
 
 
 def _scanned(trials: _Trials) -> Answer:
     """The smallest value that does, where larger ones need not be better."""
-    one = trials.one
+    searched = trials.one
     probes = _probes(trials)
-    if one.name == "balls":
+    if searched.name == "balls":
         # More balls than do cost time, and need not be looked at.
         probes = probes[: _first_met(trials, probes, len(probes) - 1) + 1]
     usable = [step for step in probes if not trials.at(step).refusal]
     if not usable:
-        refusal = trials.at(one.drawn).refusal or trials.at(probes[0]).refusal
-        return _without_value(one, "varied", refusal)
+        refusal = trials.at(searched.drawn).refusal or trials.at(probes[0]).refusal
+        return _without_value(searched, "varied", refusal)
     remarks = []
-    if one.name == "size" and probes[-1] < one.last:
+    if searched.name == "size" and probes[-1] < searched.last:
         beyond = trials.at(probes[-1] + 1)
         remarks.append(f"from {beyond.words} on, the file is invalid: {beyond.refusal}")
     refused = [trials.at(step) for step in probes if step not in usable]
     if refused:
         remarks.append(
-            f"the file is invalid with {listing([one.words for one in refused], 3)}:"
+            f"the file is invalid with {listing([searched.words for searched in refused], 3)}:"
             f" {refused[0].refusal}"
         )
-    if one.name == "size" and not any(trials.at(step).is_met for step in usable):
+    if searched.name == "size" and not any(trials.at(step).is_met for step in usable):
         # What just does may lie beside the best of them.
         best = probes.index(trials.nearest(usable))
         ends = probes[max(best - 1, 0)], probes[min(best + 1, len(probes) - 1)]
@@ -292,17 +302,17 @@ def _scanned(trials: _Trials) -> Answer:
         usable = [step for step in probes if not trials.at(step).refusal]
     good = _first_met(trials, probes, -1)
     if good < 0:
-        if one.name == "balls":
-            remarks.append(f"more than {one.words(one.last)} were not tried")
+        if searched.name == "balls":
+            remarks.append(f"more than {searched.words(searched.last)} were not tried")
         best = trials.nearest(usable)
         if trials.judgement(best).undetermined:
-            told = (
-                f"something stays undetermined with every value from {one.words(usable[0])} to"
-                f" {one.words(usable[-1])}"
+            reason = (
+                f"something stays undetermined with every value from {searched.words(usable[0])} to"
+                f" {searched.words(usable[-1])}"
             )
-            return _without_value(one, "undetermined", told)
+            return _without_value(searched, "undetermined", reason)
         return _told(trials, "none", best, remarks)
-    if one.name == "size":
+    if searched.name == "size":
         again = next(
             (trials.at(step) for step in probes[good:] if not trials.at(step).is_met), None
         )
@@ -321,19 +331,28 @@ def _first_met(trials: _Trials, probes: list[int], otherwise: int) -> int:
 
 def _probes(trials: _Trials) -> list[int]:
     """Values that are tried first, in order, within the range in which the file is right."""
-    one = trials.one
-    if one.name == "balls":
-        every = range(one.first, one.last + 1)
-        found = [step for step in every if one.value(step) <= max(EVERY, one.value(one.first))]
-        while found[-1] < one.last:
-            least = RATIO * one.value(found[-1])
-            found.append(
+    searched = trials.one
+    if searched.name == "balls":
+        every = range(searched.first, searched.last + 1)
+        steps = [
+            step
+            for step in every
+            if searched.value(step) <= max(EVERY, searched.value(searched.first))
+        ]
+        while steps[-1] < searched.last:
+            least = RATIO * searched.value(steps[-1])
+            steps.append(
                 next(
-                    (step for step in every[found[-1] + 1 :] if one.value(step) >= least), one.last
+                    (step for step in every[steps[-1] + 1 :] if searched.value(step) >= least),
+                    searched.last,
                 )
             )
-        return found
-    if not trials.is_right(one.drawn):
+        return steps
+    if not trials.is_right(searched.drawn):
         return []
-    last = one.last if trials.is_right(one.last) else _border(trials, one.drawn, one.last)
-    return sorted({int(step) for step in np.linspace(one.first, last, SIZES).round()})
+    last = (
+        searched.last
+        if trials.is_right(searched.last)
+        else _border(trials, searched.drawn, searched.last)
+    )
+    return sorted({int(step) for step in np.linspace(searched.first, last, SIZES).round()})

@@ -58,17 +58,17 @@ def draw_tried(
     """
     height = PANEL + BELOW + ABOVE
     with drawing(len(panels) * height, WIDTH) as figure:
-        for k, one in enumerate(panels):
+        for k, panel in enumerate(panels):
             bottom = (len(panels) - 1 - k) * height + BELOW
             axes = placed_axes(figure, LEFT, bottom, WIDTH - LEFT - RIGHT, PANEL)
-            axes.plot(one.values, one.distances, color=MUTED, linewidth=0.8)
+            axes.plot(panel.values, panel.distances, color=MUTED, linewidth=0.8)
             for chosen, face, label in (
-                (one.is_met, SERIES[0], "met"),
-                (~one.is_met, PAPER, "not met"),
+                (panel.is_met, SERIES[0], "met"),
+                (~panel.is_met, PAPER, "not met"),
             ):
                 axes.plot(
-                    one.values[chosen],
-                    one.distances[chosen],
+                    panel.values[chosen],
+                    panel.distances[chosen],
                     color=SERIES[0],
                     marker=MARKERS[0],
                     linestyle="none",
@@ -77,10 +77,10 @@ def draw_tried(
                     label=label,
                 )
             axes.axhline(limit, color=INK, linewidth=1.0, linestyle="--")
-            scaled_axis(axes, one.values, "x")
-            scaled_axis(axes, one.distances, "y")
+            scaled_axis(axes, panel.values, "x")
+            scaled_axis(axes, panel.distances, "y")
             axes.grid(True)
-            axes.set_xlabel(f"{one.name}, {one.unit}" if one.unit else one.name)
+            axes.set_xlabel(f"{panel.name}, {panel.unit}" if panel.unit else panel.name)
             axes.set_ylabel(axis)
             if k == 0:
                 axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=2, borderpad=0.0)

@@ -94,20 +94,20 @@ def unknown(
         )
     if calibration is not None and calibration >= len(experiment.calibration):
         count = len(experiment.calibration)
-        known = f"the indices are 0 to {count - 1}" if count else "there is none"
-        raise NotVariableError(f"there is no calibration[{calibration}]; {known}")
+        indices_text = f"the indices are 0 to {count - 1}" if count else "there is none"
+        raise NotVariableError(f"there is no calibration[{calibration}]; {indices_text}")
     if name == "repeatability":
         return _scaled(name, "machine's repeatability", root, ["machine.repeatability"])
     if name == "certificate":
         chosen = [
             k
-            for k, one in enumerate(experiment.calibration)
-            if artefact in (None, one.artefact) and calibration in (None, k)
+            for k, listed in enumerate(experiment.calibration)
+            if artefact in (None, listed.artefact) and calibration in (None, k)
         ]
         if not chosen:
-            of = "" if artefact is None else f' of "{artefact}"'
+            of_artefact = "" if artefact is None else f' of "{artefact}"'
             raise NotVariableError(
-                f"the file states no calibration{of}; there is no certificate to improve"
+                f"the file states no calibration{of_artefact}; there is no certificate to improve"
             )
         return _certificate(root, [f"calibration[{k}]" for k in chosen])
     if name == "repeats":
@@ -120,7 +120,7 @@ def _certificate(root: Node, items: list[str]) -> Unknown:
 
     :raises NotVariableError: none of them states one that can be multiplied.
     """
-    lengths, others, left = list[str](), list[str](), list[str]()
+    lengths, rows_skipped, skipped = list[str](), list[str](), list[str]()
     for item in items:
         path = f"{item}.standard_uncertainty"
         try:
@@ -129,19 +129,19 @@ def _certificate(root: Node, items: list[str]) -> Unknown:
         except QuantityError:
             leaves = []
         if not leaves:
-            left.append(item)
+            skipped.append(item)
         else:
             are_lengths = isinstance(leaves[0], LengthFunction)
-            (lengths if are_lengths else others).append(path)
-    if not lengths + others:
+            (lengths if are_lengths else rows_skipped).append(path)
+    if not lengths + rows_skipped:
         raise NotVariableError(
-            f"{listing(left)} states no standard_uncertainty that can be multiplied; there is no"
+            f"{listing(skipped)} states no standard_uncertainty that can be multiplied; there is no"
             " certificate to improve"
         )
     title = "certificate's standard uncertainty"
-    if left:
-        title += f" (without {listing(left)}, which states none that can be multiplied)"
-    return _scaled("certificate", title, root, lengths + others)
+    if skipped:
+        title += f" (without {listing(skipped)}, which states none that can be multiplied)"
+    return _scaled("certificate", title, root, lengths + rows_skipped)
 
 
 @dataclass(frozen=True)
@@ -170,11 +170,11 @@ def _scaled(name: UnknownName, title: str, root: Node, paths: list[str]) -> Unkn
         return Fraction(at_step(step)) / Fraction(lead)
 
     def tree(step: int) -> Node:
-        found = root
+        changed_tree = root
         for path, node in zip(paths, nodes, strict=True):
             assert node is not None
-            found = override(found, path, _with_leaves(node, factor(step)), node.mark)
-        return found
+            changed_tree = override(changed_tree, path, _with_leaves(node, factor(step)), node.mark)
+        return changed_tree
 
     def words(step: int) -> str:
         return _several([_text(leaf, factor(step)) for leaf in leaves])
@@ -211,8 +211,8 @@ def _leaf(value: object) -> LengthFunction | _Quantity:
         return parse_length_function(value)
     except QuantityError:
         match = QUANTITY.fullmatch(value.strip()) if isinstance(value, str) else None
-        known = match is not None and plain_unit(match[2] or "") in chain(*UNITS.values())
-        if match is None or not known or Decimal(match[1]) <= 0:
+        is_length = match is not None and plain_unit(match[2] or "") in chain(*UNITS.values())
+        if match is None or not is_length or Decimal(match[1]) <= 0:
             raise
         return _Quantity(Decimal(match[1]), match[2].strip())
 
@@ -232,7 +232,7 @@ def _with_leaves(node: Node, factor: Fraction) -> Node:
         return Mapping(
             node.mark, {k: _with_leaves(v, factor) for k, v in node.items.items()}, node.key_marks
         )
-    return Sequence(node.mark, tuple(_with_leaves(one, factor) for one in node.items))
+    return Sequence(node.mark, tuple(_with_leaves(item, factor) for item in node.items))
 
 
 def _text(leaf: LengthFunction | _Quantity, factor: Fraction) -> str:
@@ -245,12 +245,12 @@ def _text(leaf: LengthFunction | _Quantity, factor: Fraction) -> str:
     constant = exact(leaf.constant)
     if constant and factor != 1:
         constant = round_down(times(constant, factor))
-    told = typed_length(float(constant))
+    length = typed_length(float(constant))
     if not leaf.slope:
-        return told
+        return length
     divisor = 1 / exact(leaf.slope)
     divisor = divisor if factor == 1 else round_up(times(divisor, 1 / factor))
-    return f"{told} + L/{float(divisor):.9g}"
+    return f"{length} + L/{float(divisor):.9g}"
 
 
 def _several(texts: list[str]) -> str:
@@ -262,7 +262,11 @@ def _repeats(experiment: Experiment, root: Node, artefact: str | None) -> Unknow
     """How often everything is read: so many times, or so many times as often where repeats
     differ.
     """
-    places = [k for k, one in enumerate(experiment.positions) if artefact in (None, one.artefact)]
+    places = [
+        k
+        for k, position in enumerate(experiment.positions)
+        if artefact in (None, position.artefact)
+    ]
     groups = [
         (
             f"positions[{k}].readings[{j}]" if _has_groups(root, k) else f"positions[{k}]",
@@ -277,13 +281,16 @@ def _repeats(experiment: Experiment, root: Node, artefact: str | None) -> Unknow
     is_same = len(counts) == 1
 
     def tree(step: int) -> Node:
-        found = root
+        changed_tree = root
         for path, count in groups:
             mark = root.mark
-            found = override(
-                found, f"{path}.repeats", Scalar(mark, step if is_same else step * count), mark
+            changed_tree = override(
+                changed_tree,
+                f"{path}.repeats",
+                Scalar(mark, step if is_same else step * count),
+                mark,
             )
-        return found
+        return changed_tree
 
     def words(step: int) -> str:
         return str(step) if is_same else f"{step} times as many"
@@ -314,16 +321,20 @@ def _of_plate(
 ) -> Unknown:
     """Balls per side, or size, of a grid or square."""
     fitting = [
-        one
-        for one, settings in experiment.artefacts.items()
-        if isinstance(settings, GridSettings | SquareSettings) and artefact in (None, one)
+        artefact_name
+        for artefact_name, settings in experiment.artefacts.items()
+        if isinstance(settings, GridSettings | SquareSettings) and artefact in (None, artefact_name)
     ]
     if artefact is None:
-        plates = [one for one in fitting if experiment.artefacts[one].role == "plate"]
+        plates = [
+            artefact_name
+            for artefact_name in fitting
+            if experiment.artefacts[artefact_name].role == "plate"
+        ]
         fitting = plates or fitting
     if not fitting:
-        of = "no artefact is" if artefact is None else f'"{artefact}" is not'
-        raise NotVariableError(f"{of} of kind grid or square, whose {name} could be varied")
+        subject = "no artefact is" if artefact is None else f'"{artefact}" is not'
+        raise NotVariableError(f"{subject} of kind grid or square, whose {name} could be varied")
     if len(fitting) > 1:
         raise NotVariableError(
             f"there are several plates; choose one with --artefact: {listing(fitting)}"
@@ -404,7 +415,7 @@ def _size(plate: GridSettings | SquareSettings, root: Node, path: str) -> Unknow
         return " x ".join(texts(step))
 
     present = " x ".join(map(typed_length, edges))
-    first, drawn, last = (step_of(one) for one in (lead / SMALLEST, lead, lead * LARGEST))
+    first, drawn, last = (step_of(size) for size in (lead / SMALLEST, lead, lead * LARGEST))
     return Unknown(
         "size", "size of the plate", present, drawn, first, last, True, False, tree, words, _metres
     )

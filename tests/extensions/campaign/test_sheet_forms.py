@@ -44,7 +44,9 @@ def sheet(experiment: Experiment) -> RunSheet:
     )
     by_name = {one.name: one for one in experiment.pool.candidates}
     return run_sheet(
-        [by_name[name] for name in wanted], experiment.pool.changes, done=[by_name["flat low"]]
+        [by_name[name] for name in wanted],
+        experiment.pool.changes,
+        done_candidates=[by_name["flat low"]],
     )
 
 
