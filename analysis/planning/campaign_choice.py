@@ -298,11 +298,7 @@ def _refuse_unusable(
     """Refuse a choice that is no experiment: without a position, or with balls that nobody
     reads.
     """
-    positions = [
-        chosen_position.item
-        for chosen_position in chosen
-        if isinstance(chosen_position.item, Position)
-    ]
+    positions = [position.item for position in chosen if isinstance(position.item, Position)]
     if not positions:
         every = range(limits.count)
         if limits.can_read(every):

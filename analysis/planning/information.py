@@ -240,7 +240,8 @@ def pool_information(
         memory = f"{len(candidates) * bytes_each / 1e9:.3g} GB of memory"
         text = (
             f"{len(candidates)} candidates with {size} parameters each take {memory};"
-            f" offer at most {MOST_BYTES // bytes_each}, positions of the experiment and certificates counted"
+            f" offer at most {MOST_BYTES // bytes_each}, positions of the experiment and"
+            " certificates counted"
         )
         raise refused(experiment.source, text, "pool")
 

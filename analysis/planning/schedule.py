@@ -146,7 +146,7 @@ class RunSheet:
 def run_sheet(
     chosen: Sequence[Candidate],
     changes: ChangeTimes,
-    done_candidates: Sequence[Candidate] = (),
+    done: Sequence[Candidate] = (),
     completed: Completion | None = None,
     interrupted: Collection[Candidate] = (),
     names: Mapping[str, str] | None = None,
@@ -162,16 +162,16 @@ def run_sheet(
     """
     again = set() if completed is None else {completed.whole.name}
     before = [
-        listed_candidate
-        for listed_candidate in done_candidates
-        if isinstance(listed_candidate.item, Position) and listed_candidate.name not in again
+        candidate
+        for candidate in done
+        if isinstance(candidate.item, Position) and candidate.name not in again
     ]
     earlier = {candidate.name for candidate in before} | again
-    interrupted_names = {listed_candidate.name for listed_candidate in interrupted} - again
+    interrupted_names = {candidate.name for candidate in interrupted} - again
     positions = [
-        listed_candidate
-        for listed_candidate in chosen
-        if isinstance(listed_candidate.item, Position) and listed_candidate.name not in earlier
+        candidate
+        for candidate in chosen
+        if isinstance(candidate.item, Position) and candidate.name not in earlier
     ]
     first = None if completed is None else completed.rest
     if order.name == "change-over":
@@ -213,11 +213,7 @@ def run_sheet(
         elapsed += change + seconds
     return RunSheet(
         tuple(steps),
-        tuple(
-            listed_candidate
-            for listed_candidate in chosen
-            if not isinstance(listed_candidate.item, Position)
-        ),
+        tuple(candidate for candidate in chosen if not isinstance(candidate.item, Position)),
         changes=changes,
         gap=gap,
     )
@@ -334,14 +330,14 @@ def ordered(
         is_paid=first is not None,
     )
     visits = [
-        (visited, visited.item.probes)
-        for visited in done_candidates
-        if isinstance(visited.item, Position)
+        (candidate, candidate.item.probes)
+        for candidate in done_candidates
+        if isinstance(candidate.item, Position)
     ]
     if first is not None:
         visits.append((first, _ending_with(first, order.before)))
     members: dict[Setup, Iterator[Candidate]] = {
-        kind: iter([visited for visited in positions if kind_of(visited) == kind])
+        kind: iter([candidate for candidate in positions if kind_of(candidate) == kind])
         for kind in set(map(kind_of, positions))
     }
     for visit in order.visits:

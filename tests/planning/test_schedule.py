@@ -287,7 +287,7 @@ def test_times_of_a_run_sheet_by_hand() -> None:
     spent = [step.seconds + step.change_seconds for step in sheet.steps]
     assert starts == pytest.approx([sum(spent[:k]) for k in range(6)])
     assert sheet.seconds == sum(spent)
-    done = run_sheet(drawn, experiment.pool.changes, done_candidates=[drawn[4], drawn[0]])
+    done = run_sheet(drawn, experiment.pool.changes, done=[drawn[4], drawn[0]])
     assert [step.name for step in done.steps][:2] == ["y low", "z low"]
     assert [step.done for step in done.steps] == [True] * 2 + [False] * 4
     # Going on from z: to the other z position, then to x and y; the first of them needs no change.
@@ -314,8 +314,6 @@ def test_what_is_done_may_have_other_readings_than_the_file_says() -> None:
     (group,) = upright.item.readings
     split = tuple(replace(group, probes=(probe,), balls=group.balls[:2]) for probe in group.probes)
     taken = replace(upright, item=replace(upright.item, readings=split))
-    sheet = run_sheet(
-        experiment.pool.candidates[:2], experiment.pool.changes, done_candidates=[taken]
-    )
+    sheet = run_sheet(experiment.pool.candidates[:2], experiment.pool.changes, done=[taken])
     assert [step.name for step in sheet.steps] == ["upright", "flat low"]
     assert sheet.steps[0].balls == "r1c1, r1c2 with back; r1c1, r1c2 with front"

@@ -180,10 +180,10 @@ def pair_set(layout: BallLayout, chosen: Indices) -> str | None:
     for name in (*layout.pair_sets, "all"):
         if name == "all" and len(wanted) != len(layout.names) * (len(layout.names) - 1) // 2:
             continue
-        candidate_pairs = pairs(layout, name)
+        pairs_found = pairs(layout, name)
         if (
-            len(candidate_pairs) == len(wanted)
-            and {frozenset(pair) for pair in candidate_pairs.tolist()} == wanted
+            len(pairs_found) == len(wanted)
+            and {frozenset(pair) for pair in pairs_found.tolist()} == wanted
         ):
             return name
     return None

@@ -47,7 +47,7 @@ def test_what_was_read_as_planned_is_told_as_planned(tmp_path: Path) -> None:
             one.read.settings is experiment.pool.candidates[one.base].settings and one.rest is None
         )
     read = [one.read for one in done]
-    sheet = run_sheet(read, experiment.pool.changes, done_candidates=read)
+    sheet = run_sheet(read, experiment.pool.changes, done=read)
     assert [step.balls for step in sheet.steps] == ["all 25", "all 25"]
 
 
@@ -55,7 +55,7 @@ def test_a_position_read_in_part_is_told_and_written_with_its_balls(tmp_path: Pa
     experiment, done = read_of(tmp_path, {"flat low": 3, "upright": 50})
     assert experiment.pool is not None
     read = [one.read for one in done]
-    sheet = run_sheet(read, experiment.pool.changes, done_candidates=read)
+    sheet = run_sheet(read, experiment.pool.changes, done=read)
     assert sheet.steps[0].balls == "r1c1, r1c2, r1c3"
     path = tmp_path / "chosen.yaml"
     path.write_text(experiment_text(experiment, sheet.chosen, "", tmp_path), encoding="utf-8")

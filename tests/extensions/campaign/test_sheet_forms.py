@@ -46,7 +46,7 @@ def sheet(experiment: Experiment) -> RunSheet:
     return run_sheet(
         [by_name[name] for name in wanted],
         experiment.pool.changes,
-        done_candidates=[by_name["flat low"]],
+        done=[by_name["flat low"]],
     )
 
 
