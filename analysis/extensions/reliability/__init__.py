@@ -1,1 +1,1 @@
-"""Reliability: which gross errors residuals would show, and what undetected ones would do."""
+"""Reliability: gross errors that residuals reveal, and effects of undetected ones."""

@@ -1,7 +1,7 @@
 """Possible errors of observations, single ones and events, each as a pattern over all rows.
 
-A pattern is what one unit of the bias changes in the whitened residuals. Single observations come
-first, in the order of their rows; the events after them.
+A pattern is the change of the whitened residuals by one unit of the bias. Single observations come
+first, in the order of their rows, then events.
 """
 
 from __future__ import annotations
@@ -35,8 +35,8 @@ if TYPE_CHECKING:
     from ballplate.simulator.design import Whitening
     from scipy.sparse import csc_array
 
-# Axes along which a reading changes lengths by less than this share of the most are left out, and
-# so are those that change all of them in a proportion equal to within the square of this.
+# Ends have no axis along which a reading changes lengths by less than this share of the largest
+# change, or in proportion to another axis to within the square of this.
 SLIGHT = 1e-3
 UNITS: dict[str, Literal["m", "rad", "1"]] = {
     "turn": "rad",
@@ -45,11 +45,10 @@ UNITS: dict[str, Literal["m", "rad", "1"]] = {
     "scale drift": "1",
 }
 
-# Kinds that `fit` looks for among smooth errors, and not as these patterns.
+# Kinds that `fit` searches as smooth errors instead.
 DRIFTS: tuple[str, ...] = ("drift", "scale drift")
 
-# A slip leaves at least so many readings of the position on either side, and is looked for before
-# at most so many.
+# Least number of readings of the position before and after a slip; largest number of its starts.
 LEAST_PART, MOST_STARTS = 3, 60
 
 
@@ -57,12 +56,12 @@ LEAST_PART, MOST_STARTS = 3, 60
 class BiasPatterns:
     """Patterns of one kind: entries `value` at `row` and `column` (each (e,)), `count` columns.
 
-    `subject` (count,) is what is wrong: a reading, length, prior, co-ordinate, distance, position,
-    probe or artefact; of a certified length, the first that has it, and of a ball, its first
-    reading in that position, or from that position on. An `end` is a reading of a standard whose
-    lengths are read together, with which several of them are wrong. `axis` (count,) is along or
-    about which, -1 without one, the plate's own axis of a ball that moved; `start` (count,) the
-    first reading after a slip, -1 without one.
+    `subject` (count,) is a reading, length, prior, co-ordinate, distance, position, probe or
+    artefact; of a certified length, its first reading, and of a ball, its first reading in that
+    position, or from that position on. An `end` is a reading of a standard whose lengths are read
+    together, so that its error changes several of them. `axis` (count,) is the direction or axis of
+    rotation, -1 without one, the plate's own axis of a moved ball; `start` (count,) the first
+    reading after a slip, -1 without one.
     """
 
     kind: str
@@ -80,8 +79,8 @@ class BiasPatterns:
 
 @dataclass(frozen=True)
 class Patterns:
-    """Patterns as columns of `matrix` (rows, k), with `kind`, `subject`, `axis` and `start` (k,) as
-    in `BiasPatterns`.
+    """Patterns as columns of `matrix` (rows, k); `kind`, `subject`, `axis`, `start` (k,) as in
+    `BiasPatterns`.
     """
 
     design: Design
@@ -96,37 +95,37 @@ class Patterns:
 
     @cached_property
     def is_local(self) -> np.ndarray:
-        """Which patterns (k,) are of rows that come together: of one ball at the most, or one
-        kind.
-        """
-        wide = [one.word for one in self.design.observations if one.is_joint]
+        """Mask (k,) of patterns whose rows are together: of one ball at most, or of one kind."""
+        wide = [
+            observation.word for observation in self.design.observations if observation.is_joint
+        ]
         local = [*single_kinds(self.design), "ball", "moved", "length value"]
         return np.isin(self.kind, local) & ~np.isin(self.kind, wide)
 
     def of_kind(self, *kinds: str) -> Integers:
-        """Indices of the patterns of some kinds."""
+        """Return indices of the patterns of some kinds."""
         return np.flatnonzero(np.isin(self.kind, kinds))
 
     def unit(self, k: int) -> Unit:
-        """Unit of the bias."""
+        """Return the unit of the bias."""
         kind: str = self.kind[k]
-        for one in self.design.observations:
-            if one.word == kind:
-                return one.unit(self.design, int(self.subject[k]))
+        for observation in self.design.observations:
+            if observation.word == kind:
+                return observation.unit(self.design, int(self.subject[k]))
         return UNITS.get(kind, "m")
 
 
 def patterns(design: Design, state: State, x: Array | None, every_start: bool = False) -> Patterns:
-    """All patterns of a design at `state`, with scale readings `x` (readings, d) or error-free
-    ones.
+    """Return all patterns of a design at `state`, with scale readings `x` (readings, d) or
+    error-free ones.
 
     Slips are half-way and between probes, or with `every_start` at every reading, up to
     `MOST_STARTS` of a position.
     """
     from scipy.sparse import coo_array
 
-    at = LinearisedDesign(design, state, x, every_start)
-    blocks = [block for build in BUILDERS for block in build(at)]
+    linearised = LinearisedDesign(design, state, x, every_start)
+    blocks = [block for build in BUILDERS for block in build(linearised)]
     start = np.cumsum([0, *(block.count for block in blocks)])
     column = np.concatenate(
         [block.column + first for block, first in zip(blocks, start, strict=False)]
@@ -135,23 +134,18 @@ def patterns(design: Design, state: State, x: Array | None, every_start: bool = 
     value = np.concatenate([block.value for block in blocks])
     matrix = coo_array((value, (row, column)), shape=(row_count(design), int(start[-1]))).tocsc()
     kind = np.repeat(np.array([block.kind for block in blocks]), [block.count for block in blocks])
-    return Patterns(
-        design,
-        matrix,
-        kind,
-        np.concatenate([block.subject for block in blocks]),
-        np.concatenate([block.axis for block in blocks]),
-        np.concatenate([block.start for block in blocks]),
-    )
+    fields = ("subject", "axis", "start")
+    joined = (np.concatenate([getattr(block, name) for block in blocks]) for name in fields)
+    return Patterns(design, matrix, kind, *joined)
 
 
 def single_kinds(design: Design) -> list[str]:
-    """Kinds of patterns of single observations."""
-    return ["reading", "end", *(one.word for one in design.observations)]
+    """Return the kinds of patterns of single observations."""
+    return ["reading", "end", *(observation.word for observation in design.observations)]
 
 
 class LinearisedDesign:
-    """A design where it is linearised, with what several kinds of patterns need."""
+    """A design where it is linearised, with data for several kinds of patterns."""
 
     def __init__(
         self, design: Design, state: State, x: Array | None, every_start: bool = False
@@ -163,15 +157,14 @@ class LinearisedDesign:
         self.weight = reading_weights(design, self.readings)
         self.x = expected_readings(design, state, design.readings) if x is None else x
         self.unit, self.white = length_directions(design, state, x), design.once(length_whitening)
-        turned = locations(design, state, self.readings) - state.origins[self.readings.position]
-        self.arm = turned
+        self.arm = locations(design, state, self.readings) - state.origins[self.readings.position]
         self.has_plate = design.plate_positions
 
-    def of_readings(
+    def reading_entries(
         self, rows: Integers, by_axis: Array, group: Integers | None = None
     ) -> tuple[Integers, Integers, Array]:
-        """Entries of a displacement `by_axis` (m, d, k) of the plate readings `rows` (m,), in k
-        columns.
+        """Return entries of a displacement `by_axis` (m, d, k) of the plate readings `rows` (m,),
+        in k columns.
 
         With `group` (m,) each group has k columns of its own.
         """
@@ -184,14 +177,18 @@ class LinearisedDesign:
         return row[used], column[used], value[used]
 
     def along_lengths(self, displacement: Array) -> Array:
-        """Changes (lengths, k) of lengths by displacements (readings, d, k) of all readings."""
-        given = self.design.of(Lengths)
-        other = displacement[np.maximum(given.second, 0)]
-        apart = displacement[given.first] - np.where(given.to_pivot[:, None, None], 0.0, other)
+        """Return changes (lengths, k) of lengths by displacements (readings, d, k) of all
+        readings.
+        """
+        lengths = self.design.of(Lengths)
+        at_second = displacement[np.maximum(lengths.second, 0)]
+        apart = displacement[lengths.first] - np.where(
+            lengths.to_pivot[:, None, None], 0.0, at_second
+        )
         return np.einsum("md,mdk->mk", self.unit, apart)
 
-    def of_lengths(self, columns: Array) -> tuple[Integers, Integers, Array]:
-        """Entries of changes (lengths, k) of measured less known lengths."""
+    def length_entries(self, columns: Array) -> tuple[Integers, Integers, Array]:
+        """Return entries of changes (lengths, k) of measured minus known lengths."""
         white = self.white.whitened(columns)
         row, column = np.nonzero(white)
         return self.places["length"].start + row, column, white[row, column]
@@ -212,43 +209,46 @@ def _block(
 
 
 def _joined(*parts: tuple[Integers, Integers, Array]) -> tuple[Integers, Integers, Array]:
-    row, column, value = (np.concatenate(one) for one in zip(*parts, strict=True))
+    row, column, value = (np.concatenate(part_arrays) for part_arrays in zip(*parts, strict=True))
     return row, column, value
 
 
-def _single_readings(at: LinearisedDesign) -> Iterator[BiasPatterns]:
-    row, axis = np.nonzero(at.weight)
-    entries = at.weight.shape[1] * row + axis, np.arange(len(row)), at.weight[row, axis]
-    yield _block("reading", entries, at.chosen[row], axis)
+def _single_readings(linearised: LinearisedDesign) -> Iterator[BiasPatterns]:
+    row, axis = np.nonzero(linearised.weight)
+    entries = (
+        linearised.weight.shape[1] * row + axis,
+        np.arange(len(row)),
+        linearised.weight[row, axis],
+    )
+    yield _block("reading", entries, linearised.chosen[row], axis)
 
 
-def _single_lengths(at: LinearisedDesign) -> Iterator[BiasPatterns]:
+def _single_lengths(linearised: LinearisedDesign) -> Iterator[BiasPatterns]:
     """Lengths that share no reading with others."""
-    alone, white = at.white.alone, at.white.single
+    alone, white = linearised.white.alone, linearised.white.single
     row, column = _pairs_within(white, white.group)
-    own, along = white.own[column], white.direction
-    value = ((row == column) - along[row] * along[column]) / own
-    yield _block("length", (at.places["length"].start + row, column, value), alone)
+    uncertainty, along = white.own[column], white.direction
+    value = ((row == column) - along[row] * along[column]) / uncertainty
+    yield _block("length", (linearised.places["length"].start + row, column, value), alone)
 
 
-def _ends(at: LinearisedDesign) -> Iterator[BiasPatterns]:
-    """Readings of standards whose lengths are read together, each along the axes that change
-    lengths differently.
-    """
-    given = at.design.of(Lengths)
-    joint = np.setdiff1d(np.arange(len(given)), at.white.alone)
-    for reading in np.unique([given.first[joint], given.second[joint]]):
-        sign = (given.first == reading).astype(float) - (given.second == reading)
-        axes = _different(sign[:, None] * given.direction)
+def _ends(linearised: LinearisedDesign) -> Iterator[BiasPatterns]:
+    """Readings of standards whose lengths are read together, along axes with different effects."""
+    lengths = linearised.design.of(Lengths)
+    joint = np.setdiff1d(np.arange(len(lengths)), linearised.white.alone)
+    for reading in np.unique([lengths.first[joint], lengths.second[joint]]):
+        sign = (lengths.first == reading).astype(float) - (lengths.second == reading)
+        axes = _distinct_columns(sign[:, None] * lengths.direction)
         yield _block(
-            "end", at.of_lengths(sign[:, None] * at.unit[:, axes]), [reading] * len(axes), axes
+            "end",
+            linearised.length_entries(sign[:, None] * linearised.unit[:, axes]),
+            [reading] * len(axes),
+            axes,
         )
 
 
-def _different(columns: Array) -> list[int]:
-    """Indices of columns that are neither slight nor multiples of a larger one, of equal ones of
-    the first.
-    """
+def _distinct_columns(columns: Array) -> list[int]:
+    """Return indices of columns that are neither slight nor multiples of a larger one."""
     size = np.linalg.norm(columns, axis=0)
     chosen: list[int] = []
     for k in np.argsort(-(size / size.max()).round(6), kind="stable").tolist():
@@ -261,74 +261,82 @@ def _different(columns: Array) -> list[int]:
 
 
 def _pairs_within(white: Whitening, group: Integers) -> tuple[Integers, Integers]:
-    """All pairs of rows that whitening mixes, each with itself as well."""
+    """Return all pairs of rows that whitening mixes, including each row with itself."""
     every = np.arange(len(group))
     if not white.direction.any():
         return every, every
     pairs = []
     for certificate in np.unique(group):
-        own = np.flatnonzero(group == certificate)
-        pairs.append(np.stack(np.meshgrid(own, own, indexing="ij")).reshape(2, -1))
+        members = np.flatnonzero(group == certificate)
+        pairs.append(np.stack(np.meshgrid(members, members, indexing="ij")).reshape(2, -1))
     row, column = np.concatenate(pairs, axis=1)
     return row, column
 
 
-def _single_items(at: LinearisedDesign) -> Iterator[BiasPatterns]:
-    """Certified values and priors: what is stated too large makes residuals smaller."""
-    # What is known of the machine first, then of artefacts.
-    for one in reversed(at.design.observations):
-        if isinstance(one, Lengths):
+def _single_items(linearised: LinearisedDesign) -> Iterator[BiasPatterns]:
+    """Certified values and priors."""
+    # Information on the machine first, then on artefacts. A value stated too large makes residuals
+    # smaller.
+    for observation in reversed(linearised.design.observations):
+        if isinstance(observation, Lengths):
             continue
-        # Beside a constraint nothing of what is stated as exact is left in the residuals.
-        chosen = np.flatnonzero(~one.is_exact)
-        first, every = at.places[one.word].start, np.arange(len(chosen))
-        entries = (first + chosen, every, -1.0 / one.uncertainty[chosen])
-        if one.is_joint:
-            white = -one.whitened(np.eye(len(one))[:, chosen])
+        # A constraint leaves no residual.
+        chosen = np.flatnonzero(~observation.is_exact)
+        first, every = linearised.places[observation.word].start, np.arange(len(chosen))
+        entries = (first + chosen, every, -1.0 / observation.uncertainty[chosen])
+        if observation.is_joint:
+            white = -observation.whitened(np.eye(len(observation))[:, chosen])
             row, column = np.nonzero(white)
             entries = (first + row, column, white[row, column])
-        yield _block(one.word, entries, chosen, one.along[chosen])
+        yield _block(observation.word, entries, chosen, observation.along[chosen])
 
 
-def _dirty_balls(at: LinearisedDesign) -> Iterator[BiasPatterns]:
-    """A ball that is read several times in a position, displaced there; read once, it is the same
-    as its reading.
-    """
-    d = at.design.dimension
-    key = at.readings.ball * len(at.design.positions.names) + at.readings.position
+def _dirty_balls(linearised: LinearisedDesign) -> Iterator[BiasPatterns]:
+    """A ball that is read several times in a position, displaced there."""
+    d = linearised.design.dimension
+    key = (
+        linearised.readings.ball * len(linearised.design.positions.names)
+        + linearised.readings.position
+    )
     _, first, group, count = np.unique(
         key, return_index=True, return_inverse=True, return_counts=True
     )
+    # Of a ball read once, this would be the pattern of its reading.
     number = np.where(count > 1, np.cumsum(count > 1) - 1, -1)
     rows = np.flatnonzero(number[group] >= 0)
     row = d * rows[:, None] + np.arange(d)
     column = d * number[group[rows]][:, None] + np.arange(d)
-    subject = np.repeat(at.chosen[first[count > 1]], d)
+    subject = np.repeat(linearised.chosen[first[count > 1]], d)
     axis = np.tile(np.arange(d), int((count > 1).sum()))
-    yield _block("ball", (row.ravel(), column.ravel(), at.weight[rows].ravel()), subject, axis)
+    yield _block(
+        "ball", (row.ravel(), column.ravel(), linearised.weight[rows].ravel()), subject, axis
+    )
 
 
-def _moved_balls(at: LinearisedDesign) -> Iterator[BiasPatterns]:
-    """Balls that have been displaced on their plate, along its axes, from one position on."""
-    d, readings = at.design.dimension, at.readings
-    place = position_order(at.design)[readings.position]
-    order = np.lexsort((np.arange(len(place)), place, readings.ball))
-    ball, place = readings.ball[order], place[order]
+def _moved_balls(linearised: LinearisedDesign) -> Iterator[BiasPatterns]:
+    """Balls displaced on their plate, along its axes, from one position on."""
+    d, readings = linearised.design.dimension, linearised.readings
+    rank = position_order(linearised.design)[readings.position]
+    order = np.lexsort((np.arange(len(rank)), rank, readings.ball))
+    ball, rank = readings.ball[order], rank[order]
     same_ball = np.diff(ball) == 0
-    starts = 1 + np.flatnonzero(same_ball & (np.diff(place) > 0))
+    starts = 1 + np.flatnonzero(same_ball & (np.diff(rank) > 0))
     end = np.searchsorted(ball, ball[starts], side="right")
     group, rows = _runs(starts, end)
     rows = order[rows]
-    turn = at.state.rotations[readings.position[rows]]
-    first = np.repeat(at.chosen[order[starts]], d)
+    turn = linearised.state.rotations[readings.position[rows]]
+    first = np.repeat(linearised.chosen[order[starts]], d)
     yield _block(
-        "moved", at.of_readings(rows, turn, group), first, np.tile(np.arange(d), len(starts))
+        "moved",
+        linearised.reading_entries(rows, turn, group),
+        first,
+        np.tile(np.arange(d), len(starts)),
     )
 
 
 def _runs(start: Integers, end: Integers) -> tuple[Integers, Integers]:
-    """All of several ranges (g,) one after the other: the number of each one's range, and what
-    stands in it.
+    """Return the indices in several ranges (g,), one range after the other, with the number of the
+    range.
 
     >>> _runs(np.array([3, 7]), np.array([5, 8]))
     (array([0, 0, 1]), array([3, 4, 7]))
@@ -339,16 +347,16 @@ def _runs(start: Integers, end: Integers) -> tuple[Integers, Integers]:
 
 
 def position_order(design: Design) -> Integers:
-    """Place (positions,) of each position in the order in which the readings were taken."""
+    """Return the rank (positions,) of each position in the order of the readings."""
     order = np.full(len(design.positions.names), len(design.positions.names))
-    found, first = np.unique(design.readings.position, return_index=True)
-    order[found[np.argsort(first)]] = np.arange(len(found))
+    read_positions, first = np.unique(design.readings.position, return_index=True)
+    order[read_positions[np.argsort(first)]] = np.arange(len(read_positions))
     return order
 
 
-def _slip_starts(at: LinearisedDesign, rows: Integers) -> Integers:
-    """Places among a position's `rows` that a slip may come before."""
-    if at.every_start:
+def _slip_starts(linearised: LinearisedDesign, rows: Integers) -> Integers:
+    """Return indices in a position's `rows` before which a slip may come."""
+    if linearised.every_start:
         count = len(rows) - 2 * LEAST_PART + 1
         if count < 1:
             return np.zeros(0, np.int64)
@@ -357,134 +365,148 @@ def _slip_starts(at: LinearisedDesign, rows: Integers) -> Integers:
                 np.int64
             )
         )
-    probe = at.readings.probe[rows]
+    probe = linearised.readings.probe[rows]
     changes = np.flatnonzero(np.diff(probe)) + 1
-    # Between probes only where each has its readings together.
+    # Between probes, if the readings of each are together.
     between = changes if len(changes) == len(np.unique(probe)) - 1 else changes[:0]
     return np.unique(np.append(between, len(rows) // 2))
 
 
-def _slips(at: LinearisedDesign) -> Iterator[BiasPatterns]:
+def _slips(linearised: LinearisedDesign) -> Iterator[BiasPatterns]:
     """Plates that slipped within a position."""
-    d = at.design.dimension
-    for k in at.has_plate:
-        rows = np.flatnonzero(at.readings.position == k)
-        starts = _slip_starts(at, rows)
+    d = linearised.design.dimension
+    for k in linearised.has_plate:
+        rows = np.flatnonzero(linearised.readings.position == k)
+        starts = _slip_starts(linearised, rows)
         starts = starts[(starts > 0) & (starts < len(rows))]
         if not len(starts):
             continue
         group, late = _runs(starts, np.full(len(starts), len(rows)))
         moved = rows[late]
-        first = at.chosen[rows[starts]]
+        first = linearised.chosen[rows[starts]]
         shifts = np.broadcast_to(np.eye(d), (len(moved), d, d))
         axes = np.tile(np.arange(d), len(starts))
-        entries = at.of_readings(moved, shifts, group)
+        entries = linearised.reading_entries(moved, shifts, group)
         yield _block("shift", entries, [k] * len(axes), axes, np.repeat(first, d))
-        turns = rotation_sensitivity(at.arm[moved] - at.arm[rows].mean(axis=0))
+        turns = rotation_sensitivity(linearised.arm[moved] - linearised.arm[rows].mean(axis=0))
         about = np.tile(np.arange(3) if d == 3 else np.array([2]), len(starts))
-        entries = at.of_readings(moved, turns, group)
+        entries = linearised.reading_entries(moved, turns, group)
         yield _block("turn", entries, [k] * len(about), about, np.repeat(first, turns.shape[2]))
 
 
-def _probes(at: LinearisedDesign) -> Iterator[BiasPatterns]:
-    """Probes whose offsets are stated too large; of one that is estimated only its prior can be
-    wrong.
-    """
-    design, state = at.design, at.state
+def _probes(linearised: LinearisedDesign) -> Iterator[BiasPatterns]:
+    """Probes with offsets stated too large."""
+    design, state = linearised.design, linearised.state
     d, offsets = design.dimension, state.probes[design.readings.probe]
-    all_rates = offset_sensitivity(design.model, at.x, state.a, offsets)
+    all_rates = offset_sensitivity(design.model, linearised.x, state.a, offsets)
     probes = np.unique(design.readings.probe)
-    # A fit tests what its readings may show; a task may also use a probe that reads nothing else.
-    if not at.every_start:
+    # A task may use a probe without readings, of which a fit has no residual.
+    if not linearised.every_start:
         probes = np.union1d(probes, design.tasks.probes)
     for probe in probes:
+        # Of an estimated offset only the prior can be in error.
         fixed = np.ones(d, bool) if not design.probes.free.any() else ~design.probes.free[probe]
         if not fixed.any():
             continue
         rate = np.where((design.readings.probe == probe)[:, None, None], all_rates, 0.0)[
             :, :, fixed
         ]
-        rows = np.flatnonzero(at.readings.probe == probe)
-        of_lengths = at.of_lengths(at.along_lengths(rate))
-        entries = _joined(at.of_readings(rows, rate[at.chosen[rows]]), of_lengths)
+        rows = np.flatnonzero(linearised.readings.probe == probe)
+        of_lengths = linearised.length_entries(linearised.along_lengths(rate))
+        entries = _joined(
+            linearised.reading_entries(rows, rate[linearised.chosen[rows]]), of_lengths
+        )
         yield _block("probe", entries, [probe] * int(fixed.sum()), np.flatnonzero(fixed))
 
 
-def _length_values(at: LinearisedDesign) -> Iterator[BiasPatterns]:
-    """Certified lengths that are stated too long and are read several times, or together with
-    others.
-    """
-    given = at.design.of(Lengths)
-    known = given.is_known
+def _length_values(linearised: LinearisedDesign) -> Iterator[BiasPatterns]:
+    """Certified lengths stated too long that are read several times, or together with others."""
+    lengths = linearised.design.of(Lengths)
+    is_known = lengths.is_known
     numbers, first, count = np.unique(
-        given.certificate[known], return_index=True, return_counts=True
+        lengths.certificate[is_known], return_index=True, return_counts=True
     )
-    is_alone = np.isin(np.flatnonzero(known)[first], at.white.alone)
+    is_alone = np.isin(np.flatnonzero(is_known)[first], linearised.white.alone)
     for number in numbers[(count > 1) | ~is_alone]:
-        entries = at.of_lengths(-1.0 * (given.certificate == number)[:, None])
-        yield _block("length value", entries, int(np.flatnonzero(given.certificate == number)[0]))
+        entries = linearised.length_entries(-1.0 * (lengths.certificate == number)[:, None])
+        yield _block("length value", entries, int(np.flatnonzero(lengths.certificate == number)[0]))
 
 
-def _scales(at: LinearisedDesign) -> Iterator[BiasPatterns]:
-    """Certificates of an artefact of which all values are too long by one ratio."""
-    design = at.design
+def _scales(linearised: LinearisedDesign) -> Iterator[BiasPatterns]:
+    """Certificates of an artefact with all values too long by one ratio."""
+    design = linearised.design
     lengths = design.of(Lengths)
     of_length = design.balls.artefact[design.readings.ball[lengths.first]]
-    scaled = [one for one in design.observations if one.scales and len(one)]
+    scaled = [
+        observation
+        for observation in design.observations
+        if observation.scales and len(observation)
+    ]
     for artefact in range(len(design.artefacts.names)):
-        mine = [
-            np.flatnonzero(design.balls.artefact[one.balls[:, 0]] == artefact) for one in scaled
+        rows_of_artefact = [
+            np.flatnonzero(design.balls.artefact[observation.balls[:, 0]] == artefact)
+            for observation in scaled
         ]
         of_lengths = lengths.is_known & (of_length == artefact)
-        if sum(map(len, mine)) + len(np.unique(lengths.certificate[of_lengths])) < 2:
+        if sum(map(len, rows_of_artefact)) + len(np.unique(lengths.certificate[of_lengths])) < 2:
             continue
         parts = []
-        for one, rows in zip(scaled, mine, strict=True):
-            bias = np.zeros(len(one))
-            bias[rows] = one.scaled()[rows]
-            white = -one.whitened(bias)
+        for observation, rows in zip(scaled, rows_of_artefact, strict=True):
+            bias = np.zeros(len(observation))
+            bias[rows] = observation.scaled()[rows]
+            white = -observation.whitened(bias)
             row = np.flatnonzero(white)
-            parts.append((at.places[one.word].start + row, np.zeros_like(row), white[row]))
+            parts.append(
+                (linearised.places[observation.word].start + row, np.zeros_like(row), white[row])
+            )
         columns = -np.where(of_lengths, lengths.value, 0.0)[:, None]
-        yield _block("scale", _joined(*parts, at.of_lengths(columns)), artefact)
+        yield _block("scale", _joined(*parts, linearised.length_entries(columns)), artefact)
 
 
-def _expansions(at: LinearisedDesign) -> Iterator[BiasPatterns]:
+def _expansions(linearised: LinearisedDesign) -> Iterator[BiasPatterns]:
     """Artefacts that are larger in one position."""
-    design = at.design
-    values = length_values(design, at.state)
+    design = linearised.design
+    values = length_values(design, linearised.state)
     of_lengths = design.readings.position[design.of(Lengths).first]
     for k in range(len(design.positions.names)):
-        rows = np.flatnonzero(at.readings.position == k)
+        rows = np.flatnonzero(linearised.readings.position == k)
         if not len(rows) and not (of_lengths == k).any():
             continue
-        away = at.arm[rows] - at.arm[rows].mean(axis=0) if len(rows) else at.arm[rows]
+        away = (
+            linearised.arm[rows] - linearised.arm[rows].mean(axis=0)
+            if len(rows)
+            else linearised.arm[rows]
+        )
         columns = np.where(of_lengths == k, values, 0.0)[:, None]
         yield _block(
-            "expansion", _joined(at.of_readings(rows, away[:, :, None]), at.of_lengths(columns)), k
+            "expansion",
+            _joined(
+                linearised.reading_entries(rows, away[:, :, None]),
+                linearised.length_entries(columns),
+            ),
+            k,
         )
 
 
-def _drifts(at: LinearisedDesign) -> Iterator[BiasPatterns]:
-    """Drifts from the first reading to the last, of the reference point and of the scales: by the
-    clock that is stated, or in order.
-    """
-    if at.every_start:
+def _drifts(linearised: LinearisedDesign) -> Iterator[BiasPatterns]:
+    """Drifts from the first reading to the last, of the reference point and of the scales."""
+    if linearised.every_start:
         return
-    design, readings, d = at.design, at.design.readings, at.design.dimension
-    stated = [one.clock for one in design.influences if isinstance(one, Drift)]
-    clock = stated[0] if stated else even_clock(len(design.positions.names))
+    design, readings, d = linearised.design, linearised.design.readings, linearised.design.dimension
+    # By the stated clock, or in order.
+    clocks = [influence.clock for influence in design.influences if isinstance(influence, Drift)]
+    clock = clocks[0] if clocks else even_clock(len(design.positions.names))
     time = clock.hours(readings)[:, None]
     if not np.ptp(time) > 0.0:
         return
     time /= np.ptp(time)
     for kind, displacement, axes in (
         ("drift", time[:, :, None] * np.eye(d), np.arange(d)),
-        ("scale drift", (time * at.x)[:, :, None], np.array([-1])),
+        ("scale drift", (time * linearised.x)[:, :, None], np.array([-1])),
     ):
-        rows = np.arange(len(at.chosen))
-        entries = at.of_readings(rows, displacement[at.chosen])
-        of_lengths = at.of_lengths(at.along_lengths(displacement))
+        rows = np.arange(len(linearised.chosen))
+        entries = linearised.reading_entries(rows, displacement[linearised.chosen])
+        of_lengths = linearised.length_entries(linearised.along_lengths(displacement))
         yield _block(kind, _joined(entries, of_lengths), np.zeros(len(axes), np.int64), axes)
 
 

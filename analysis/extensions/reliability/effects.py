@@ -28,11 +28,10 @@ from .response import Response
 if TYPE_CHECKING:
     from scipy.sparse import csc_array, csr_array
 
-# Places of which all pairs are looked at; of more points, or balls of a plate, some are chosen
-# evenly.
+# Locations whose pairs are all evaluated; of more points, or balls of a plate, an even selection.
 MOST_PLACES = 200
 
-# Numbers of a product of functions and patterns that are held at once.
+# Values of a product of functions and patterns in memory.
 AT_ONCE = 2_000_000
 
 SYMBOLS = tuple(symbol for symbol, kind in QUANTITIES.items() if kind.effect)
@@ -40,10 +39,10 @@ SYMBOLS = tuple(symbol for symbol, kind in QUANTITIES.items() if kind.effect)
 
 @dataclass(frozen=True)
 class Largest:
-    """For k patterns the largest change by a unit of the bias (k,), its function (k,), and the
-    latter's uncertainty.
+    """Largest change by a unit of each bias (k,), its function (k,), and the function's uncertainty
+    (k,).
 
-    The function is -1, and the change 0, where there is none that is determined.
+    Without a determined function, the function is -1 and the change 0.
     """
 
     change: Array
@@ -53,14 +52,12 @@ class Largest:
 
 @dataclass(frozen=True)
 class Changes:
-    """Linear functions of the displacements of places: rows of `operator` (f, places d), with
-    uncertainties (f,).
+    """Linear functions of displacements: rows of `operator` (f, points d), with uncertainties (f,).
 
-    The places move by `common` (places d, r) times the common part of a response and, for balls, by
-    `own` (places d, n d) times its own part; None for points. These are moved by `direct`
-    (places d, k) as well where a bias of one of the k patterns enters the correction itself, as a
-    probe's offset does; None for balls. `first` and `second` (f,) are the places of each function,
-    or one and its axis.
+    The points move by `common` (points d, r) times the common part of a response and, if they are
+    balls, by `own` (points d, n d) times its own part, else None. `direct` (points d, k) is a
+    direct effect of the k patterns on corrected points, as of a probe's offset; None for balls.
+    `first` and `second` (f,) are the points of each function, or one and its axis.
     """
 
     operator: csr_array
@@ -72,7 +69,7 @@ class Changes:
     direct: csc_array | None = None
 
     def largest(self, response: Response) -> Largest:
-        """The largest change of a function by each pattern."""
+        """Return the largest change of a function by each pattern."""
         count = len(response.index)
         change, where = np.zeros(count), np.full(count, -1)
         step = max(AT_ONCE // max(len(self.uncertainty), 1), 1)
@@ -93,58 +90,65 @@ class Changes:
 
 
 def changes_of(
-    at: Linearisation, given: Coordinates | Distances, biases: Patterns
+    linearisation: Linearisation, wanted: Coordinates | Distances, biases: Patterns
 ) -> Callable[[Integers], Changes]:
-    """Changes of co-ordinates, or of distances, by some `biases`; of a large artefact, those that
-    end at some or the asked balls.
+    """Return a function of balls that returns changes of co-ordinates or distances by some
+    `biases`.
+
+    In a large artefact, only distances that end at a selection of balls, or at the given balls,
+    count.
     """
-    places, made = given.places, displacements(at, given.places, narrow=False)
-    if isinstance(given, Coordinates):
-        found = _coordinates(made, places)
+    places, moves = wanted.places, displacements(linearisation, wanted.places, narrow=False)
+    if isinstance(wanted, Coordinates):
+        changes = _coordinates(moves, places)
         if isinstance(places, MeasuredPoints):
-            found = replace(found, direct=_direct(at, places, biases))
-        return lambda asked: found
+            changes = replace(changes, direct=_direct(linearisation, places, biases))
+        return lambda balls: changes
     if isinstance(places, MeasuredPoints):
         chosen = (
-            np.arange(len(made.places)) if given.pairs is not None else evenly(len(made.places))
+            np.arange(len(moves.places)) if wanted.pairs is not None else evenly(len(moves.places))
         )
         pairs = (
             np.stack(np.triu_indices(len(chosen), 1), axis=1)
-            if given.pairs is None
-            else given.pairs
+            if wanted.pairs is None
+            else wanted.pairs
         )
         of_points = replace(
-            _distances(made.select(chosen), None, pairs, chosen),
+            _distances(moves.select(chosen), None, pairs, chosen),
             direct=_direct(
-                at, MeasuredPoints(places.points[chosen], places.probes[chosen]), biases
+                linearisation, MeasuredPoints(places.points[chosen], places.probes[chosen]), biases
             ),
         )
-        return lambda asked: of_points
-    kept: dict[bytes, Changes] = {}
+        return lambda balls: of_points
+    cached: dict[bytes, Changes] = {}
 
-    def among(asked: Integers) -> Changes:
-        some = evenly(len(made.places))
-        others = np.setdiff1d(np.flatnonzero(np.isin(places.labels, asked)), some)
-        first, second = np.triu_indices(len(some), 1)
-        ends = np.stack([np.repeat(others, len(some)), np.tile(some, len(others))], axis=1)
-        pairs = np.concatenate([np.stack([some[first], some[second]], axis=1), ends])
-        pairs = pairs if given.pairs is None else given.pairs
+    def among(balls: Integers) -> Changes:
+        selection = evenly(len(moves.places))
+        further = np.setdiff1d(np.flatnonzero(np.isin(places.labels, balls)), selection)
+        first, second = np.triu_indices(len(selection), 1)
+        ends = np.stack(
+            [np.repeat(further, len(selection)), np.tile(selection, len(further))], axis=1
+        )
+        pairs = np.concatenate([np.stack([selection[first], selection[second]], axis=1), ends])
+        pairs = pairs if wanted.pairs is None else wanted.pairs
         key = pairs.tobytes()
-        if key not in kept:
-            kept.clear()
+        if key not in cached:
+            cached.clear()
             # Moving all balls in each batch would take time with the square of their number.
-            used = np.union1d(some, pairs)
-            moved, pairs = made.select(used), np.searchsorted(used, pairs)
-            own = _own_parts(at, moved, places.index[used])
-            kept[key] = _distances(moved, own, pairs, places.labels[used])
-        return kept[key]
+            used = np.union1d(selection, pairs)
+            moved, pairs = moves.select(used), np.searchsorted(used, pairs)
+            own_parts = _own_parts(linearisation, moved, places.index[used])
+            cached[key] = _distances(moved, own_parts, pairs, places.labels[used])
+        return cached[key]
 
     return among
 
 
 def across_probes(design: Design) -> Distances | None:
-    """Distances between points measured with any of the probes that measuring tasks use, at some
-    evaluation points; None where these are U6, or there is no task.
+    """Return distances between points measured with any of the tasks' probes, at some evaluation
+    points.
+
+    None if these are U6, or there is no task.
     """
     probes = np.unique(design.tasks.probes)
     if set(probes.tolist()) <= {design.evaluation.probe}:
@@ -156,7 +160,7 @@ def across_probes(design: Design) -> Distances | None:
 
 
 def evenly(count: int) -> Integers:
-    """Indices of up to `MOST_PLACES` of `count` places.
+    """Return up to `MOST_PLACES` evenly spread indices of `count`.
 
     >>> evenly(3).tolist(), len(evenly(1000)), int(evenly(1000)[-1])
     ([0, 1, 2], 200, 999)
@@ -166,52 +170,52 @@ def evenly(count: int) -> Integers:
     return np.linspace(0, count - 1, MOST_PLACES).round().astype(np.int64)
 
 
-def _direct(at: Linearisation, places: MeasuredPoints, biases: Patterns) -> csc_array:
-    """Changes (n d, k) of corrected points x + e(x, a, p) by p itself, where that is wrong."""
+def _direct(linearisation: Linearisation, places: MeasuredPoints, biases: Patterns) -> csc_array:
+    """Return changes (n d, k) of corrected points x + e(x, a, p) by an error of p itself."""
     from scipy.sparse import coo_array
 
-    state, chosen = at.state, biases.of_kind("probe")
+    state, chosen = linearisation.state, biases.of_kind("probe")
     offsets = state.probes[places.probes]
-    by_offset = offset_sensitivity(at.design.model, places.points, state.a, offsets)
-    mine = places.probes[:, None] == biases.subject[chosen]
-    changes = np.where(mine[:, None, :], by_offset[:, :, biases.axis[chosen]], 0.0)
+    by_offset = offset_sensitivity(linearisation.design.model, places.points, state.a, offsets)
+    is_own = places.probes[:, None] == biases.subject[chosen]
+    changes = np.where(is_own[:, None, :], by_offset[:, :, biases.axis[chosen]], 0.0)
     changes = changes.reshape(places.points.size, len(chosen))
     row, column = np.nonzero(changes)
     shape = len(changes), len(biases)
     return coo_array((changes[row, column], (row, chosen[column])), shape=shape).tocsc()
 
 
-def _own_parts(at: Linearisation, made: Displacements, index: Integers) -> csr_array:
-    """The parts (places d, n d) that balls have alone, in the columns of all balls."""
-    n, d = at.design.balls.places.shape
-    own = columns_of_balls(made.own.reshape(-1, d), np.repeat(index, d), n)
-    own.eliminate_zeros()
-    return own
+def _own_parts(linearisation: Linearisation, moves: Displacements, index: Integers) -> csr_array:
+    """Return the parts (balls d, n d) of single balls, in the columns of all balls."""
+    n, d = linearisation.design.balls.places.shape
+    parts = columns_of_balls(moves.own.reshape(-1, d), np.repeat(index, d), n)
+    parts.eliminate_zeros()
+    return parts
 
 
-def _coordinates(made: Displacements, places: Places) -> Changes:
-    """Co-ordinates of points that are determined."""
+def _coordinates(moves: Displacements, places: Places) -> Changes:
+    """Return the determined co-ordinates of points."""
     from scipy.sparse import csr_array, eye
 
-    n, d = made.places.shape
-    uncertainty = made.uncertainties.ravel()
-    known = np.flatnonzero(~np.isnan(uncertainty))
-    operator = csr_array(eye(n * d, format="csr"))[known]
-    place, axis = np.divmod(known, d)
-    common = made.common.reshape(n * d, -1)
-    return Changes(operator, common, None, uncertainty[known], places.labels[place], axis)
+    n, d = moves.places.shape
+    uncertainty = moves.uncertainties.ravel()
+    determined = np.flatnonzero(~np.isnan(uncertainty))
+    operator = csr_array(eye(n * d, format="csr"))[determined]
+    point, axis = np.divmod(determined, d)
+    common = moves.common.reshape(n * d, -1)
+    return Changes(operator, common, None, uncertainty[determined], places.labels[point], axis)
 
 
 def _distances(
-    made: Displacements, own: csr_array | None, pairs: Integers, labels: Integers
+    moves: Displacements, own: csr_array | None, pairs: Integers, labels: Integers
 ) -> Changes:
-    """Distances between pairs (m, 2) of places that are apart and, where they are as drawn,
+    """Return distances between pairs (m, 2) that are apart and, in the nominal design,
     determined.
     """
     from scipy.sparse import coo_array
 
-    n, d = made.places.shape
-    places, common, null, drawn = relative(made)
+    n, d = moves.places.shape
+    places, common, null, drawn = relative(moves)
     first, second = pairs.T
     apart = np.linalg.norm(places[first] - places[second], axis=1) > 0.0
     first, second = first[apart], second[apart]
@@ -229,8 +233,8 @@ def _distances(
 
     operator = by_places(places)
     change = (by_places(drawn) if null.shape[2] else operator) @ null.reshape(n * d, null.shape[2])
-    known = np.linalg.norm(change, axis=1) <= open_above(null)
-    operator, first, second = operator[known], first[known], second[known]
+    determined = np.linalg.norm(change, axis=1) <= open_above(null)
+    operator, first, second = operator[determined], first[determined], second[determined]
     flat = common.reshape(n * d, common.shape[2])
     variance = np.zeros(len(first))
     for start in range(0, flat.shape[1], 100):

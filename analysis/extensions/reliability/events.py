@@ -12,72 +12,72 @@ from ballplate.simulator.machines import Integers
 
 from .bias_patterns import Patterns
 
-# Kinds whose patterns come one for each axis, of one subject together.
+# Kinds with one pattern per axis of a subject.
 BY_AXIS: tuple[str, ...] = ("reading", "end", "ball", "moved", "probe")
-# Certified distances of one ball that are looked at together, at the most.
+# Largest number of certified distances of one ball in a group.
 MOST_DISTANCES = 12
 
 SLIP: tuple[str, ...] = ("shift", "turn")
 
 
-def event_groups(given: Patterns) -> list[Integers]:
-    """All events that are looked for, as arrays (g, q) of patterns: single ones, and what one cause
-    may do together.
+def event_groups(biases: Patterns) -> list[Integers]:
+    """Return all events to search as arrays (g, q) of patterns: single ones, and patterns of one
+    cause.
     """
-    found = [np.flatnonzero(given.kind != "moved")[:, None]]
+    groups = [np.flatnonzero(biases.kind != "moved")[:, None]]
     for kind in BY_AXIS:
-        found += _by_subject(given, kind)
-    found += _by_ball(given)
-    shift, turn = (_by_start(given, kind) for kind in SLIP)
+        groups += _by_subject(biases, kind)
+    groups += _by_ball(biases)
+    shift, turn = (_by_start(biases, kind) for kind in SLIP)
     if len(shift):
-        found += [shift, np.concatenate([shift, turn], axis=1)]
-    expansion = given.of_kind("expansion")
-    artefact = given.design.positions.artefact[given.subject[expansion]]
+        groups += [shift, np.concatenate([shift, turn], axis=1)]
+    expansion = biases.of_kind("expansion")
+    artefact = biases.design.positions.artefact[biases.subject[expansion]]
     pairs = [
         expansion[[i, j]]
         for i, j in combinations(range(len(expansion)), 2)
         if artefact[i] == artefact[j]
     ]
     if pairs:
-        found.append(np.array(pairs))
-    return found
+        groups.append(np.array(pairs))
+    return groups
 
 
-def _by_ball(given: Patterns) -> list[Integers]:
-    """Groups of all certified distances of one ball, of balls with as many together."""
-    columns = given.of_kind("distance")
-    ends = given.design.of(CalibratedDistances).first, given.design.of(CalibratedDistances).second
-    first, second = (end[given.subject[columns]] for end in ends)
+def _by_ball(biases: Patterns) -> list[Integers]:
+    """Return groups of all certified distances of one ball, by size of the group."""
+    columns = biases.of_kind("distance")
+    ends = biases.design.of(CalibratedDistances).first, biases.design.of(CalibratedDistances).second
+    first, second = (end[biases.subject[columns]] for end in ends)
     by_width: dict[int, list[Integers]] = {}
     for ball in np.unique([first, second]).tolist():
-        mine = columns[(first == ball) | (second == ball)]
-        if 1 < len(mine) <= MOST_DISTANCES:
-            by_width.setdefault(len(mine), []).append(mine)
+        own_columns = columns[(first == ball) | (second == ball)]
+        if 1 < len(own_columns) <= MOST_DISTANCES:
+            by_width.setdefault(len(own_columns), []).append(own_columns)
     return [np.array(by_width[width]) for width in sorted(by_width)]
 
 
-def _by_subject(given: Patterns, kind: str) -> Iterator[Integers]:
-    """Groups of the patterns of each subject, those of as many axes together."""
-    columns = given.of_kind(kind)
-    _, start, count = np.unique(given.subject[columns], return_index=True, return_counts=True)
+def _by_subject(biases: Patterns, kind: str) -> Iterator[Integers]:
+    """Return groups of the patterns of each subject, by number of axes."""
+    columns = biases.of_kind(kind)
+    _, start, count = np.unique(biases.subject[columns], return_index=True, return_counts=True)
     for q in np.unique(count[count > 1]):
         yield columns[start[count == q][:, None] + np.arange(q)]
 
 
-def _by_start(given: Patterns, kind: str) -> Integers:
-    """Patterns (starts, q) of the slips of each start."""
-    columns = given.of_kind(kind)
+def _by_start(biases: Patterns, kind: str) -> Integers:
+    """Return patterns (starts, q) of the slips of each start."""
+    columns = biases.of_kind(kind)
     if not len(columns):
         return np.zeros((0, 1), np.int64)
-    _, count = np.unique(given.start[columns], return_counts=True)
+    _, count = np.unique(biases.start[columns], return_counts=True)
     assert (count == count[0]).all()
     return columns.reshape(-1, int(count[0]))
 
 
 @dataclass(frozen=True)
 class Cause:
-    """What patterns come of: a `kind` (that of the patterns, or "slip"), its `subjects`, what is
-    wrong as in `patterns.Block`, and the first reading after a slip, or -1.
+    """Cause of patterns: `kind` (theirs, or "slip"), `subjects` as in `BiasPatterns`, first
+    reading after a slip or -1.
     """
 
     kind: str
@@ -85,18 +85,21 @@ class Cause:
     start: int = -1
 
 
-def cause(given: Patterns, columns: Integers) -> Cause:
-    """Which cause some patterns are of."""
-    kind = str(given.kind[columns[0]])
-    subjects = tuple(sorted({int(given.subject[k]) for k in columns}))
-    return Cause("slip" if kind in SLIP else kind, subjects, int(given.start[columns[0]]))
+def cause(biases: Patterns, columns: Integers) -> Cause:
+    """Return the cause of some patterns."""
+    kind = str(biases.kind[columns[0]])
+    subjects = tuple(sorted({int(biases.subject[k]) for k in columns}))
+    return Cause("slip" if kind in SLIP else kind, subjects, int(biases.start[columns[0]]))
 
 
-def whole(given: Patterns, columns: Integers) -> Integers:
-    """All patterns of the cause that `columns` are of."""
-    kind: str = given.kind[columns[0]]
+def all_directions(biases: Patterns, columns: Integers) -> Integers:
+    """Return all patterns of the cause of some."""
+    kind: str = biases.kind[columns[0]]
     if kind not in (*BY_AXIS, *SLIP):
         return columns
-    found = cause(given, columns)
-    same = given.of_kind(*(SLIP if kind in SLIP else (kind,)))
-    return same[(given.subject[same] == found.subjects[0]) & (given.start[same] == found.start)]
+    common_cause = cause(biases, columns)
+    candidates = biases.of_kind(*(SLIP if kind in SLIP else (kind,)))
+    return candidates[
+        (biases.subject[candidates] == common_cause.subjects[0])
+        & (biases.start[candidates] == common_cause.start)
+    ]

@@ -2,9 +2,9 @@
 absorbs.
 
 With the square root G of the covariance and the whitened Jacobian J, the columns of Q = J G are
-orthonormal, and H = Q Q' is the hat matrix. As G has one block for each ball, a row of Q has a part
-that it may share with all others and one of d columns that only rows of the same ball have. Neither
-J nor H is formed; nothing here needs full rank.
+orthonormal, and H = Q Q' is the hat matrix. G has one block for each ball. So a row of Q has a
+common part, and a part of d columns that only rows of the same ball have. Neither J nor H is
+formed, and the rank need not be full.
 """
 
 from __future__ import annotations
@@ -21,8 +21,8 @@ from ballplate.simulator.machines import Array, Integers
 
 @dataclass(frozen=True)
 class HatRows:
-    """Some `rows` (b,) of Q: `common` (b, r), and `own` (b, d) in the columns of `ball` (b,), -1
-    without one.
+    """Some `rows` (b,) of Q: `common` (b, r), and `own` (b, d) in the columns of `ball` (b,) or
+    -1.
     """
 
     rows: Integers
@@ -32,13 +32,13 @@ class HatRows:
 
 
 def row_places(design: Design) -> dict[str, slice]:
-    """Where the whitened rows of each kind stand, by its word: d for each reading of a plate, one
-    for each other observation.
+    """Return the whitened rows by kind: d for each reading of a plate, one for each other
+    observation.
 
-    Of lengths read together there are as many rows as lengths that do not follow from others.
+    Lengths read together have one row for each length that does not follow from others.
     """
     counts = {"reading": design.dimension * len(design.plate_readings)}
-    counts |= {one.word: one.count(design) for one in design.observations}
+    counts |= {observation.word: observation.count(design) for observation in design.observations}
     ends = np.cumsum(list(counts.values())).tolist()
     return {
         word: slice(end - count, end)
@@ -47,23 +47,23 @@ def row_places(design: Design) -> dict[str, slice]:
 
 
 def row_count(design: Design) -> int:
-    """Number of the whitened rows of all observations."""
+    """Return the number of whitened rows of all observations."""
     return max(rows.stop for rows in row_places(design).values())
 
 
 def whitened_residuals(design: Design, state: State, x: Array | None) -> Array:
-    """Residuals (rows,) of all observations, in units of their standard uncertainties."""
+    """Return residuals (rows,) of all observations, in units of their standard uncertainties."""
     chosen = design.plate_readings
     of_readings = reading_blocks(
         design, state, design.readings.select(chosen), None if x is None else x[chosen]
     )
-    others = [one.rows(design, state, x).residual for one in design.observations]
-    return np.concatenate([of_readings.residual.ravel(), *others])
+    residuals = [observation.rows(design, state, x).residual for observation in design.observations]
+    return np.concatenate([of_readings.residual.ravel(), *residuals])
 
 
 @single_threaded
 def hat_rows(at: Linearisation, x: Array | None) -> Iterator[HatRows]:
-    """All rows of Q, some at a time; readings of one ball come together."""
+    """Return all rows of Q in batches; readings of one ball are together."""
     design, layout, state, balls = at.design, at.layout, at.state, at.balls
     places, d = row_places(design), design.dimension
     width, rank = balls.common.shape[2], at.rank
@@ -85,21 +85,26 @@ def hat_rows(at: Linearisation, x: Array | None) -> Iterator[HatRows]:
             own.reshape(-1, d),
             np.repeat(ball, d),
         )
-    for one in design.observations:
-        found, of = one.rows(design, state, x), one.balls
-        is_single = of.shape[1] == 1
-        for part in _slices(len(found.residual)):
+    for observation in design.observations:
+        blocks, ends = observation.rows(design, state, x), observation.balls
+        is_single = ends.shape[1] == 1
+        for part in _slices(len(blocks.residual)):
             shape = (part.stop - part.start, width)
-            common = np.zeros(shape) if found.by_shared is None else widened(found.by_shared[part])
-            for ball, slope in zip(of[part].T, found.by_ball[part].swapaxes(0, 1), strict=True):
+            common = (
+                np.zeros(shape) if blocks.by_shared is None else widened(blocks.by_shared[part])
+            )
+            for ball, slope in zip(ends[part].T, blocks.by_ball[part].swapaxes(0, 1), strict=True):
                 common += (slope[:, None] @ balls.common[ball])[:, 0]
-            # Balls that are tied to others have no part of their own.
+            # Tied balls have no part of their own.
             own, alone = np.zeros((len(common), d)), np.full(len(common), -1)
             if is_single:
-                alone = of[part, 0]
-                own = (found.by_ball[part] @ balls.own[alone])[:, 0]
+                alone = ends[part, 0]
+                own = (blocks.by_ball[part] @ balls.own[alone])[:, 0]
             yield HatRows(
-                places[one.word].start + np.arange(part.start, part.stop), common, own, alone
+                places[observation.word].start + np.arange(part.start, part.stop),
+                common,
+                own,
+                alone,
             )
 
 
@@ -110,7 +115,7 @@ def _slices(count: int) -> list[slice]:
 
 
 def _reading_batches(design: Design) -> Iterator[Integers]:
-    """Readings of plates by their place among these, whole balls at a time."""
+    """Return indices of plate readings, whole balls at a time."""
     ball = design.readings.ball[design.plate_readings]
     order = np.argsort(ball, kind="stable")
     ends = np.cumsum(np.bincount(ball, minlength=1))
@@ -125,17 +130,19 @@ def _reading_batches(design: Design) -> Iterator[Integers]:
 def _reading_rows(
     design: Design, layout: SharedLayout, state: State, x: Array | None, chosen: Integers
 ) -> tuple[Array, Array]:
-    """Derivatives of readings by the shared parameters (m, d, s) and by their balls (m, d, d)."""
+    """Return derivatives of readings by the shared parameters (m, d, s) and by their balls (m,
+    d, d).
+    """
     readings = design.readings.select(chosen)
     blocks = reading_blocks(design, state, readings, None if x is None else x[chosen])
     m, d = len(chosen), design.dimension
-    # What is held goes to the extra column.
+    # The extra column takes the derivatives by held parameters, whose column is -1.
     shared = np.zeros((m, d, len(layout) + 1))
     shared[:, :, layout.model] = blocks.by_model
-    at = np.arange(m)[:, None]
-    shared[at, :, layout.pose_columns[readings.position]] = blocks.by_pose.transpose(0, 2, 1)
+    row = np.arange(m)[:, None]
+    shared[row, :, layout.pose_columns[readings.position]] = blocks.by_pose.transpose(0, 2, 1)
     if blocks.by_offset is not None:
-        shared[at, :, layout.offset_columns[readings.probe]] = blocks.by_offset.transpose(0, 2, 1)
+        shared[row, :, layout.offset_columns[readings.probe]] = blocks.by_offset.transpose(0, 2, 1)
     if blocks.by_influence is not None:
         shared[:, :, layout.influences] = blocks.by_influence
     return shared[:, :, :-1], blocks.by_ball

@@ -20,8 +20,7 @@ def reliability(
     sigma: Literal["estimated", "given"] | None = None,
     report: Report = unreported,
 ) -> Reliability:
-    """Which mistakes in readings and certificates residuals would show, and what those do that they
-    would not.
+    """Return redundancies, minimal detectable biases and effects of undetected errors.
 
     >>> import ballplate as bp
     >>> bp.reliability(bp.quickstart()).degrees_of_freedom

@@ -1,4 +1,4 @@
-"""Names of observations and events, as a metrologist would say them."""
+"""Names of observations and events in a metrologist's terms."""
 
 from __future__ import annotations
 
@@ -10,16 +10,16 @@ from ballplate.simulator.machines import Integers
 from .bias_patterns import Patterns
 
 
-def name(given: Patterns, k: int, with_position: bool = True) -> str:
-    """What a pattern is about; a reading's may be without its position."""
-    kind, subject = given.kind[k], int(given.subject[k])
-    design, axis = given.design, int(given.axis[k])
+def name(biases: Patterns, k: int, with_position: bool = True) -> str:
+    """Return the name of a pattern's subject; a reading's may omit its position."""
+    kind, subject = biases.kind[k], int(biases.subject[k])
+    design, axis = biases.design, int(biases.axis[k])
     letter = AXIS_NAMES[axis] if axis >= 0 else ""
     if kind in ("reading", "end"):
         return f"{reading_name(design, subject, with_position)}, {letter}"
-    for one in design.observations:
-        if one.word == kind:
-            return one.name(design, subject)
+    for observation in design.observations:
+        if observation.word == kind:
+            return observation.name(design, subject)
     if kind == "ball":
         ball, position = design.readings.ball[subject], design.readings.position[subject]
         return (
@@ -32,7 +32,7 @@ def name(given: Patterns, k: int, with_position: bool = True) -> str:
         return f"ball {design.ball_label(int(ball))} displaced {where}, along {letter} of the plate"
     if kind in ("shift", "turn"):
         how = f"along {letter}" if kind == "shift" else f"turned about {letter}"
-        return f"position {design.positions.names[subject]} slipped {slip_place(given, k)}, {how}"
+        return f"position {design.positions.names[subject]} slipped {slip_place(biases, k)}, {how}"
     if kind == "probe":
         return f"offset {letter} of probe {design.probes.names[subject]}"
     if kind == "length value":
@@ -47,25 +47,25 @@ def name(given: Patterns, k: int, with_position: bool = True) -> str:
 
 
 def common_ball(design: Design, distances: Integers) -> int:
-    """The ball that several distances have in common; of two between the same balls, the first."""
+    """Return the first ball that several distances have in common."""
     ends = design.of(CalibratedDistances).balls[distances]
     return next(int(ball) for ball in ends[0] if (ends == ball).any(axis=1).all())
 
 
-def slip_place(given: Patterns, k: int) -> str:
-    """Where in a position a slip of the artefact is looked for."""
-    design, position, start = given.design, int(given.subject[k]), int(given.start[k])
+def slip_place(biases: Patterns, k: int) -> str:
+    """Return the moment in a position before which a slip is tested."""
+    design, position, start = biases.design, int(biases.subject[k]), int(biases.start[k])
     rows = np.flatnonzero(design.readings.position == position)
     probe = design.readings.probe[rows]
-    at = int(np.searchsorted(rows, start))
-    if probe[at - 1] != probe[at] and probe[at - 1] not in probe[at:]:
-        return f"before probe {design.probes.names[probe[at]]}"
-    half = "half-way, " if at == len(rows) // 2 else ""
+    index = int(np.searchsorted(rows, start))
+    if probe[index - 1] != probe[index] and probe[index - 1] not in probe[index:]:
+        return f"before probe {design.probes.names[probe[index]]}"
+    half = "half-way, " if index == len(rows) // 2 else ""
     return f"{half}before ball {design.ball_label(int(design.readings.ball[start]))}"
 
 
 def reading_name(design: Design, reading: int, with_position: bool = True) -> str:
-    """A reading by ball and position, and by its probe where there are several."""
+    """Return a reading's ball and position, with its probe if there are several."""
     readings = design.readings
     position = (
         f" in position {design.positions.names[readings.position[reading]]}"

@@ -1,4 +1,4 @@
-"""Size of a bias, in standard deviations, that a two-sided test finds with a stated power."""
+"""Size of a bias, in standard deviations, that a two-sided test detects with a stated power."""
 
 from __future__ import annotations
 
@@ -8,19 +8,19 @@ import numpy as np
 
 POINTS = 20001
 
-# Non-centralities beyond this are none of a test that anybody makes.
+# Larger non-centralities have no practical test.
 LARGEST = 1e4
 
-# Chances of a test that can be told from never and always.
+# Limits of significance levels and powers, which rounding keeps apart from 0 and 1.
 LEAST_CHANCE, MOST_CHANCE = 1e-12, 0.999999
 
 
 def alarm_limit(false_alarm: float, freedom: float = math.inf) -> float:
-    """What a statistic exceeds in absolute value with the probability `false_alarm` if there is no
-    bias.
+    """Return the absolute value that a statistic without bias exceeds with probability
+    `false_alarm`.
 
-    Normal where sigma is known; with sigma from other observations of `freedom` degrees of freedom
-    Student's.
+    Normal if sigma is known; Student's with sigma from other observations of `freedom` degrees of
+    freedom.
 
     >>> round(alarm_limit(0.001), 4), round(alarm_limit(0.001, 10), 4)
     (3.2905, 4.5869)
@@ -33,11 +33,8 @@ def alarm_limit(false_alarm: float, freedom: float = math.inf) -> float:
 
 
 def chance_of_alarm(noncentrality: float, limit: float, freedom: float = math.inf) -> float:
-    """Probability that a statistic whose mean is off by `noncentrality` exceeds `limit` in absolute
+    """Return the probability that a statistic with mean `noncentrality` exceeds `limit` in absolute
     value.
-
-    Of Student's non-central distribution by the trapezoidal rule over the logarithm of the
-    estimated sigma: SciPy's is not a number for some biases at few degrees of freedom.
 
     >>> round(chance_of_alarm(0.0, alarm_limit(0.05, 4), 4), 9)
     0.05
@@ -46,6 +43,8 @@ def chance_of_alarm(noncentrality: float, limit: float, freedom: float = math.in
 
     if math.isinf(freedom):
         return float(ndtr(noncentrality - limit) + ndtr(-noncentrality - limit))
+    # The trapezoidal rule over the logarithm of the estimated sigma: SciPy's non-central t is NaN
+    # for some biases at few degrees of freedom.
     width = 10.0 / math.sqrt(freedom)
     y = np.linspace(-40.0 / freedom - width, min(width, 3.0), POINTS)
     weight = np.exp(freedom * (y - 0.5 * np.expm1(2.0 * y)))
@@ -55,10 +54,10 @@ def chance_of_alarm(noncentrality: float, limit: float, freedom: float = math.in
 
 
 def noncentrality(false_alarm: float, power: float, freedom: float = math.inf) -> float:
-    """The bias, in standard deviations of its estimate, that a two-sided test finds with the stated
-    power.
+    """Return the bias, in standard deviations of its estimate, that a two-sided test detects with
+    `power`.
 
-    It solves the test's power exactly, with both tails; infinite without a degree of freedom.
+    Both tails count; without a degree of freedom it is infinite.
 
     >>> round(noncentrality(0.001, 0.8), 3), noncentrality(0.001, 0.8, 0)
     (4.132, inf)

@@ -1,6 +1,4 @@
-"""Redundancy, minimal detectable biases and their effects for all observations and events of a
-design.
-"""
+"""Redundancy, minimal detectable biases and effects for all observations and events of a design."""
 
 from __future__ import annotations
 
@@ -33,7 +31,7 @@ from .response import responses
 
 FALSE_ALARM, POWER = 0.001, 0.8
 
-# In the place of a symbol: distances between points measured with any of the tasks' probes.
+# Instead of a symbol: distances between points measured with any of the tasks' probes.
 ACROSS = "across probes"
 
 
@@ -44,12 +42,11 @@ def reliability(
     sigma: Literal["estimated", "given"] | None = None,
     report: Report = unreported,
 ) -> Reliability:
-    """Reliability of an experiment's design at zero machine error; `sigma` overrides what the file
-    says.
+    """Return the reliability of an experiment's design at zero machine error.
 
-    `report` is told the number of observations done.
+    `sigma` overrides the file. `report` receives the number of finished observations.
 
-    :raises ExperimentError: it has more observations than there is memory for.
+    :raises ExperimentError: there is not enough memory for all observations.
     """
     design = lay_out(experiment)
     reason = too_many_entries(design)
@@ -72,15 +69,15 @@ def reliability_of(
     experiment: Experiment | None = None,
     report: Report = unreported,
 ) -> Reliability:
-    """Reliability of a design at zero machine error, where sigma is known or estimated."""
+    """Return the reliability of a design at zero machine error."""
     report(ProgressStep("observations", 0, row_count(design)))
-    at = linearise(design)
-    given = patterns(design, at.state, None)
+    linearisation = linearise(design)
+    biases = patterns(design, linearisation.state, None)
     functions = {
         symbol: groups
         for symbol in SYMBOLS
-        for groups in [functions_of(symbol, design, at.layout)]
-        # Of what only some experiments ask for, the others are told nothing.
+        for groups in [functions_of(symbol, design, linearisation.layout)]
+        # Functions of other experiments are not reported.
         if groups or QUANTITIES[symbol].is_recorded
     }
     mixed = across_probes(design)
@@ -88,68 +85,77 @@ def reliability_of(
         functions[ACROSS] = (mixed,)
     changes = {
         symbol: [
-            changes_of(at, group, given) for group in groups if not isinstance(group, Parameters)
+            changes_of(linearisation, group, biases)
+            for group in groups
+            if not isinstance(group, Parameters)
         ]
         for symbol, groups in functions.items()
     }
     places = row_places(design)
-    redundancy, left, information = (
+    redundancy, remaining_share, information = (
         np.zeros(row_count(design)),
-        np.zeros(len(given)),
-        np.zeros(len(given)),
+        np.zeros(len(biases)),
+        np.zeros(len(biases)),
     )
-    none = np.full(len(given), -1)
+    none = np.full(len(biases), -1)
     effects = {
-        symbol: Effects(groups, np.zeros(len(given)), none.copy(), none.copy(), none * np.nan)
+        symbol: Effects(groups, np.zeros(len(biases)), none.copy(), none.copy(), none * np.nan)
         for symbol, groups in functions.items()
     }
-    done = 0
-    for one in responses(at, given):
-        report(ProgressStep("observations", done, row_count(design)))
-        done += len(one.rows)
-        redundancy[one.rows] = 1.0 - one.hat
-        information[one.index] = one.information
-        left[one.index] = one.information / np.where(one.square > 0.0, one.square, 1.0)
-        asked = (
-            np.unique(one.own.indices // design.dimension)
-            if len(one.rows)
+    finished = 0
+    for response in responses(linearisation, biases):
+        report(ProgressStep("observations", finished, row_count(design)))
+        finished += len(response.rows)
+        redundancy[response.rows] = 1.0 - response.hat
+        information[response.index] = response.information
+        remaining_share[response.index] = response.information / np.where(
+            response.square > 0.0, response.square, 1.0
+        )
+        balls = (
+            np.unique(response.own.indices // design.dimension)
+            if len(response.rows)
             else np.zeros(0, np.int64)
         )
         for symbol, groups in changes.items():
-            for among in groups:
-                _put(effects[symbol], one.index, among(asked), among(asked).largest(one))
+            for changes_among in groups:
+                _enter_larger(
+                    effects[symbol],
+                    response.index,
+                    changes_among(balls),
+                    changes_among(balls).largest(response),
+                )
     readings = design.readings.select(design.plate_readings)
     is_read = measured(design, readings)
-    # Co-ordinates that are not read are no observations.
+    # Missing co-ordinates are no observations.
     redundancy[places["reading"]][~is_read.ravel()] = 0.0
-    joint = [one.word for one in design.observations if one.is_joint]
-    # Of standards' lengths those that share no reading come first, and have a pattern each.
+    joint = [response.word for response in design.observations if response.is_joint]
+    # Standards' lengths that share no reading come first, and have a pattern each.
     for kind, rows in places.items():
-        own, of_kind = np.flatnonzero(given.kind == kind), redundancy[rows]
+        columns, of_kind = np.flatnonzero(biases.kind == kind), redundancy[rows]
         if kind == "reading":
-            left[own] = of_kind[is_read.ravel()][: len(own)]
+            remaining_share[columns] = of_kind[is_read.ravel()][: len(columns)]
         elif kind == "length":
-            left[own] = of_kind[: len(own)]
+            remaining_share[columns] = of_kind[: len(columns)]
         elif kind not in joint:
-            left[own] = of_kind[given.subject[own]]
-    every = patterns(design, at.state, None, every_start=True)
-    tests = Columns(every.matrix, event_groups(every), leftover(at, None, 1)).tests()
-    across = effects.pop(ACROSS).change if mixed is not None else np.zeros(len(given))
+            remaining_share[columns] = of_kind[biases.subject[columns]]
+    every = patterns(design, linearisation.state, None, every_start=True)
+    tests = Columns(every.matrix, event_groups(every), leftover(linearisation, None, 1)).tests()
+    across = effects.pop(ACROSS).change if mixed is not None else np.zeros(len(biases))
     limit = 0.5 * FAMILY / max(tests, 1)
-    freedom = at.degrees_of_freedom
+    freedom = linearisation.degrees_of_freedom
     return Reliability(
         experiment.label if experiment else "",
         experiment.title if experiment else "",
         design,
-        given,
+        biases,
         redundancy,
-        left,
+        remaining_share,
         int(((readings.repeats - 1)[:, None] * is_read).sum()),
         information,
         effects,
         across,
         freedom,
-        at.deficiency,
+        linearisation.deficiency,
         sigma_is_estimated,
         false_alarm,
         power,
@@ -158,10 +164,8 @@ def reliability_of(
     )
 
 
-def _put(effects: Effects, index: Integers, changes: Changes, largest: Largest) -> None:
-    """Enter what patterns `index` change, where that is more than what has been entered of other
-    artefacts.
-    """
+def _enter_larger(effects: Effects, index: Integers, changes: Changes, largest: Largest) -> None:
+    """Enter changes by patterns `index` that exceed those entered of other artefacts."""
     more = comparable(largest.change) > comparable(effects.change[index])
     use = (largest.function >= 0) & (more | (effects.first[index] < 0))
     index, function = index[use], largest.function[use]

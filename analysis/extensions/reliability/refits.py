@@ -1,9 +1,9 @@
-"""Mistakes in an experiment file that estimates without them show: offsets of probes, and the
-arrangement of the axes.
+"""Errors in an experiment file that a fit without them reveals: offsets of probes, arrangement of
+axes.
 
-Offsets that are wrong by millimetres and another chain of axes are no small biases: their patterns
-at the wrong estimate explain little. The estimate is made anew with all offsets free, which gives
-the sum of squares of every single mistake in them, and once with each other arrangement.
+Offsets in error by millimetres and another chain of axes are no small biases: their patterns at the
+biased estimate explain little. A fit with all offsets free gives the sum of squares for every
+single error in them; each other arrangement has a fit of its own.
 """
 
 from __future__ import annotations
@@ -48,102 +48,109 @@ from .tails import log_chance, normal_equivalent
 
 Made = TypeVar("Made")
 
-# Significance level of S^2 beyond which estimates are made anew, and of what a mistake may leave
-# more than all offsets free.
+# Significance level of a sum of squares that needs refits, and of the excess of an error's sum of
+# squares over that with all offsets free.
 TOO_LARGE = 1e-3
 
-# Part of what an offset changes that residuals have to show: with small rotations they show little
-# of one that all readings of a position have in common. No offset is off by more (m).
+# Share of an offset's effect that residuals must show: with small rotations they show little of one
+# that all readings of a position have in common. Largest error of an offset (m).
 SHOWN, LARGEST_CHANGE = 1e-7, 0.2
 
-# Share of S^2 below which a mistake is named although what it leaves shows more.
+# Remaining share of S^2 below which an error is named although the remainder has other causes.
 NEARLY_ALL = 1e-2
 
 
 def diagnosis_with_refits(
-    at: Linearisation, x: Array, freedom: int, sigma_is_estimated: bool
+    fitted: Linearisation, x: Array, freedom: int, sigma_is_estimated: bool
 ) -> Diagnosis:
-    """What is suspected of the observations behind a fit, and of its offsets and arrangement.
+    """Search the residuals of a fit for their cause, including errors in offsets and in the
+    arrangement.
 
-    Where nothing explains the residuals to first order, or only several causes a S^2 that is too
-    large, the estimate is made anew without each mistake of these kinds. One is named if
-    it explains S^2 and leaves nothing unexplained; those that the readings do not distinguish
-    from it, together with it.
+    If no cause explains the residuals to first order, or only several causes explain a large S^2,
+    the estimate is repeated without each error of these kinds. An error is named if it explains S^2
+    and the remainder has explained causes, together with those that the readings do not distinguish
+    from it.
     """
     from scipy.special import chdtri
 
-    found = diagnosis_of_all(at, x, freedom, sigma_is_estimated)
-    is_small = at.factor.sum_of_squares <= float(chdtri(max(freedom, 1), TOO_LARGE))
-    if found.unexplained is None and (is_small or len(found.suspects) < 2):
-        return found
-    search = _Refits(at, x, freedom, sigma_is_estimated, found)
-    return search.offsets() or search.arrangements() or found
+    first_order = diagnosis_of_all(fitted, x, freedom, sigma_is_estimated)
+    is_small = fitted.factor.sum_of_squares <= float(chdtri(max(freedom, 1), TOO_LARGE))
+    if first_order.unexplained is None and (is_small or len(first_order.suspects) < 2):
+        return first_order
+    search = _Refits(fitted, x, freedom, sigma_is_estimated, first_order)
+    return search.offsets() or search.arrangements() or first_order
 
 
 @dataclass(frozen=True)
 class _Refits:
-    """A fit, and what was found of it to first order."""
+    """A fit, and its diagnosis to first order."""
 
     at: Linearisation
     x: Array
     freedom: int
     estimated: bool
-    found: Diagnosis
+    first_order: Diagnosis
 
     def offsets(self) -> Diagnosis | None:
-        """A mistake in the offsets of probes; None where none explains S^2."""
+        """Return the diagnosis with an error in the offsets of probes; None if none explains
+        S^2.
+        """
         design = self.at.design
         free = _free_offsets(design, self.x)
         if free is None:
             return None
         kinds = [
-            [(free.left(one), one) for one in every]
-            for every in (discrete_mistakes(design), free.single())
+            [(free.remaining(mistake), mistake) for mistake in mistakes]
+            for mistakes in (discrete_mistakes(design), free.single())
         ]
-        least = min([free.least, *(left for left, _ in kinds[0])])
+        least = min([free.least, *(remaining for remaining, _ in kinds[0])])
         most = min(least + self._variance(least) * free.tolerance, self.total - self._odds(least))
         limit = math.log(0.5 * FAMILY / max(sum(map(len, kinds)), 1))
         for mistakes, dimensions in zip(kinds, (1, design.dimension), strict=True):
             possible = [
-                one
-                for one in mistakes
-                if one[0] <= most and self._log_p(one[0], dimensions) < limit
+                (remaining, mistake)
+                for remaining, mistake in mistakes
+                if remaining <= most and self._log_p(remaining, dimensions) < limit
             ]
             near = self._near(possible)
-            found = self._of_offsets(near, limit) if near else None
-            if found:
-                return found
+            named = self._offset_diagnosis(near, limit) if near else None
+            if named:
+                return named
         return None
 
-    def _of_offsets(self, mistakes: list[WrongOffsets], limit: float) -> Diagnosis | None:
-        """What is suspected with the first of some mistakes."""
+    def _offset_diagnosis(self, mistakes: list[WrongOffsets], limit: float) -> Diagnosis | None:
+        """Return the diagnosis with the first of some errors."""
         design, first = self.at.design, mistakes[0]
         if not first.is_off:
-            words = tuple(one.words(design) for one in mistakes)
+            words = tuple(mistake.words(design) for mistake in mistakes)
             cure = "correct the offsets under probes, or the names of probes in the readings"
             return self._named("offsets", words, cure, with_offsets(design, first.change), limit)
         (probe,) = first.probes
         exact = _exact(design, stated_offsets(design) + first.change, np.array([probe]))
-        found = self._without(exact)
-        if found is None:
+        searched = self._without(exact)
+        if searched is None:
             return None
-        search, rest = found
+        search, remainder = searched
         log_p = self._log_p(search.sum_of_squares, design.dimension)
         statistics = normal_equivalent(log_p), normal_equivalent(limit)
         suspect = search.offset(probe, -first.change[probe], *statistics)
-        names = {one.probes[0]: design.probes.names[one.probes[0]] for one in mistakes}
+        names = {mistake.probes[0]: design.probes.names[mistake.probes[0]] for mistake in mistakes}
         if suspect:
-            given = suspect.patterns
-            every = np.array([suspect.columns[0], *(one[0] for one in suspect.alternatives)])
-            told = given.subject[every[given.kind[every] == "probe"]]
-            others = (f"offset of probe {name}" for k, name in names.items() if k not in told)
-            suspect = replace(suspect, of_model=(*others, *suspect.of_model))
-            return replace(rest, suspects=(suspect, *rest.suspects))
+            biases = suspect.patterns
+            every = np.array(
+                [suspect.columns[0], *(mistake[0] for mistake in suspect.alternatives)]
+            )
+            distinguished = biases.subject[every[biases.kind[every] == "probe"]]
+            further = (
+                f"offset of probe {name}" for k, name in names.items() if k not in distinguished
+            )
+            suspect = replace(suspect, of_model=(*further, *suspect.of_model))
+            return replace(remainder, suspects=(suspect, *remainder.suspects))
         words = tuple(f"the offset of probe {name} is another one" for name in names.values())
         return self._named("offsets", words, "qualify the probe again", exact, limit)
 
     def arrangements(self) -> Diagnosis | None:
-        """Other arrangements of the axes that explain S^2; None where none does."""
+        """Return the diagnosis with another arrangement of the axes; None if none explains S^2."""
         design = self.at.design
         model = design.model
         chain = model.spatial if isinstance(model, PlaneModel) else model
@@ -151,30 +158,31 @@ class _Refits:
             return None
         priors = design.of(Priors)
         if priors.of_model.any():
-            # What is known of these parameters, as by a map, says nothing of another arrangement's.
+            # Priors of these parameters, as of a map, do not apply to another arrangement's.
             alone = design.observed(priors.select(~priors.of_model))
             solution = estimate(alone, self.x)
             if solution.status != "converged":
                 return None
-            at = linearised_fit(alone, solution)
-            return replace(self, at=at, freedom=at.degrees_of_freedom).arrangements()
+            refitted = linearised_fit(alone, solution)
+            return replace(self, at=refitted, freedom=refitted.degrees_of_freedom).arrangements()
         names: dict[Arrangement, list[str]] = {}
         for name, arrangement in ARRANGEMENTS.items():
             if arrangement != chain.arrangement:
                 names.setdefault(arrangement, []).append(name)
         fits = []
         for arrangement in names:
-            other: ErrorModel = replace(chain, arrangement=arrangement)
-            other = replace(model, spatial=other) if isinstance(model, PlaneModel) else other
-            solution = estimate(replace(design, model=other), self.x)
+            changed: ErrorModel = replace(chain, arrangement=arrangement)
+            changed = replace(model, spatial=changed) if isinstance(model, PlaneModel) else changed
+            solution = estimate(replace(design, model=changed), self.x)
             if solution.status == "converged":
-                fits.append((solution.factor.sum_of_squares, (arrangement, other)))
+                fits.append((solution.factor.sum_of_squares, (arrangement, changed)))
         near, limit = self._near(fits), math.log(0.5 * FAMILY / len(names))
-        least = min((left for left, _ in fits), default=self.total)
+        least = min((remaining for remaining, _ in fits), default=self.total)
         if not near or self._log_p(least, 1) > limit or self.total - least < self._odds(least):
             return None
         words = tuple(
-            f"the arrangement of the axes is {' or '.join(names[one])}" for one, _ in near
+            f"the arrangement of the axes is {' or '.join(names[candidate])}"
+            for candidate, _ in near
         )
         cure = "correct arrangement under error_model"
         return self._named("arrangement", words, cure, replace(design, model=near[0][1]), limit)
@@ -183,60 +191,68 @@ class _Refits:
     def total(self) -> float:
         return self.at.factor.sum_of_squares
 
-    def _log_p(self, left: float, dimensions: int) -> float:
-        """Logarithm of the chance that so little is left."""
-        square = max(self.total - left, 0.0)
+    def _log_p(self, remaining: float, dimensions: int) -> float:
+        """Return the logarithm of the p-value of a remaining sum of squares."""
+        square = max(self.total - remaining, 0.0)
         return float(log_chance(square, self.total, dimensions, self.freedom, False))
 
-    def _variance(self, left: float) -> float:
-        return max(left / self.freedom, 1.0) if self.estimated else 1.0
+    def _variance(self, remaining: float) -> float:
+        return max(remaining / self.freedom, 1.0) if self.estimated else 1.0
 
     def _odds(self, least: float) -> float:
-        """What one explanation leaves more than another that clearly is the better."""
+        """Return the difference of sums of squares that makes one explanation clearly better."""
         return 2.0 * LOG_ODDS_LIMIT * self._variance(least)
 
     def _near(self, fits: list[tuple[float, Made]]) -> list[Made]:
-        """Of explanations with what they leave, those that the best does not clearly beat."""
-        fits = sorted(fits, key=lambda one: one[0])
-        return [one for left, one in fits if left <= fits[0][0] + self._odds(fits[0][0])]
+        """Return the explanations, given with remaining sums of squares, that the best does not
+        clearly beat.
+        """
+        fits = sorted(fits, key=lambda fit: fit[0])
+        return [
+            explanation
+            for remaining, explanation in fits
+            if remaining <= fits[0][0] + self._odds(fits[0][0])
+        ]
 
     def _without(self, design: Design) -> tuple[Search, Diagnosis] | None:
-        """The search of what a design without a mistake leaves, and what it finds; None where that
-        remains unexplained.
+        """Return the search with a corrected design, and its diagnosis; None if residuals remain
+        unexplained.
         """
         solution = estimate(design, self.x)
         if solution.status != "converged":
             return None
-        at = linearised_fit(design, solution)
-        search = Search(at, self.x, at.degrees_of_freedom, self.estimated)
-        found = search.found()
-        is_clear = found.unexplained is None and (self.found.unexplained or not found.suspects)
+        refitted = linearised_fit(design, solution)
+        search = Search(refitted, self.x, refitted.degrees_of_freedom, self.estimated)
+        remainder = search.diagnosis()
+        is_clear = remainder.unexplained is None and (
+            self.first_order.unexplained or not remainder.suspects
+        )
         if is_clear or solution.factor.sum_of_squares < NEARLY_ALL * self.total:
-            return search, found
+            return search, remainder
         return None
 
     def _named(
         self, kind: str, words: tuple[str, ...], cure: str, design: Design, limit: float
     ) -> Diagnosis | None:
-        """A mistake with what is suspected of the design without it."""
-        found = self._without(design)
-        if found is None:
+        """Return the diagnosis with an error in the file, and the causes that remain without it."""
+        searched = self._without(design)
+        if searched is None:
             return None
-        search, rest = found
-        left = search.sum_of_squares
-        before, times = (math.sqrt(one / self.freedom) for one in (self.total, left))
-        statistics = normal_equivalent(self._log_p(left, 1)), normal_equivalent(limit)
-        return replace(rest, refit=Refit(kind, words, cure, before, times, *statistics))
+        search, remainder = searched
+        remaining = search.sum_of_squares
+        before, times = (math.sqrt(square / self.freedom) for square in (self.total, remaining))
+        statistics = normal_equivalent(self._log_p(remaining, 1)), normal_equivalent(limit)
+        return replace(remainder, refit=Refit(kind, words, cure, before, times, *statistics))
 
 
 @dataclass(frozen=True)
 class _Offsets:
     """S^2 as a function of the offsets, from an estimate with all of them free.
 
-    The norm of `root` (r, l d) times the difference of offsets from those estimated, plus `side`
-    (r,), is what readings leave; `prior` (l d,) are standard uncertainties of stated offsets, 0 of
-    exact ones, and `size` (l d,) what readings change by a change of each. `tolerance` is what the
-    right offsets leave more than the best at most.
+    S^2 is the squared norm of `root` (r, l d) times the difference from the `estimated` offsets,
+    plus `side` (r,). `prior` (l d,) are standard uncertainties of stated offsets, 0 of exact ones,
+    and `size` (l d,) the changes of readings by a unit of each. `tolerance` is the largest excess
+    of the right offsets' S^2 over the least.
     """
 
     design: Design
@@ -249,17 +265,17 @@ class _Offsets:
 
     @property
     def least(self) -> float:
-        """What the best offsets leave."""
+        """S^2 of the best offsets."""
         return self._solved(np.zeros_like(self.prior), np.ones(len(self.prior), bool))[0]
 
-    def left(self, mistake: WrongOffsets) -> float:
-        """What is left with the offsets as they are but for a mistake."""
+    def remaining(self, mistake: WrongOffsets) -> float:
+        """Return S^2 with the stated offsets except for an error."""
         change, loose = mistake.change.ravel(), np.zeros(mistake.change.shape, bool)
         loose[list(mistake.probes)] = mistake.is_off
         return self._solved(change, loose.ravel())[0]
 
     def single(self) -> Iterator[WrongOffsets]:
-        """Each probe as one whose offset is off, by as much as leaves least."""
+        """Return each probe as one with an offset in error, by the amount with the least S^2."""
         shape = self.design.probes.offsets.shape
         shown = np.sqrt((self.root**2).sum(axis=0)) > SHOWN * self.size
         for probe in np.flatnonzero(shown.reshape(shape).any(axis=1)).tolist():
@@ -269,8 +285,10 @@ class _Offsets:
                 yield WrongOffsets((probe,), np.where(loose, change.reshape(shape), 0.0))
 
     def _solved(self, stated: Array, loose: Flags) -> tuple[float, Array]:
-        """The least that is left with offsets as `stated` (l d,) but for those that are `loose`
-        (l d,), and these offsets (l d,), all as changes of those in the file.
+        """Return the least S^2 with `loose` (l d,) offsets free and others as `stated` (l d,), and
+        the offsets (l d,).
+
+        All are changes of those in the file.
         """
         change = stated.copy()
         moving = loose | (self.prior > 0.0)
@@ -286,31 +304,34 @@ class _Offsets:
         size = np.maximum(self.size[moving], weight[moving])
         step = np.linalg.lstsq(root / size, -side, rcond=SHOWN)[0]
         change[moving] += step / size
-        rest = side + root @ (step / size)
-        return float(rest @ rest), change
+        residual = side + root @ (step / size)
+        return float(residual @ residual), change
 
 
 def _free_offsets(design: Design, x: Array) -> _Offsets | None:
-    """S^2 as a function of a design's offsets; None where the estimate with free ones fails."""
+    """Return S^2 as a function of a design's offsets; None if the fit with free ones fails."""
     from scipy.special import chdtri
 
     stated, read = stated_offsets(design), np.unique(design.readings.probe)
     shifts = offset_differences(design, x).shifts(len(stated))
-    known = _exact(design, stated + shifts, read)
+    exact_design = _exact(design, stated + shifts, read)
     free = np.isin(np.arange(len(stated)), read)[:, None] & np.ones(stated.shape, bool)
-    solution = estimate(replace(known, probes=replace(known.probes, free=free)), x)
+    solution = estimate(replace(exact_design, probes=replace(exact_design.probes, free=free)), x)
     if solution.status != "converged":
         return None
     exact = _exact(design, solution.state.probes, read)
-    at = linearise(exact, solution.state, x, as_drawn(exact))
-    rest, given = leftover(at, x, at.degrees_of_freedom), patterns(exact, solution.state, x)
-    chosen = given.of_kind("probe")
-    columns = np.zeros((len(rest.residual), stated.size + 1))
-    places = stated.shape[1] * given.subject[chosen] + given.axis[chosen]
-    biases = given.matrix[:, chosen].toarray()
-    columns[:, places], size = rest.of(biases), np.zeros(stated.size)
+    linearisation = linearise(exact, solution.state, x, as_drawn(exact))
+    remainder, all_patterns = (
+        leftover(linearisation, x, linearisation.degrees_of_freedom),
+        patterns(exact, solution.state, x),
+    )
+    chosen = all_patterns.of_kind("probe")
+    columns = np.zeros((len(remainder.residual), stated.size + 1))
+    places = stated.shape[1] * all_patterns.subject[chosen] + all_patterns.axis[chosen]
+    biases = all_patterns.matrix[:, chosen].toarray()
+    columns[:, places], size = remainder.of(biases), np.zeros(stated.size)
     size[places] = np.linalg.norm(biases, axis=0)
-    columns[:, -1] = rest.residual
+    columns[:, -1] = remainder.residual
     root = np.asarray(np.linalg.qr(columns, mode="r"))
     priors, prior = design.of(Priors), np.zeros(stated.shape)
     rows = np.flatnonzero(priors.probe >= 0)
@@ -322,9 +343,11 @@ def _free_offsets(design: Design, x: Array) -> _Offsets | None:
 
 
 def _exact(design: Design, offsets: Array, probes: Integers) -> Design:
-    """The design with some probes' offsets, out of `offsets` (l, d), as exact ones."""
-    priors, mine = design.of(Priors), np.isin(np.arange(len(offsets)), probes)[:, None]
-    kept = np.flatnonzero((priors.probe < 0) | ~np.isin(priors.probe, probes))
+    """Return the design with some probes' offsets, from `offsets` (l, d), stated as exact."""
+    priors, is_chosen = design.of(Priors), np.isin(np.arange(len(offsets)), probes)[:, None]
+    rows = np.flatnonzero((priors.probe < 0) | ~np.isin(priors.probe, probes))
     old = design.probes
-    new = replace(old, offsets=np.where(mine, offsets, old.offsets), free=old.free & ~mine)
-    return replace(design, probes=new).observed(priors.select(kept))
+    new = replace(
+        old, offsets=np.where(is_chosen, offsets, old.offsets), free=old.free & ~is_chosen
+    )
+    return replace(design, probes=new).observed(priors.select(rows))

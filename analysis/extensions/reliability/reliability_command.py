@@ -1,6 +1,4 @@
-"""`ballplate run --reliability`: which biases a design would notice, and the
-effects of the others.
-"""
+"""`ballplate run --reliability`: print minimal detectable biases of a design, and their effects."""
 
 from __future__ import annotations
 
@@ -33,21 +31,21 @@ def add_options(parser: ArgumentParser) -> None:
         metavar="0.1%",
         type=_share,
         default=0.001,
-        help="chance that the test of one bias raises a false alarm; default 0.1%%",
+        help="significance level of the test of one bias; default 0.1%%",
     )
     parser.add_argument(
         "--power",
         metavar="80%",
         type=_share,
         default=0.8,
-        help="chance that a bias of the size of the MDB is found; default 80%%",
+        help="probability of detecting a bias of the size of the MDB; default 80%%",
     )
     parser.add_argument(
         "--sigma",
         choices=("estimated", "given"),
         help=(
-            "test against the scatter of the residuals, or the stated uncertainties; default: what"
-            " the file says"
+            "test against sigma estimated from the residuals, or the stated uncertainties; default:"
+            " the file's choice"
         ),
     )
     parser.add_argument(
@@ -70,7 +68,7 @@ def _share(text: str) -> float:
 
 
 def run(options: Namespace) -> int:
-    """Tell the reliability of all experiments of the files."""
+    """Print the reliability of all experiments of the files."""
     from ballplate.cli import experiments, print_json, print_lines, progress
 
     from .redundancy import reliability
@@ -80,11 +78,11 @@ def run(options: Namespace) -> int:
         raise UsageError("--power must be above --false-alarm; any test has at least that power")
     chosen = experiments(options)
     if options.output is not None and len(chosen) > 1:
-        names = ", ".join(str(one.name or one.label) for one in chosen)
+        names = ", ".join(str(experiment.name or experiment.label) for experiment in chosen)
         raise UsageError(
             f"-o writes the table of one experiment; choose one with --variant: {names}"
         )
-    found = []
+    results = []
     for k, experiment in enumerate(chosen):
         with progress(options) as shown:
             result = reliability(
@@ -95,9 +93,9 @@ def run(options: Namespace) -> int:
                 options, {options.output: text_writer(partial(write_observations, result=result))}
             )
         if options.json:
-            found.append(result.to_dict())
+            results.append(result.to_dict())
         else:
             print_lines([*([""] if k else []), *result.lines(options.all)])
     if options.json:
-        print_json(found)
+        print_json(results)
     return 0

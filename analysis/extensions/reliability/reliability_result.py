@@ -1,6 +1,4 @@
-"""Reliability of a design, as text for people, plain data for programs, and a table for
-spreadsheets.
-"""
+"""Reliability of a design as text, plain data, and a table for spreadsheets."""
 
 from __future__ import annotations
 
@@ -37,32 +35,30 @@ from .rows_picture import RowOfPoints, draw_rows
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-# An effect below this share of the bias, in metres per unit, counts as none.
+# Effects below this share of the bias, in metres per unit, are neglected.
 NO_EFFECT = 1e-6
 
-# Observations of a kind that a table names.
+# Rows of a table of single observations.
 MOST = 5
 
-EVENTS: tuple[tuple[str, ...], ...] = (
-    ("ball",),
-    ("moved",),
-    ("shift",),
-    ("turn",),
-    ("probe",),
-    ("length value",),
-    ("scale",),
-    ("expansion",),
-    ("drift",),
-    ("scale drift",),
+EVENTS = (
+    "ball",
+    "moved",
+    "shift",
+    "turn",
+    "probe",
+    "length value",
+    "scale",
+    "expansion",
+    *DRIFTS,
 )
 
 
 @dataclass(frozen=True)
 class Effects:
-    """Largest changes `change` (k,) of `functions` of one kind by a unit of each pattern's bias,
-    and where.
+    """Largest changes `change` (k,) of `functions` of one kind by a unit of each pattern's bias.
 
-    `first` and `second` (k,) are the places of the function that changes most, -1 where none is
+    `first` and `second` (k,) are the points of the function that changes most, -1 if none is
     determined; `uncertainty` (k,) is its standard uncertainty.
     """
 
@@ -75,17 +71,16 @@ class Effects:
 
 @dataclass(frozen=True, repr=False)
 class Reliability(Result):
-    """What a design notices of biases, for each of its patterns.
+    """Reliability of a design: redundancies, minimal detectable biases and effects, by pattern.
 
-    `redundancy` (rows,) are the redundancy numbers of the observations; a reading of a plate stands
-    for the mean of its repeats, which have `among_repeats` degrees of freedom more among
-    themselves. `left` (k,) is that of each pattern: of a single observation its redundancy number,
-    otherwise the share of its square that is left in the residuals. `information` (k,) is what is
-    left of a pattern in the residuals, per unit of the bias squared, and 0 where that is nil.
-    `effects` are by symbol, and `across` (k,) is the largest change of a distance between points
-    measured with any of the probes that measuring tasks use. `noncentrality` belongs to the test
-    with `false_alarm` and `power`, sigma being known or estimated from the observations, less the
-    one suspected, and `fit_noncentrality` to each of all those tests that a fit makes.
+    `redundancy` (rows,) are the redundancy numbers of the observations; a reading of a plate is the
+    mean of its repeats, which have `among_repeats` further degrees of freedom. `left` (k,) is the
+    redundancy number of a single observation, otherwise the share of a pattern's square in the
+    residuals. `information` (k,) is a pattern's square in the residuals per unit of the bias
+    squared, 0 if negligible. `effects` are by symbol; `across` (k,) is the largest change of a
+    distance between points measured with any of the tasks' probes. `noncentrality` belongs to one
+    test with `false_alarm` and `power`, sigma being known or estimated from the other observations;
+    `fit_noncentrality` to each of the tests of a fit.
     """
 
     label: str
@@ -114,50 +109,82 @@ class Reliability(Result):
         )
 
     def lines(self, with_all: bool = False) -> list[str]:
-        """As lines of text; `with_all` lists every event, not only the worst of each position or
-        probe.
+        """Return lines of text; `with_all` lists every event, not only the worst of each
+        position or probe.
         """
-        return _lines(self, with_all)
+        lines = [*_heading(self), "", *_positions(self)]
+        readings = self.patterns.of_kind("reading")
+        items = self.patterns.of_kind(*single_kinds(self.design)[1:])
+        for title, chosen in (("worst readings", readings), ("worst items", items)):
+            if len(chosen):
+                lines += [
+                    "",
+                    *_table(self, title, _worst_first(self, chosen)[:MOST], with_redundancy=True),
+                ]
+        events: list[int] = []
+        for kind in EVENTS:
+            candidates = self.patterns.of_kind(kind)
+            events += candidates.tolist() if with_all else _worst_of_each(self, candidates)
+        if events:
+            lines += ["", *_table(self, "events", events, with_redundancy=False)]
+        return lines + _closing(self, with_all)
 
     def data(self) -> dict[str, Any]:
-        return _data(self)
+        """Return plain data in metres, radians and ratios; None if undetectable or undetermined."""
+        is_single = np.isin(self.patterns.kind, single_kinds(self.design))
+        return {
+            "experiment": self.label,
+            "title": self.title,
+            "parameters": self.design.parameter_count,
+            "observations": self.design.observation_count,
+            "rank_deficiency": self.deficiency,
+            **picked(self, "degrees_of_freedom", "sigma_is_estimated", "false_alarm", "power"),
+            "noncentrality": self.noncentrality,
+            "fit_noncentrality": self.fit_noncentrality,
+            "redundancy": float(self.redundancy.sum()) + self.among_repeats,
+            "redundancy_among_repeats": self.among_repeats,
+            "observations_by_name": [
+                {**_pattern_data(self, k), "redundancy": self.left[k]}
+                for k in np.flatnonzero(is_single).tolist()
+            ],
+            "events": [_pattern_data(self, k) for k in np.flatnonzero(~is_single).tolist()],
+        }
 
     def rows(self) -> list[dict[str, Any]]:
-        """One row for each bias: of an observation, a probe, a position, a certificate."""
+        """Return one row per bias: of an observation, a probe, a position, a certificate."""
         data = self.to_dict()
         rows = []
-        for one in (*data["observations_by_name"], *data["events"]):
-            changes = {symbol: effect.get("change") for symbol, effect in one["effects"].items()}
+        for bias in (*data["observations_by_name"], *data["events"]):
+            changes = {symbol: effect.get("change") for symbol, effect in bias["effects"].items()}
             names = ("name", "kind", "redundancy", "minimal_detectable", "found_by_fit", "unit")
-            rows.append({name.replace("_", " "): one.get(name) for name in names} | changes)
+            rows.append({name.replace("_", " "): bias.get(name) for name in names} | changes)
         return rows
 
     def plot(self, path: str | Path | None = None) -> Figure:
-        """The smallest biases of readings that a test finds, and what those just too small for it
-        change in U6, by position.
+        """Plot the minimal detectable biases of readings, and their effects on U6, by position.
 
-        With a path, which ends in .svg, .png or .pdf, the picture is written as well.
+        A path, which ends in .svg, .png or .pdf, saves the picture.
 
         :raises ImportError: matplotlib is missing.
-        :raises ValueError: the path ends in something else, or there are no readings of plates.
+        :raises ValueError: another ending, or no readings of plates.
         """
         readings = self.patterns.of_kind("reading")
         if not len(readings):
-            raise ValueError("no readings of plates are tested, so that there is nothing to draw")
+            raise ValueError("no readings of plates to draw")
         design = self.design
         position = design.readings.position[self.patterns.subject[readings]]
         panels = [
             (
                 name,
                 [
-                    RowOfPoints(design.positions.names[k], own[np.isfinite(own)])
+                    RowOfPoints(design.positions.names[k], biases_there[np.isfinite(biases_there)])
                     for k in np.unique(position)
-                    for own in [1e6 * values[readings[position == k]]]
+                    for biases_there in [1e6 * values[readings[position == k]]]
                 ],
             )
             for name, values in (
                 ("minimal detectable bias of a reading, µm", self.minimal_detectable),
-                ("what it changes in U6 at most, µm", _effect(self, "U6")),
+                ("its largest effect on U6, µm", _effect(self, "U6")),
             )
         ]
         words = f"{self.title}: minimal detectable biases of readings, and their effects on U6"
@@ -165,17 +192,15 @@ class Reliability(Result):
 
     @cached_property
     def found_by_fit(self) -> Array:
-        """The same of the tests that `fit` makes, which are many together; NaN for drifts, which it
-        looks for as smooth errors.
+        """Minimal detectable biases (k,) of all tests of `fit` together; NaN for drifts, its
+        smooth errors.
         """
         as_smooth = np.isin(self.patterns.kind, DRIFTS)
         return np.where(as_smooth, np.nan, self._biases(self.fit_noncentrality))
 
     @cached_property
     def minimal_detectable(self) -> Array:
-        """Minimal detectable biases (k,) in metres, radians or ratios; infinite where nothing can
-        be detected.
-        """
+        """Minimal detectable biases (k,) in metres, radians or ratios; infinite if undetectable."""
         return self._biases(self.noncentrality)
 
     def _biases(self, noncentrality: float) -> Array:
@@ -185,46 +210,24 @@ class Reliability(Result):
             )
 
     def is_harmless(self, k: int) -> bool:
-        """Whether a bias changes no distance: between balls, between corrected points with the
-        probe of the evaluation or those of measuring tasks, nor any other length that is judged.
+        """Return whether a bias changes no length: between balls, between corrected points, or
+        of a task.
         """
         changes = [self.across, *(self.effects[symbol].change for symbol in self.lengths)]
         return all(change[k] <= NO_EFFECT * self.size(k) for change in changes)
 
     @property
     def lengths(self) -> list[str]:
-        """Symbols of the effects that are on lengths."""
+        """Symbols of effects on lengths."""
         return [symbol for symbol in self.effects if QUANTITIES[symbol].are_lengths]
 
     def size(self, k: int) -> float:
-        """About how far, in metres, a unit of a bias moves what it is about."""
+        """Return the approximate displacement, in metres, by a unit of a bias."""
         return 1.0 if self.patterns.unit(k) == "m" else self._extent
 
     @cached_property
     def _extent(self) -> float:
         return max(float(np.ptp(self.design.balls.places, axis=0).max(initial=0.0)), 1e-3)
-
-
-def _lines(result: Reliability, with_all: bool) -> list[str]:
-    """Reliability as lines of text; `with_all` lists every event, not only the worst of each
-    position or probe.
-    """
-    lines = [*_heading(result), "", *_positions(result)]
-    readings = result.patterns.of_kind("reading")
-    items = result.patterns.of_kind(*single_kinds(result.design)[1:])
-    for title, chosen in (("worst readings", readings), ("worst items", items)):
-        if len(chosen):
-            lines += [
-                "",
-                *_table(result, title, _worst_first(result, chosen)[:MOST], with_redundancy=True),
-            ]
-    events: list[int] = []
-    for kinds in EVENTS:
-        found = result.patterns.of_kind(*kinds)
-        events += found.tolist() if with_all else _worst_of_each(result, found)
-    if events:
-        lines += ["", *_table(result, "events", events, with_redundancy=False)]
-    return lines + _closing(result, with_all)
 
 
 def _heading(result: Reliability) -> list[str]:
@@ -255,19 +258,19 @@ def _heading(result: Reliability) -> list[str]:
         ),
     ]
     if result.among_repeats:
-        lines.append("a reading stands for the mean of its repeats")
+        lines.append("a reading is the mean of its repeats")
     if math.isinf(result.noncentrality):
         lines.append(
-            "too few degrees of freedom to estimate sigma without what is tested; nothing is"
-            " detectable"
+            "too few degrees of freedom to estimate sigma without the tested observation: no bias"
+            " is detectable"
         )
     return lines
 
 
 def _positions(result: Reliability) -> list[str]:
-    """A summary of the readings of plates by position."""
-    design, given = result.design, result.patterns
-    readings = given.of_kind("reading")
+    """Return a summary of the readings of plates by position."""
+    design, biases = result.design, result.patterns
+    readings = biases.of_kind("reading")
     head = [
         "position",
         "readings",
@@ -278,13 +281,13 @@ def _positions(result: Reliability) -> list[str]:
         "largest at",
     ]
     rows = [[*head, "effect on U6, µm", "largest at"]]
-    position = design.readings.position[given.subject[readings]]
+    position = design.readings.position[biases.subject[readings]]
     of_u6 = _effect(result, "U6")
     for k in np.unique(position):
-        own = readings[position == k]
-        by_bias = own[comparable(result.minimal_detectable[own]).argmax()]
-        by_effect = own[comparable(_finite_or_zero(of_u6[own])).argmax()]
-        known = bool(np.isfinite(of_u6[by_effect]))
+        readings_there = readings[position == k]
+        by_bias = readings_there[comparable(result.minimal_detectable[readings_there]).argmax()]
+        by_effect = readings_there[comparable(_finite_or_zero(of_u6[readings_there])).argmax()]
+        is_determined = bool(np.isfinite(of_u6[by_effect]))
         u = (
             f"{number(1e6 * of_u6[by_effect], 3)}"
             f" ({number(1e6 * result.effects['U6'].uncertainty[by_effect], 3)})"
@@ -292,14 +295,14 @@ def _positions(result: Reliability) -> list[str]:
         rows.append(
             [
                 design.positions.names[k],
-                str(len(np.unique(given.subject[own]))),
-                number(result.left[own].min(), 3),
-                number(result.left[own].mean(), 3),
+                str(len(np.unique(biases.subject[readings_there]))),
+                number(result.left[readings_there].min(), 3),
+                number(result.left[readings_there].mean(), 3),
                 _shown(result.minimal_detectable[by_bias]),
                 _shown(result.found_by_fit[by_bias]),
-                name(given, int(by_bias), with_position=False),
-                u if known else "-",
-                name(given, int(by_effect), with_position=False) if known else "",
+                name(biases, int(by_bias), with_position=False),
+                u if is_determined else "-",
+                name(biases, int(by_effect), with_position=False) if is_determined else "",
             ]
         )
     if len(rows) == 1:
@@ -327,26 +330,24 @@ def _table(
         "by fit": (result.found_by_fit[chosen], _shown),
         "unit": lambda k: SHOWN[result.patterns.unit(k)],
         **{f"{symbol}, µm": (chosen, effect_words(symbol)) for symbol in effects},
-        "U6 at": lambda k: "" if hidden[k] else _where(result, "U6", k),
+        "U6 at": lambda k: "" if hidden[k] else _location(result, "U6", k),
     }
     return table_lines(columns, chosen, None if with_redundancy else "redundancy")
 
 
 def _effect_number(result: Reliability, symbol: str, k: int, effect: float) -> str:
-    """An effect in micrometres, 0 where there is none but rounding."""
+    """Return an effect in micrometres, 0 if it is rounding."""
     if result.effects[symbol].change[k] <= 1e-9 * result.size(k):
         return "0"
     return number(1e6 * effect, 3)
 
 
 def _effect(result: Reliability, symbol: str) -> np.ndarray:
-    """Effects (k,) of biases of the size of the MDB; NaN where nothing can be detected or nothing
-    is determined.
-    """
+    """Return effects (k,) of biases of the size of the MDB; NaN if undetectable or undetermined."""
     effects = result.effects[symbol]
-    known = np.isfinite(result.minimal_detectable) & (effects.first >= 0)
+    is_defined = np.isfinite(result.minimal_detectable) & (effects.first >= 0)
     with np.errstate(invalid="ignore"):
-        return np.where(known, result.minimal_detectable * effects.change, np.nan)
+        return np.where(is_defined, result.minimal_detectable * effects.change, np.nan)
 
 
 def _finite_or_zero(values: np.ndarray) -> np.ndarray:
@@ -354,9 +355,7 @@ def _finite_or_zero(values: np.ndarray) -> np.ndarray:
 
 
 def _worst_first(result: Reliability, chosen: Integers) -> list[int]:
-    """Patterns by their effect on U6, then on U5, those that cannot be detected but do harm
-    first.
-    """
+    """Return patterns sorted by their effect on U6, then on U5, undetectable harmful ones first."""
     keys = [comparable(_finite_or_zero(_effect(result, symbol)[chosen])) for symbol in ("U5", "U6")]
     hidden = np.array([_is_dangerous(result, k) for k in chosen.tolist()], bool)
     return [int(chosen[i]) for i in np.lexsort((chosen, -keys[0], -keys[1], ~hidden))]
@@ -367,7 +366,7 @@ def _is_dangerous(result: Reliability, k: int) -> bool:
 
 
 def _worst_of_each(result: Reliability, chosen: Integers) -> list[int]:
-    """The worst pattern of each subject, or of each position for balls, in the order of the
+    """Return the worst pattern of each subject, of balls in each position, in the order of the
     design.
     """
     if not len(chosen):
@@ -381,17 +380,17 @@ def _worst_of_each(result: Reliability, chosen: Integers) -> list[int]:
 
 
 def _closing(result: Reliability, with_all: bool) -> list[str]:
-    """What cannot be detected, in words, and what was left out."""
+    """Return notes on undetectable biases and on omissions."""
     lines = []
     hidden = np.flatnonzero(result.information <= 0.0).tolist()
     harmless = [k for k in hidden if result.is_harmless(k)]
     dangerous = sorted(set(hidden).difference(harmless))
     if harmless:
-        told = _listed(name(result.patterns, k) for k in harmless)
+        text = _listed(name(result.patterns, k) for k in harmless)
         which = "it changes no determined distance" if result.deficiency else "no distance changes"
         lines.append(
-            f"cannot be detected, harmless: {told}: {which}, between balls or corrected points"
-            f"{_of_probes(result.design)}"
+            f"cannot be detected, harmless: {text}: {which}, between balls or corrected points"
+            f"{_probes_of_points(result.design)}"
         )
     for k in dangerous[: 4 * MOST]:
         unit = result.patterns.unit(k)
@@ -401,15 +400,15 @@ def _closing(result: Reliability, with_all: bool) -> list[str]:
             if result.effects[symbol].change[k] > NO_EFFECT * result.size(k)
         ]
         if result.across[k] > NO_EFFECT * result.size(k):
-            told = f"{number(result.across[k], 3)} µm per {SHOWN[unit]}"
-            parts.append(f"distances between points of tasks' probes by up to {told}")
+            text = f"{number(result.across[k], 3)} µm per {SHOWN[unit]}"
+            parts.append(f"distances between points of tasks' probes by up to {text}")
         lines.append(
             f"cannot be detected, DANGEROUS: {name(result.patterns, k)}; it changes"
             f" {', '.join(parts)}"
         )
-    left = len(hidden) - len(harmless) - 4 * MOST
-    if left > 0:
-        lines.append(f"({left} more that cannot be detected are in --json)")
+    omitted = len(hidden) - len(harmless) - 4 * MOST
+    if omitted > 0:
+        lines.append(f"({omitted} more that cannot be detected are in --json)")
     if len(result.patterns.of_kind("reading")) and not len(result.patterns.of_kind("ball")):
         lines.append(
             "(no ball is read twice in one position: dirt on it is the same as a bias of its"
@@ -428,10 +427,8 @@ def _closing(result: Reliability, with_all: bool) -> list[str]:
     return ["", *lines] if lines else []
 
 
-def _of_probes(design: Design) -> str:
-    """Which probes measure the corrected points whose distances were looked at, if there are
-    several.
-    """
+def _probes_of_points(design: Design) -> str:
+    """Return the probes of the corrected points if there are several."""
     names = design.probes.names
     if len(names) == 1:
         return ""
@@ -456,37 +453,13 @@ def _percent(value: float) -> str:
     return f"{100 * value:.4g} %"
 
 
-def _where(result: Reliability, symbol: str, k: int) -> str:
-    """Where the largest effect is."""
+def _location(result: Reliability, symbol: str, k: int) -> str:
+    """Return the points of the largest effect."""
     effects, design = result.effects[symbol], result.design
     first, second = int(effects.first[k]), int(effects.second[k])
     if first < 0 or result.effects[symbol].change[k] <= 1e-9 * result.size(k):
         return ""
     return function_name(design, effects.functions[0], first, second)
-
-
-def _data(result: Reliability) -> dict[str, Any]:
-    """Reliability as plain data in metres, radians and ratios; None where nothing can be detected
-    or determined.
-    """
-    is_single = np.isin(result.patterns.kind, single_kinds(result.design))
-    return {
-        "experiment": result.label,
-        "title": result.title,
-        "parameters": result.design.parameter_count,
-        "observations": result.design.observation_count,
-        "rank_deficiency": result.deficiency,
-        **picked(result, "degrees_of_freedom", "sigma_is_estimated", "false_alarm", "power"),
-        "noncentrality": result.noncentrality,
-        "fit_noncentrality": result.fit_noncentrality,
-        "redundancy": float(result.redundancy.sum()) + result.among_repeats,
-        "redundancy_among_repeats": result.among_repeats,
-        "observations_by_name": [
-            {**_pattern_data(result, k), "redundancy": result.left[k]}
-            for k in np.flatnonzero(is_single).tolist()
-        ],
-        "events": [_pattern_data(result, k) for k in np.flatnonzero(~is_single).tolist()],
-    }
 
 
 def _pattern_data(result: Reliability, k: int) -> dict[str, Any]:
@@ -505,7 +478,7 @@ def _pattern_data(result: Reliability, k: int) -> dict[str, Any]:
                     * (1.0 if hidden else result.minimal_detectable[k])
                 ),
                 "standard_uncertainty": result.effects[symbol].uncertainty[k],
-                "at": _where(result, symbol, k),
+                "at": _location(result, symbol, k),
             }
             for symbol in result.effects
             if result.effects[symbol].first[k] >= 0
@@ -516,60 +489,41 @@ def _pattern_data(result: Reliability, k: int) -> dict[str, Any]:
 def write_observations(stream: TextIO, result: Reliability) -> None:
     """Write a row for every observation: each co-ordinate of each reading, and each item."""
     writer = CsvWriter(stream)
-    writer.writerow(
-        [
-            "kind",
-            "position",
-            "ball",
-            "probe",
-            "axis",
-            "name",
-            "redundancy",
-            "unit",
-            "minimal_detectable",
-            "found_by_fit",
-        ]
-        + [
-            f"{symbol}_{what}"
-            for symbol in result.effects
-            for what in ("effect_um", "standard_uncertainty_um", "at")
-        ]
-    )
-    design, given = result.design, result.patterns
-    effects = {symbol: _effect(result, symbol) for symbol in result.effects}
-    for k in np.flatnonzero(np.isin(given.kind, single_kinds(given.design))).tolist():
-        names = ["", "", "", ""]
-        if given.kind[k] in ("reading", "end"):
-            i = int(given.subject[k])
-            readings = design.readings
-            position, probe = (
-                design.positions.names[readings.position[i]],
-                design.probes.names[readings.probe[i]],
-            )
-            names = [
-                position,
-                design.ball_label(int(readings.ball[i])),
-                probe,
-                AXIS_NAMES[given.axis[k]],
-            ]
-        unit = given.unit(k)
-        cells: list[Any] = [
-            given.kind[k],
-            *names,
-            name(given, k),
-            repr(float(result.left[k])),
-            ascii_units(SHOWN[unit]),
-        ]
-        cells += [_cell(result.minimal_detectable[k]), _cell(result.found_by_fit[k])]
-        for symbol in result.effects:
-            cells += [
-                _cell(effects[symbol][k]),
-                _cell(result.effects[symbol].uncertainty[k]),
-                _where(result, symbol, k),
-            ]
-        writer.writerow(cells)
+    singles = np.flatnonzero(np.isin(result.patterns.kind, single_kinds(result.design)))
+    rows = [_observation_row(result, k) for k in singles.tolist()]
+    writer.writerow(list(rows[0]))
+    for row in rows:
+        writer.writerow(list(row.values()))
 
 
-def _cell(value: float) -> str:
-    """A small number in micro-units with all its digits, empty where there is none."""
+def _observation_row(result: Reliability, k: int) -> dict[str, Any]:
+    design, subject, data = result.design, result.patterns.subject[k], _pattern_data(result, k)
+    place = ("", "", "", "")
+    if data["kind"] in ("reading", "end"):
+        readings = design.readings
+        place = (
+            design.positions.names[readings.position[subject]],
+            design.ball_label(int(readings.ball[subject])),
+            design.probes.names[readings.probe[subject]],
+            AXIS_NAMES[result.patterns.axis[k]],
+        )
+    row = {
+        "kind": data["kind"],
+        **dict(zip(("position", "ball", "probe", "axis"), place, strict=True)),
+        "name": data["name"],
+        "redundancy": repr(float(result.left[k])),
+        "unit": ascii_units(SHOWN[data["unit"]]),
+        **{name: _digits(data[name]) for name in ("minimal_detectable", "found_by_fit")},
+    }
+    for symbol in result.effects:
+        effect = data["effects"].get(symbol, {})
+        row[f"{symbol}_effect_um"] = _digits(effect.get("change", math.nan))
+        uncertainty = effect.get("standard_uncertainty", math.nan)
+        row[f"{symbol}_standard_uncertainty_um"] = _digits(uncertainty)
+        row[f"{symbol}_at"] = effect.get("at", "")
+    return row
+
+
+def _digits(value: float) -> str:
+    """Return a value in micro-units with all its digits, empty unless finite."""
     return repr(float(1e6 * value)) if math.isfinite(value) else ""

@@ -17,8 +17,7 @@ from .remainders import columns_of_balls
 if TYPE_CHECKING:
     from scipy.sparse import csr_array
 
-# A share of a pattern's square that is left in the residuals and counts as none: rounding leaves
-# about 1e-15.
+# Shares of a pattern's square in the residuals that are neglected: rounding leaves about 1e-15.
 NIL = 1e-10
 
 
@@ -27,9 +26,8 @@ class Response:
     """Q' h of the patterns `index` (k,): `common` (k, r), and `own` (k, n d) in the columns of the
     balls.
 
-    `square` (k,) is h'h and `information` (k,) is h'(I - H) h, per unit of the bias squared; 0
-    where it is nil. `hat` (b,) is the diagonal of H at the `rows` (b,) that were worked through for
-    them.
+    `square` (k,) is h'h and `information` (k,) is h'(I - H) h, per unit of the bias squared; 0 if
+    negligible. `hat` (b,) is the diagonal of H at the processed `rows` (b,).
     """
 
     rows: Integers
@@ -41,31 +39,39 @@ class Response:
 
     @property
     def information(self) -> Array:
-        taken = (self.common**2).sum(axis=1) + np.asarray(self.own.power(2).sum(axis=1)).ravel()
-        left = self.square - taken
-        return np.where(left > NIL * self.square, left, 0.0)
+        absorbed = (self.common**2).sum(axis=1) + np.asarray(self.own.power(2).sum(axis=1)).ravel()
+        remaining = self.square - absorbed
+        return np.where(remaining > NIL * self.square, remaining, 0.0)
 
 
-def responses(at: Linearisation, given: Patterns) -> Iterator[Response]:
-    """Responses of all patterns, some at a time."""
+def responses(linearisation: Linearisation, biases: Patterns) -> Iterator[Response]:
+    """Return responses of all patterns, in batches."""
     from scipy.sparse import csr_array
 
-    matrix = given.matrix.tocsr()
-    n, d = at.design.balls.places.shape
-    square = np.asarray(given.matrix.power(2).sum(axis=0)).ravel()
-    wide = np.flatnonzero(~given.is_local)
-    first_row = given.matrix.indices[np.minimum(given.matrix.indptr[:-1], given.matrix.nnz - 1)]
-    common, own = np.zeros((len(wide), at.balls.common.shape[2])), csr_array((len(wide), n * d))
-    for some in hat_rows(at, None):
+    matrix = biases.matrix.tocsr()
+    n, d = linearisation.design.balls.places.shape
+    square = np.asarray(biases.matrix.power(2).sum(axis=0)).ravel()
+    wide = np.flatnonzero(~biases.is_local)
+    first_row = biases.matrix.indices[np.minimum(biases.matrix.indptr[:-1], biases.matrix.nnz - 1)]
+    common, own = (
+        np.zeros((len(wide), linearisation.balls.common.shape[2])),
+        csr_array((len(wide), n * d)),
+    )
+    for some in hat_rows(linearisation, None):
         hat = (some.common**2).sum(axis=1) + (some.own**2).sum(axis=1)
         private = columns_of_balls(some.own, some.ball, n)
         here = np.zeros(matrix.shape[0], bool)
         here[some.rows] = True
-        local = np.flatnonzero(given.is_local & here[first_row])
+        local = np.flatnonzero(biases.is_local & here[first_row])
         block = matrix[some.rows]
-        mine = block[:, local].T.tocsr()
+        local_rows = block[:, local].T.tocsr()
         yield Response(
-            some.rows, hat, local, mine @ some.common, (mine @ private).tocsr(), square[local]
+            some.rows,
+            hat,
+            local,
+            local_rows @ some.common,
+            (local_rows @ private).tocsr(),
+            square[local],
         )
         through = block[:, wide].T.tocsr()
         common += through @ some.common

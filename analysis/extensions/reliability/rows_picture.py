@@ -14,7 +14,7 @@ from ballplate.simulator.machines import Array
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-# Points: of the drawing, of what stands around a panel, and of a row.
+# Points: width, margins of a panel, and height of a row.
 WIDTH, RIGHT, BELOW, ABOVE, ROW = 480.0, 16.0, 46.0, 24.0, 16.0
 
 # Room for names of rows, and letters of a name that has it.
@@ -23,7 +23,7 @@ NAMES, LETTERS = 120.0, 20
 
 @dataclass(frozen=True, eq=False)
 class RowOfPoints:
-    """A row's name and the values that stand in it."""
+    """A row's name and its values."""
 
     name: str
     values: Array
@@ -34,10 +34,10 @@ def draw_rows(
     words: str,
     path: str | Path | None = None,
 ) -> Figure:
-    """Values as points in rows, a panel for each quantity.
+    """Draw values as points in rows, a panel for each quantity.
 
     :raises ImportError: matplotlib is missing.
-    :raises ValueError: the name ends in none of the kinds of pictures.
+    :raises ValueError: the path has no ending of a picture.
     :raises OSError: the file cannot be written.
     """
     heights = [ROW * max(len(rows), 2) + BELOW + ABOVE for _, rows in panels]
@@ -48,11 +48,11 @@ def draw_rows(
             axes = placed_axes(
                 figure, NAMES, top + BELOW, WIDTH - NAMES - RIGHT, height - BELOW - ABOVE
             )
-            every = np.concatenate([one.values for one in rows])
-            for k, one in enumerate(rows):
+            every = np.concatenate([row.values for row in rows])
+            for k, row in enumerate(rows):
                 axes.plot(
-                    one.values,
-                    np.full(len(one.values), -k),
+                    row.values,
+                    np.full(len(row.values), -k),
                     color=SERIES[k % len(SERIES)],
                     marker="|",
                     markersize=9.0,
@@ -60,8 +60,8 @@ def draw_rows(
                 )
             axes.set_ylim(0.6 - max(len(rows), 2), 0.6)
             shown = [
-                one.name if len(one.name) <= LETTERS else f"{one.name[: LETTERS - 1]}…"
-                for one in rows
+                row.name if len(row.name) <= LETTERS else f"{row.name[: LETTERS - 1]}…"
+                for row in rows
             ]
             axes.set_yticks([-k for k in range(len(rows))], shown)
             scaled_axis(axes, every, "x")

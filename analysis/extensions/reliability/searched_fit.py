@@ -1,4 +1,4 @@
-"""What a fit asks for: the search of its residuals for gross errors, in words and as data."""
+"""Search of a fit's residuals for gross errors, with its result as sentences and data."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from .wording import diagnosis_data, diagnosis_lines, diagnosis_words
 
 @dataclass(frozen=True)
 class DiagnosisInWords(Diagnosis):
-    """A diagnosis that can be told; `marks` tell where the readings stand."""
+    """A diagnosis that can be printed; `marks` locate the readings in their file."""
 
     @property
     def names_causes(self) -> bool:
@@ -37,9 +37,7 @@ class DiagnosisInWords(Diagnosis):
 def diagnosed(
     at: Linearisation, x: Array, freedom: int, sigma_is_estimated: bool
 ) -> tuple[DiagnosisInWords, str]:
-    """What is suspected of the observations behind a fit, and why there was no search where there
-    are too many of them; empty otherwise.
-    """
+    """Return the causes of a fit's residuals, and the reason if there was no search."""
     untested = too_many_entries(at.design)
     if untested:
         return DiagnosisInWords(), untested

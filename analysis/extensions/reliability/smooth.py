@@ -15,10 +15,10 @@ from numpy.polynomial import legendre
 from .bias_patterns import LinearisedDesign
 from .hat import row_count
 
-# Scale readings closer than this (m) count as the same place on a scale.
+# Scale readings closer than this (m) are at the same location.
 SAME_PLACE = 1e-3
 
-# Places on a scale that each have a value of their own; of more, waves up to so many half periods.
+# Largest number of locations with values of their own; of more, half periods of waves.
 MOST_PLACES, WAVES = 60, 20
 
 # Degrees of polynomials along one axis with levers, of those that turn probes, and of those in all
@@ -29,39 +29,39 @@ ALONG, OF_PROBES, TOGETHER = 7, 4, 4
 DRIFT = 6
 
 
-# In words what an error is, and its displacements (readings, d, k).
+# Descriptions of errors with their displacements (readings, d, k).
 Displacements = Iterator[tuple[str, Array]]
 
 
 @dataclass(frozen=True)
 class Smooth:
-    """Biases (rows, k) that together are one smooth error, and in words what it is."""
+    """Biases (rows, k) that together are one smooth error, with its description."""
 
     words: str
     columns: Array
 
 
 def smooth_errors(design: Design, state: State) -> Iterator[Smooth]:
-    """All smooth errors that are looked for, at a state."""
-    at = LinearisedDesign(design, state, None)
-    # Not at the readings themselves: where these are at few places on a scale, functions of them
-    # differ by their noise, and would explain it.
+    """Return all smooth errors to search, at a state."""
+    linearised = LinearisedDesign(design, state, None)
+    # Not at the readings themselves: if they are at few locations on a scale, functions of their
+    # noise would explain it.
     drawn = replace(state, balls=design.balls.places)
     readings = design.readings
     scales = locations(design, drawn, readings) - state.probes[readings.probe]
     for build in (_on_scales, _along_axes, _of_probes, _in_space, _in_time):
         for words, displacement in build(design, state, scales):
-            yield Smooth(words, _rows(at, displacement))
+            yield Smooth(words, _rows(linearised, displacement))
 
 
 def _on_scales(design: Design, state: State, x: Array) -> Displacements:
     """Each component as any function of one scale reading."""
     letters = AXIS_NAMES[: design.dimension]
     for axis, letter in enumerate(letters):
-        values = _places(x[:, axis])
-        for component, other in enumerate(letters):
+        values = _location_functions(x[:, axis])
+        for component, component_letter in enumerate(letters):
             displacement = values[:, None, :] * np.eye(design.dimension)[component][:, None]
-            yield f"an error in {other} that depends on {letter}", displacement
+            yield f"an error in {component_letter} that depends on {letter}", displacement
 
 
 def _along_axes(design: Design, state: State, x: Array) -> Displacements:
@@ -98,7 +98,9 @@ def _in_space(design: Design, state: State, x: Array) -> Displacements:
     terms = []
     for powers in product(range(TOGETHER + 1), repeat=d):
         if 0 < sum(powers) <= TOGETHER:
-            factors = [one[:, power] for one, power in zip(by_axis, powers, strict=True)]
+            factors = [
+                polynomials[:, power] for polynomials, power in zip(by_axis, powers, strict=True)
+            ]
             terms.append(np.prod(factors, axis=0))
     yield (
         "an error that depends on several co-ordinates together",
@@ -107,7 +109,7 @@ def _in_space(design: Design, state: State, x: Array) -> Displacements:
 
 
 def _in_time(design: Design, state: State, x: Array) -> Displacements:
-    """Drifts over all readings and, alike in all positions or not, within each."""
+    """Drifts over all readings, and within each position, common to all positions or not."""
     time, within = np.linspace(0.0, 1.0, len(x)), _time_within(design)
     waves = np.cos(np.pi * np.arange(1, DRIFT + 1) * time[:, None])
     for values in (time[:, None], waves):
@@ -117,24 +119,24 @@ def _in_time(design: Design, state: State, x: Array) -> Displacements:
 
 
 def _fractions(x: Array) -> Array:
-    """Scale readings (m, d) between -1 and 1."""
+    """Return scale readings (m, d) scaled to -1 to 1."""
     low, extent = x.min(axis=0), np.ptp(x, axis=0)
     return 2.0 * (x - low) / np.where(extent > 0.0, extent, 1.0) - 1.0
 
 
-def _places(x: Array) -> Array:
-    """Functions (m, k) of one scale reading (m,), as general as the readings permit."""
+def _location_functions(x: Array) -> Array:
+    """Return functions (m, k) of one scale reading (m,), as general as the readings permit."""
     order = np.argsort(x, kind="stable")
-    place = np.zeros(len(x), np.int64)
-    place[order] = np.cumsum(np.append(0, np.diff(x[order]) > SAME_PLACE))
-    if place.max(initial=0) < MOST_PLACES:
-        return np.eye(int(place.max(initial=0)) + 1)[place]
+    location = np.zeros(len(x), np.int64)
+    location[order] = np.cumsum(np.append(0, np.diff(x[order]) > SAME_PLACE))
+    if location.max(initial=0) < MOST_PLACES:
+        return np.eye(int(location.max(initial=0)) + 1)[location]
     t = 0.5 * (_fractions(x[:, None])[:, 0] + 1.0)
     return np.cos(np.pi * np.arange(1, WAVES + 1) * t[:, None])
 
 
 def _time_within(design: Design) -> Array:
-    """Time (readings, positions) in each position, between -1 and 1, by the order of the
+    """Return time (readings, positions) in each position, from -1 to 1, in the order of the
     readings.
     """
     position = design.readings.position
@@ -146,17 +148,23 @@ def _time_within(design: Design) -> Array:
 
 
 def _in_all_directions(values: Array, d: int) -> Array:
-    """Displacements (m, d, d k) along each axis by functions (m, k)."""
-    found = np.zeros((len(values), d, d, values.shape[1]))
+    """Return displacements (m, d, d k) along each axis by functions (m, k)."""
+    displacements = np.zeros((len(values), d, d, values.shape[1]))
     for axis in range(d):
-        found[:, axis, axis] = values
-    return found.reshape(len(values), d, -1)
+        displacements[:, axis, axis] = values
+    return displacements.reshape(len(values), d, -1)
 
 
-def _rows(at: LinearisedDesign, displacement: Array) -> Array:
-    """Biases (rows, k) of all observations by displacements (readings, d, k) of all readings."""
+def _rows(linearised: LinearisedDesign, displacement: Array) -> Array:
+    """Return biases (rows, k) of all observations by displacements (readings, d, k) of all
+    readings.
+    """
     k = displacement.shape[2]
-    found = np.zeros((row_count(at.design), k))
-    found[at.places["reading"]] = (at.weight[:, :, None] * displacement[at.chosen]).reshape(-1, k)
-    found[at.places["length"]] = at.white.whitened(at.along_lengths(displacement))
-    return found
+    biases = np.zeros((row_count(linearised.design), k))
+    biases[linearised.places["reading"]] = (
+        linearised.weight[:, :, None] * displacement[linearised.chosen]
+    ).reshape(-1, k)
+    biases[linearised.places["length"]] = linearised.white.whitened(
+        linearised.along_lengths(displacement)
+    )
+    return biases

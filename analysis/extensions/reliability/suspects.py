@@ -1,6 +1,4 @@
-"""Suspected causes of a fit's residuals: observations, events, the scatter of some readings, or
-the model.
-"""
+"""Causes of a fit's residuals: observations, events, noise of some readings, or the model."""
 
 from __future__ import annotations
 
@@ -16,14 +14,14 @@ from .scatter import Scatter
 
 @dataclass(frozen=True)
 class Suspect:
-    """A cause that the residuals show: its `columns` (q,) among `patterns`, their sizes and
-    standard uncertainties.
+    """A cause that the residuals show: its `columns` (q,) among `patterns`, with sizes and
+    uncertainties.
 
-    `values` (q,), in metres, radians or ratios, are estimated together with the other suspects'.
-    `statistic` is that of a normal variable of the same chance, which exceeded `limit` when the
-    cause was found. `alternatives` are patterns of causes that the readings cannot tell from it,
-    and `of_model` errors of the model that they cannot; `first` and `last` are readings that a slip
-    may have come before, -1 of other causes. `of_exact`: it is of values that are stated as exact.
+    `values` (q,), in metres, radians or ratios, are estimated together with those of other
+    suspects. `statistic` is that of a normal variable of the same p-value, which exceeded `limit`.
+    `alternatives` are patterns of indistinguishable causes, and `of_model` indistinguishable errors
+    of the model. A slip came between the readings `first` and `last`, -1 of other causes.
+    `of_exact`: the values are stated as exact.
     """
 
     patterns: Patterns
@@ -40,12 +38,12 @@ class Suspect:
 
     @property
     def largest(self) -> int:
-        """Place of the most significant direction."""
+        """Index of the most significant direction."""
         return int(np.argmax(np.abs(self.values) / self.standard_uncertainties))
 
     @property
     def pattern(self) -> int:
-        """The most significant direction among the patterns."""
+        """Pattern of the most significant direction."""
         return int(self.columns[self.largest])
 
     @property
@@ -63,7 +61,7 @@ class Suspect:
 
 @dataclass(frozen=True)
 class MoreScatter:
-    """Readings of one position or with one probe that scatter `times` as much as the others."""
+    """Readings of one position or with one probe with `times` the noise of the others."""
 
     design: Design
     of: Scatter
@@ -74,11 +72,10 @@ class MoreScatter:
 
 @dataclass(frozen=True)
 class Unexplained:
-    """Residuals that no single gross error explains; `words` tell the smooth error that does best,
-    empty without one.
+    """Residuals that no gross error explains; `words` name the best smooth error, empty without
+    one.
 
-    They are `times` as large as the stated uncertainties make them, which is `too_large` if these
-    do not explain it.
+    They are `times` as large as stated, which is `too_large` if significant.
     """
 
     words: str
@@ -90,8 +87,8 @@ class Unexplained:
 
 @dataclass(frozen=True)
 class Refit:
-    """A mistake in the experiment file that an estimate without it shows: one of `causes`, in
-    words, which the readings do not distinguish.
+    """An error in the experiment file that a fit without it reveals: one of indistinguishable
+    `causes`.
 
     Residuals are `times` as large as stated without it, `before` with it. `kind` is offsets or
     arrangement.
@@ -108,11 +105,9 @@ class Refit:
 
 @dataclass(frozen=True)
 class Diagnosis:
-    """What the residuals show: mistakes, readings that scatter more, or that no single gross error
-    explains them.
+    """Causes of the residuals: gross errors, readings with more noise, or an unexplained remainder.
 
-    Readings may scatter more beside mistakes, or beside what no single gross error explains. With a
-    `refit` all else is what that leaves.
+    With a `refit`, the other causes are those of the residuals without it.
     """
 
     suspects: tuple[Suspect, ...] = ()

@@ -1,24 +1,21 @@
-"""Logarithms of the tail probabilities of sums of squares, which may be too small for a
-floating-point number.
-"""
+"""Logarithms of tail probabilities of sums of squares, which may underflow."""
 
 from __future__ import annotations
 
 import numpy as np
 from ballplate.simulator.machines import Array
 
-# Below this, chances come from the leading term of their series.
+# Smaller probabilities come from the leading term of their series.
 SMALLEST = 1e-280
 
 
 def log_chance(
     square: Array | float, total: float, dimensions: Array | float, freedom: float, given: bool
 ) -> Array:
-    """Logarithms (k,) of the chance that `dimensions` of the residuals' `freedom` explain a sum of
-    squares so large.
+    """Return logarithms (k,) of the p-value of a sum of squares in `dimensions` of the residuals'
+    `freedom`.
 
-    With `given` sigma chi-squared of `square` itself; otherwise that of the share of `square` in
-    `total`, Fisher's F.
+    With `given` sigma by chi-squared of `square`; otherwise by Fisher's F of its share in `total`.
 
     >>> log_chance(np.array([3.841459]), 100.0, 1.0, 90.0, True).round(6)
     array([-2.995732])
@@ -37,17 +34,22 @@ def log_chance(
             leading -= np.log1p(-np.clip((0.5 * q - 1.0) / half, 0.0, 0.5))
         else:
             a, b = 0.5 * (freedom - q), 0.5 * q
-            left = np.clip(1.0 - square / total, 1e-300, 1.0)
-            chance = betainc(np.maximum(a, 1e-9), b, left)
-            leading = a * np.log(left) + b * np.log1p(-left) - np.log(a) - betaln(a, b)
-        found = np.where(chance > SMALLEST, np.log(np.maximum(chance, SMALLEST)), leading)
+            remaining_share = np.clip(1.0 - square / total, 1e-300, 1.0)
+            chance = betainc(np.maximum(a, 1e-9), b, remaining_share)
+            leading = (
+                a * np.log(remaining_share)
+                + b * np.log1p(-remaining_share)
+                - np.log(a)
+                - betaln(a, b)
+            )
+        logarithm = np.where(chance > SMALLEST, np.log(np.maximum(chance, SMALLEST)), leading)
     return np.asarray(
-        np.where((q <= 0) | (freedom - q < 1) & (not given), 0.0, np.minimum(found, 0.0))
+        np.where((q <= 0) | (freedom - q < 1) & (not given), 0.0, np.minimum(logarithm, 0.0))
     )
 
 
 def normal_equivalent(log_p: float) -> float:
-    """What a normal variable exceeds in absolute value with the chance exp(`log_p`).
+    """Return the absolute value that a normal variable exceeds with probability exp(`log_p`).
 
     >>> round(normal_equivalent(np.log(0.05)), 4)
     1.96

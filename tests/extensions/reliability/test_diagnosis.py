@@ -214,11 +214,11 @@ def test_what_the_stated_uncertainties_explain_is_laid_to_the_model_only_where_s
             if found.unexplained:
                 advice = "larger uncertainties" in unexplained_words(found.unexplained)
                 assert advice == (found.unexplained.times > 1.0) == (share == 1.0)
-                richer = "try a richer error model" in unexplained_words(found.unexplained)
+                richer = "try a larger error model" in unexplained_words(found.unexplained)
                 assert richer != is_explained(design, solution)
                 calm = "and so not too large" in unexplained_words(found.unexplained)
                 assert calm == is_explained(design, solution)
-                level = "at most 1 % of fits" in unexplained_words(found.unexplained)
+                level = "at most 1 % of sound campaigns" in unexplained_words(found.unexplained)
                 assert level == calm
 
 

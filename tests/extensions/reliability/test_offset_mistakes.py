@@ -84,7 +84,7 @@ def test_what_offsets_leave_is_what_an_estimate_with_them_leaves(
         change = true + size * generator.standard_normal(true.shape)
         expected = estimate(with_offsets(design, change), x)
         assert expected.status == "converged"
-        left = free.left(WrongOffsets((1, 2), change))
+        left = free.remaining(WrongOffsets((1, 2), change))
         assert left == pytest.approx(expected.factor.sum_of_squares, rel=5e-3)
         assert left > free.least
 

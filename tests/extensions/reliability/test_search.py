@@ -113,7 +113,7 @@ def test_what_causes_explain_is_what_they_take_away_as_parameters(
                 widths.add(len(group[place]))
         # A cause that has been taken out explains nothing more, and others less.
         columns = search.groups[-2][len(search.groups[-2]) // 2]
-        search._take_out(columns)
+        search._remove(columns)
         taken = np.column_stack([taken, matrix[:, columns]])
         assert search.left.sum_of_squares == pytest.approx(left_by(taken, residual), rel=1e-6), step
     assert widths == ({1, 2, 3, 6} if text is MIXED else {1, 2, 3})
