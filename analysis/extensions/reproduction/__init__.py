@@ -1,3 +1,1 @@
-"""Published experiments computed anew: what documents print, beside what the shipped designs
-give.
-"""
+"""Published experiments: the values that documents print, compared with the shipped designs."""

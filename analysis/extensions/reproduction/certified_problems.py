@@ -1,6 +1,4 @@
-"""Certified problems as they stand in files: a design, readings, and answers computed in many
-digits.
-"""
+"""Certified problems in files: a design, readings, and answers computed in many digits."""
 
 from __future__ import annotations
 
@@ -12,17 +10,15 @@ from typing import Any
 
 from ballplate.simulator.inputs import ExperimentError, Message, hint, refused, shorten
 
-# Above any number that means something here, and below where a float ends.
+# Larger than any meaningful number, and smaller than the largest float.
 LARGE = 1e150
 
 
 @dataclass(frozen=True)
 class CertifiedProblem:
-    """A problem and what is certified of it: `answers` as they stand under `certified` in its file,
-    SI units.
+    """A problem with its certified `answers`, as under `certified` in its file `path`, in SI units.
 
-    `path` is the problem's file; the same design as an experiment file and its readings lie beside
-    it.
+    An experiment file with the same design, and its readings, are in the same folder.
     """
 
     name: str
@@ -36,59 +32,63 @@ class CertifiedProblem:
 
     @property
     def readings_file(self) -> Path | None:
-        """The readings; None of a problem that is only planned."""
+        """Readings; None of a problem that is only planned."""
         return self.path.with_suffix(".csv") if "estimate" in self.answers else None
 
 
 def certified_problems(folder: Path, names: list[str]) -> list[CertifiedProblem]:
-    """The problems in a folder by name, or those `names`.
+    """Return the problems in a folder by name, or those `names`.
 
-    :raises ExperimentError: there is no such folder or problem, or a file is not one of a problem.
+    :raises ExperimentError: a missing folder or problem, or an invalid file.
     """
-    found = {path.stem: path for path in sorted(folder.glob("*.json"))}
-    if not found:
+    paths = {path.stem: path for path in sorted(folder.glob("*.json"))}
+    if not paths:
         text = (
             "no certified problems here; name their folder, designs/certified in a checkout, with"
             " --designs"
         )
         raise refused(folder, text)
-    unknown = [name for name in names if name not in found]
+    unknown = [name for name in names if name not in paths]
     if unknown:
         messages = [
-            Message(str(folder), 0, 0, "", f'no problem "{name}"; {hint(name, found)}')
+            Message(str(folder), 0, 0, "", f'no problem "{name}"; {hint(name, paths)}')
             for name in unknown
         ]
         raise ExperimentError(messages)
-    return [_problem(found[name]) for name in names or found]
+    return [_problem(paths[name]) for name in names or paths]
 
 
 def _problem(path: Path) -> CertifiedProblem:
     data = read_json(path)
     if not isinstance(data, dict) or not isinstance(data.get("certified"), dict):
         raise refused(path, 'no certified problem: it has no key "certified"')
-    for part in data["certified"].keys() & {"as_drawn", "estimate"}:
-        complaint = _complaint(data["certified"][part])
-        if complaint:
-            text = f"{complaint}; make the file anew, or take the shipped one"
-            raise refused(path, text, f"certified.{part}")
+    for key in data["certified"].keys() & {"as_drawn", "estimate"}:
+        fault = _fault(data["certified"][key])
+        if fault:
+            text = f"{fault}; write the file again, or use the shipped one"
+            raise refused(path, text, f"certified.{key}")
     return CertifiedProblem(
         str(data.get("name", path.stem)), str(data.get("title", "")), path, data["certified"]
     )
 
 
-def _complaint(answers: Any) -> str | None:
-    """What keeps certified answers from being compared with, None where nothing does."""
+def _fault(answers: Any) -> str | None:
+    """Return the reason why certified answers cannot be compared; None for valid ones."""
     if not isinstance(answers, dict) or not isinstance(answers.get("uncertainties"), dict):
         return 'has no mapping "uncertainties"'
-    for symbol, one in answers["uncertainties"].items():
-        if not isinstance(one, dict):
+    for symbol, uncertainty in answers["uncertainties"].items():
+        if not isinstance(uncertainty, dict):
             return f"{symbol} is no mapping"
         for key in ("count", "undetermined"):
-            if type(one.get(key)) is not int:
+            if type(uncertainty.get(key)) is not int:
                 return f'{symbol} has no whole number "{key}"'
         for key in ("maximum", "average"):
-            is_undetermined = key in one and one["maximum" if key == "average" else key] is None
-            if not is_undetermined and not (_is_number(one.get(key)) and one[key] > 0.0):
+            is_undetermined = (
+                key in uncertainty and uncertainty["maximum" if key == "average" else key] is None
+            )
+            if not is_undetermined and not (
+                _is_number(uncertainty.get(key)) and uncertainty[key] > 0.0
+            ):
                 return f'{symbol} has no number "{key}" above zero'
     if "sum_of_squares" in answers and not _is_number(answers["sum_of_squares"]):
         return '"sum_of_squares" is no number'
@@ -103,7 +103,7 @@ def _is_number(value: Any) -> bool:
 
 
 def _are_numbers(value: Any) -> bool:
-    """A number, or a list or mapping of such."""
+    """Return whether a value is a number, or a list or mapping of numbers."""
     parts = (
         value.values() if isinstance(value, dict) else value if isinstance(value, list) else None
     )
@@ -111,9 +111,9 @@ def _are_numbers(value: Any) -> bool:
 
 
 def read_results(path: Path, problems: Sequence[CertifiedProblem]) -> dict[str, Any]:
-    """Answers of a program by the names of problems: the mapping under `problems` of a JSON file.
+    """Return a program's answers by problem: the mapping under `problems` of a JSON file.
 
-    :raises ExperimentError: it is no such file, or names a problem that is none.
+    :raises ExperimentError: an invalid file, or an unknown problem.
     """
     data = read_json(path)
     if not isinstance(data, dict) or not isinstance(data.get("problems"), dict):
@@ -122,17 +122,17 @@ def read_results(path: Path, problems: Sequence[CertifiedProblem]) -> dict[str, 
             " docs/documents/certified.md"
         )
         raise refused(path, text)
-    known = {path.stem for one in problems for path in one.path.parent.glob("*.json")}
+    names = {path.stem for problem in problems for path in problem.path.parent.glob("*.json")}
     messages = [
         Message(
             str(path),
             0,
             0,
             "problems",
-            f'no problem "{shorten(name)}"; {hint(name, sorted(known))}',
+            f'no problem "{shorten(name)}"; {hint(name, sorted(names))}',
         )
         for name in data["problems"]
-        if name not in known
+        if name not in names
     ]
     if messages:
         raise ExperimentError(messages)
@@ -140,7 +140,7 @@ def read_results(path: Path, problems: Sequence[CertifiedProblem]) -> dict[str, 
 
 
 def read_json(path: Path) -> Any:
-    """What a JSON file holds.
+    """Return the content of a JSON file.
 
     :raises ExperimentError: it cannot be read, or is not JSON.
     """
@@ -151,5 +151,5 @@ def read_json(path: Path) -> Any:
     except (ValueError, RecursionError) as error:
         line, column = getattr(error, "lineno", 0), getattr(error, "colno", 0)
         raise refused(
-            path, f"is not JSON ({error}); write it anew", line=line, column=column
+            path, f"is not JSON ({error}); write it again", line=line, column=column
         ) from None

@@ -1,4 +1,4 @@
-"""A document's statements beside what the shipped designs give, each with a judgement."""
+"""A document's statements compared with the shipped designs, each with a verdict."""
 
 from __future__ import annotations
 
@@ -46,10 +46,10 @@ from .shipped import (
 
 @dataclass(frozen=True)
 class ComparedFigure:
-    """A published figure and ours, in metres or radians.
+    """A published value and ballplate's, in metres or radians.
 
-    `ratio` is published over ours, `adjusted` the same after the column's common factor, which has
-    to lie `within` limits; `rests_on` are keys of assumptions.
+    `ratio` is `published` over `ours`, `adjusted` the ratio after the column's common factor, which
+    must be `within` limits; `rests_on` are keys of assumptions.
     """
 
     quantity: str
@@ -69,7 +69,7 @@ class ComparedFigure:
 
 @dataclass(frozen=True)
 class ComparedColumn:
-    """A column of a table with its common factor, which has to lie `within` limits."""
+    """A column of a table with its common factor, which must be `within` limits."""
 
     column: PublishedColumn
     factor: float
@@ -87,7 +87,9 @@ class ComparedColumn:
 
 @dataclass(frozen=True)
 class ComparedRank:
-    """A statement on rank, and the deficiency of one of its designs with the gap that tells it."""
+    """A statement on rank, with the deficiency of one of its designs and the gap that decides
+    it.
+    """
 
     design: str
     published: int | Literal["some"]
@@ -101,7 +103,7 @@ class ComparedRank:
 
 @dataclass(frozen=True)
 class ComparedRemark:
-    """A remark on averages, and the least and the largest of the ratios that it is about."""
+    """A remark on averages, with the least and the largest of its ratios."""
 
     remark: Remark
     least: float
@@ -115,10 +117,10 @@ class ComparedRemark:
 
 @dataclass(frozen=True)
 class ErratumLine:
-    """Published figures of one column over those of the design it is headed with, and of the one
-    that is meant.
+    """Ratios of the published values of a column to those of the design in the heading, and the
+    meant one.
 
-    The deviations are the largest of a figure from the common factor.
+    The deviations are the largest from the common factor.
     """
 
     statistic: Statistic
@@ -132,7 +134,9 @@ class ErratumLine:
 
 @dataclass(frozen=True)
 class ComparedErratum:
-    """A block under the wrong heading; `limit` is the largest deviation of a column that agrees."""
+    """A block under an incorrect heading; `limit` is the largest deviation of a column that
+    agrees.
+    """
 
     erratum: Erratum
     lines: tuple[ErratumLine, ...]
@@ -140,7 +144,9 @@ class ComparedErratum:
 
     @property
     def agrees(self) -> bool:
-        """Whether the figures are those of the designs meant, and not those of the heading."""
+        """Return whether the values are those of the designs meant, and not those in the
+        heading.
+        """
         meant = all(line.deviation_as_meant <= self.limit for line in self.lines)
         return meant and any(line.deviation_as_headed > self.limit for line in self.lines)
 
@@ -150,10 +156,9 @@ Rule = Literal["within", "most", "shown"]
 
 @dataclass(frozen=True)
 class ProgressLine:
-    """One figure of an iteration: a step, or a sum of squares in square metres; `limit` is a
-    factor.
+    """One value of an iteration: a step, or a sum of squares in square metres; `limit` is a factor.
 
-    A published figure is met `within` that factor, bounds ours at `most`, or is `shown` only; it is
+    A published value agrees `within` that factor, is an upper limit for `most`, or is `shown` only;
     NaN if illegible.
     """
 
@@ -173,7 +178,7 @@ class ProgressLine:
 
 @dataclass(frozen=True)
 class ComparedProgress:
-    """Iterations of one fit; whether it settled within the number that is published."""
+    """Iterations of one fit; whether it settled within the published number."""
 
     progress: PublishedIterations
     settled: bool
@@ -189,8 +194,8 @@ class ComparedProgress:
 
 @dataclass(frozen=True)
 class ComparedDifference:
-    """Two estimators over synthetic data sets, and the published differences of one data set;
-    `limit` is a factor.
+    """Two estimators over synthetic data sets, and the published differences of one; `limit` is
+    a factor.
     """
 
     difference: Difference
@@ -199,12 +204,12 @@ class ComparedDifference:
 
     @property
     def parts(self) -> tuple[PlacedFigure, ...]:
-        found = (("rms", self.comparison.rms), ("maximum", self.comparison.maximum))
+        named_values = (("rms", self.comparison.rms), ("maximum", self.comparison.maximum))
         return tuple(
             PlacedFigure(
                 name, getattr(self.difference, name), tuple(map(float, values)), self.limit
             )
-            for name, values in found
+            for name, values in named_values
         )
 
     @property
@@ -214,7 +219,7 @@ class ComparedDifference:
 
 @dataclass(frozen=True)
 class PlacedFigure:
-    """A published figure, in metres, among the values of synthetic data sets."""
+    """A published value, in metres, among the values of synthetic data sets."""
 
     quantity: str
     published: float
@@ -237,8 +242,8 @@ class PlacedFigure:
 
 
 @dataclass(frozen=True)
-class Told:
-    """A design without a legible figure, and its uncertainties."""
+class ComputedDesign:
+    """A design without a legible value, and its uncertainties."""
 
     design: str
     quantities: dict[str, Quantity]
@@ -246,7 +251,7 @@ class Told:
 
 @dataclass(frozen=True)
 class Section:
-    """All that is compared of one section; `skipped` states what was left out to save time."""
+    """All comparisons of one section; `skipped` names those skipped to save time."""
 
     name: str
     title: str
@@ -257,7 +262,7 @@ class Section:
     errata: tuple[ComparedErratum, ...] = ()
     progress: tuple[ComparedProgress, ...] = ()
     differences: tuple[ComparedDifference, ...] = ()
-    told: tuple[Told, ...] = ()
+    told: tuple[ComputedDesign, ...] = ()
     illegible: tuple[Illegible, ...] = ()
     skipped: str = ""
 
@@ -267,21 +272,19 @@ class Section:
             *(*self.ranks, *self.columns, *self.remarks),
             *(*self.errata, *self.progress, *self.differences),
         )
-        return all(one.agrees for one in compared)
+        return all(statement.agrees for statement in compared)
 
 
 @dataclass(frozen=True)
 class Side:
-    """Ratios to ours, after the common factor, of the figures of a quantity that lie on one side of
-    ours.
-    """
+    """Adjusted ratios of the published values of a one-sided quantity."""
 
     stated: OneSided
     ratios: tuple[float, ...]
 
     @property
     def above(self) -> int:
-        """Number of figures above ours."""
+        """Number of published values above ballplate's."""
         return sum(ratio > 1.0 for ratio in self.ratios)
 
 
@@ -294,18 +297,19 @@ class Reproduction:
 
     @property
     def sides(self) -> tuple[Side, ...]:
-        """What lies on one side of ours in the columns that are compared, where there are any."""
-        found = []
+        """The one-sided quantities of the compared columns."""
+        one_sided_quantities = []
         for stated in self.document.statements.one_sided:
             ratios = [
                 figure.adjusted
                 for section in self.sections
-                for one in section.columns
-                for figure in one.figures
-                if (figure.quantity, one.column.statistic) == (stated.quantity, stated.statistic)
+                for compared in section.columns
+                for figure in compared.figures
+                if (figure.quantity, compared.column.statistic)
+                == (stated.quantity, stated.statistic)
             ]
-            found += [Side(stated, tuple(ratios))] if ratios else []
-        return tuple(found)
+            one_sided_quantities += [Side(stated, tuple(ratios))] if ratios else []
+        return tuple(one_sided_quantities)
 
     @property
     def agrees(self) -> bool:
@@ -319,10 +323,10 @@ def reproduce(
     trials: int | None = 100,
     report: Report = unreported,
 ) -> Reproduction:
-    """Compute the experiments of a document's sections, all of them if none are named.
+    """Compute the experiments of a document's sections, by default all.
 
-    `trials` is the number of synthetic data sets that estimators are compared over; None leaves
-    that comparison out. `report` receives what is being done, how many data sets of how many.
+    `trials` is the number of synthetic data sets for the comparison of estimators; None skips it.
+    `report` receives progress.
 
     :raises ExperimentError: a shipped design is missing or has errors.
     """
@@ -340,10 +344,12 @@ def reproduce(
 def _section(
     document: Document, shipped: Shipped, name: str, trials: int | None, report: Report
 ) -> Section:
-    stated = document.statements
-    illegible = tuple(block for block in stated.illegible if block.section == name)
-    told = variants(shipped, name) if any(block.told for block in illegible) else {}
-    differences = [one for one in stated.differences if section_of(one.design) == name]
+    statements = document.statements
+    illegible = tuple(block for block in statements.illegible if block.section == name)
+    computed_designs = variants(shipped, name) if any(block.told for block in illegible) else {}
+    differences = [
+        difference for difference in statements.differences if section_of(difference.design) == name
+    ]
     skipped = (
         "the comparison of estimators over synthetic data sets"
         if differences and trials is None
@@ -355,7 +361,7 @@ def _section(
         rests_on(document, name),
         tuple(
             compare_rank(shipped, statement, design)
-            for statement in stated.ranks
+            for statement in statements.ranks
             for design in statement.designs
             if statement.section == name
         ),
@@ -365,31 +371,33 @@ def _section(
             if column.section == name
         ),
         tuple(
-            compare_remark(shipped, remark) for remark in stated.remarks if remark.section == name
+            compare_remark(shipped, remark)
+            for remark in statements.remarks
+            if remark.section == name
         ),
         tuple(
             compare_erratum(document, shipped, erratum)
-            for erratum in stated.errata
+            for erratum in statements.errata
             if section_of(erratum.headed[0]) == name
         ),
         tuple(
             compare_progress(document, shipped, progress)
-            for progress in stated.convergence
+            for progress in statements.convergence
             if section_of(progress.design) == name
         ),
         tuple(
-            compare_difference(document, shipped, one, trials, report)
-            for one in differences
+            compare_difference(document, shipped, difference, trials, report)
+            for difference in differences
             if trials is not None
         ),
-        tuple(Told(label, tabulated(shipped, label)) for label in told),
+        tuple(ComputedDesign(label, tabulated(shipped, label)) for label in computed_designs),
         illegible,
         skipped,
     )
 
 
 def rests_on(document: Document, section: str, quantity: str | None = None) -> str:
-    """Keys of the assumptions of a section, or of one quantity in it, put together."""
+    """Return the keys of the assumptions of a section, or of one quantity in it, as one string."""
     chosen = SYMBOLS if quantity is None else (quantity,)
     return "".join(
         assumption.key
@@ -399,7 +407,7 @@ def rests_on(document: Document, section: str, quantity: str | None = None) -> s
 
 
 def common_factor(ratios: Iterable[float]) -> float:
-    """Median of ratios, which a few that have other causes do not move; NaN without any.
+    """Return the median of ratios, which a few outliers do not move; NaN without any.
 
     >>> common_factor([0.9, 1.0, 1.6])
     1.0
@@ -409,18 +417,25 @@ def common_factor(ratios: Iterable[float]) -> float:
 
 
 def compare_column(document: Document, shipped: Shipped, column: PublishedColumn) -> ComparedColumn:
-    """Compare the figures of one column after its common factor, in which exceptions have no
-    part.
+    """Compare the values of one column after its common factor, which exceptions do not
+    influence.
     """
-    stated = document.statements
+    statements = document.statements
     quantities = tabulated(shipped, column.design)
     ratios = _ratios(column, quantities)
     exceptions = {
-        symbol: next((one for one in stated.exceptions if one.concerns(column, symbol)), None)
+        symbol: next(
+            (
+                reservation
+                for reservation in statements.exceptions
+                if reservation.concerns(column, symbol)
+            ),
+            None,
+        )
         for symbol in ratios
     }
     factor = common_factor(ratio for symbol, ratio in ratios.items() if exceptions[symbol] is None)
-    usual = (1.0 - stated.limits.figure, 1.0 + stated.limits.figure)
+    usual = (1.0 - statements.limits.figure, 1.0 + statements.limits.figure)
     figures = []
     for symbol, ratio in ratios.items():
         exception = exceptions[symbol]
@@ -437,7 +452,7 @@ def compare_column(document: Document, shipped: Shipped, column: PublishedColumn
                 rests_on(document, column.section, symbol),
             )
         )
-    of_factor = (1.0 - stated.limits.factor, 1.0 + stated.limits.factor)
+    of_factor = (1.0 - statements.limits.factor, 1.0 + statements.limits.factor)
     return ComparedColumn(column, factor, of_factor, tuple(figures))
 
 
@@ -455,29 +470,29 @@ def compare_rank(shipped: Shipped, statement: RankStatement, design: str) -> Com
 
 
 def compare_remark(shipped: Shipped, remark: Remark) -> ComparedRemark:
-    """Compute the ratios that a remark is about."""
+    """Compute the ratios of a remark."""
     ratios = []
-    for design, other in remark.pairs:
+    for design, reference in remark.pairs:
         if remark.quantities == (SUM_OF_SQUARES,):
             last, compared = (
                 sums_of_squares(fitted_exactly(shipped_experiment(shipped, name)))[-1]
-                for name in (design, other)
+                for name in (design, reference)
             )
             ratios.append(last / compared)
             continue
         plan = planned(shipped, design)
         for symbol in remark.quantities:
-            if other == REPEATABILITY:
+            if reference == REPEATABILITY:
                 compared_with = float(plan.design.machine.repeatability[0])
             else:
-                compared_with = planned(shipped, other).quantities[symbol].average
+                compared_with = planned(shipped, reference).quantities[symbol].average
             ratios.append(plan.quantities[symbol].average / compared_with)
     return ComparedRemark(remark, float(np.min(ratios)), float(np.max(ratios)))
 
 
 def compare_erratum(document: Document, shipped: Shipped, erratum: Erratum) -> ComparedErratum:
-    """Compare figures with the designs that they are headed with, and with those that are meant."""
-    stated = document.statements
+    """Compare values with the designs in their heading, and with those meant."""
+    statements = document.statements
     lines = []
     for headed, meant in zip(erratum.headed, erratum.meant, strict=True):
         for column in document.columns:
@@ -487,20 +502,31 @@ def compare_erratum(document: Document, shipped: Shipped, erratum: Erratum) -> C
                 meant,
             ) or column.statistic not in erratum.statistics:
                 continue
-            both = [_ratios(column, tabulated(shipped, design)) for design in (headed, meant)]
+            ratios_of_designs = [
+                _ratios(column, tabulated(shipped, design)) for design in (headed, meant)
+            ]
             regular = [
                 symbol
                 for symbol in column.figures
-                if not any(one.concerns(column, symbol) for one in stated.exceptions)
+                if not any(
+                    reservation.concerns(column, symbol) for reservation in statements.exceptions
+                )
             ]
             deviations = []
-            for ratios in both:
+            for ratios in ratios_of_designs:
                 factor = common_factor(ratios[symbol] for symbol in regular)
                 deviations.append(max(abs(ratios[symbol] / factor - 1.0) for symbol in regular))
             lines.append(
-                ErratumLine(column.statistic, headed, meant, both[0], both[1], *deviations)
+                ErratumLine(
+                    column.statistic,
+                    headed,
+                    meant,
+                    ratios_of_designs[0],
+                    ratios_of_designs[1],
+                    *deviations,
+                )
             )
-    return ComparedErratum(erratum, tuple(lines), stated.limits.figure)
+    return ComparedErratum(erratum, tuple(lines), statements.limits.figure)
 
 
 def compare_progress(
@@ -508,10 +534,10 @@ def compare_progress(
 ) -> ComparedProgress:
     """Compare the iterations of a fit of exact readings."""
     limits = document.statements.limits
-    found = fitted_exactly(shipped_experiment(shipped, progress.design))
-    record = found.solution.iterations
-    steps, sums = [iteration.step for iteration in record], sums_of_squares(found)
-    # What ours has ended with is what it would have later.
+    fitted = fitted_exactly(shipped_experiment(shipped, progress.design))
+    record = fitted.solution.iterations
+    steps, sums = [iteration.step for iteration in record], sums_of_squares(fitted)
+    # Further iterations would not change the final sum of squares.
     later = sums + sums[-1:] * len(progress.sums_of_squares)
     lines = []
     for k, published in enumerate(progress.steps, start=1):
@@ -522,7 +548,7 @@ def compare_progress(
         is_close = k < 2 or progress.misfit
         rule = "shown" if k in progress.sums_shown_only else "within" if is_close else "most"
         lines.append(_line("S^2", k, published, later, rule, limits.sum_of_squares))
-    settled = found.solution.status == "converged"
+    settled = fitted.solution.status == "converged"
     if progress.steps:
         settled = settled and len(record) - 1 <= len(progress.steps)
     else:
@@ -544,12 +570,7 @@ def _line(
 def compare_difference(
     document: Document, shipped: Shipped, difference: Difference, trials: int, report: Report
 ) -> ComparedDifference:
-    """Place published differences of two estimators among those of synthetic data sets."""
+    """Compare published differences of two estimators with those of synthetic data sets."""
     experiment = shipped_experiment(shipped, difference.design)
-    comparison = compare_estimators(
-        experiment,
-        trials,
-        across_probes=True,
-        report=report,
-    )
+    comparison = compare_estimators(experiment, trials, across_probes=True, report=report)
     return ComparedDifference(difference, comparison, document.statements.limits.median)

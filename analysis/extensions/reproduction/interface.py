@@ -1,4 +1,4 @@
-"""Published figures and certified problems from Python."""
+"""Published values and certified problems from Python."""
 
 from __future__ import annotations
 
@@ -25,13 +25,13 @@ def reproduce(
     results: PathLike | None = None,
     report: Report = unreported,
 ) -> ReproducedDocument | CertifiedScores:
-    """The published figures of NPL Report CISE 15/98 beside ours, or the problems with certified
-    answers solved.
+    """Compare the published values of NPL Report CISE 15/98 with ballplate's, or solve certified
+    problems.
 
-    An `experiment` is a section such as 6.2.1, or the name of a problem; without any it is all of
-    them. `trials` is the number of synthetic data sets of section 6.2.7, None leaves them out.
-    `designs` is a folder in place of the designs that come with ballplate, `results` a JSON file
-    with another program's answers to the certified problems.
+    An `experiment` is a section such as 6.2.1, or the name of a problem; default: all. `trials` is
+    the number of synthetic data sets of section 6.2.7, None skips them. `designs` is a folder that
+    replaces the shipped designs, `results` a JSON file with another program's answers to the
+    certified problems.
 
     >>> import ballplate as bp
     >>> bp.reproduce("npl", "6.1.2").is_right
@@ -50,7 +50,7 @@ def reproduce(
     folder = None if designs is None else Path(designs)
     if document == "npl":
         if results is not None:
-            raise ValueError("results go with certified only; leave them out")
+            raise ValueError("results apply to certified only; leave them out")
         return reproduce_npl(chosen, trials, folder, report)
     answers = None if results is None else Path(results)
     return score_certified(chosen, answers, folder, report)

@@ -1,4 +1,4 @@
-"""Statements of a document as data: figures, ranks, remarks, errata, and the assumptions of a
+"""Statements of a document as data: values, ranks, remarks, errata, and assumptions of a
 comparison.
 """
 
@@ -19,9 +19,7 @@ SUM_OF_SQUARES = "S^2"
 
 
 class Assumption(Settings):
-    """What a comparison takes for granted that the document does not state; of all sections and
-    quantities if empty.
-    """
+    """An assumption that the document does not state; for all sections and quantities if empty."""
 
     key: str
     text: str
@@ -29,14 +27,14 @@ class Assumption(Settings):
     quantities: tuple[str, ...] = ()
 
     def concerns(self, section: str, quantity: str) -> bool:
-        """Whether a quantity of a section rests on it."""
+        """Return whether a quantity of a section depends on it."""
         return section in (self.sections or (section,)) and quantity in (
             self.quantities or (quantity,)
         )
 
 
 class Limits(Settings):
-    """How closely ours have to agree: `figure` and `factor` are relative, the others factors."""
+    """Limits of agreement: `figure` and `factor` are relative, the others factors."""
 
     figure: float
     factor: float
@@ -46,9 +44,9 @@ class Limits(Settings):
 
 
 class Reservation(Settings):
-    """Figures that cannot be held to the common limit, the limits of their ratio instead, and why.
+    """Published values with limits of their own for their ratio, and the reason.
 
-    An `open` one is a difference that nobody has explained.
+    An `open` one is an unexplained difference.
     """
 
     key: str
@@ -61,7 +59,7 @@ class Reservation(Settings):
     open: bool = False
 
     def concerns(self, column: PublishedColumn, quantity: str) -> bool:
-        """Whether a figure of a column is among them."""
+        """Return whether it applies to a quantity of a column."""
         return (
             column.table in self.tables
             and quantity in self.quantities
@@ -71,9 +69,7 @@ class Reservation(Settings):
 
 
 class OneSided(Settings):
-    """A quantity whose figures lie on one side of ours in all columns, which nobody has explained,
-    and what is known of it.
-    """
+    """A quantity whose published values are all on one side of ballplate's, without explanation."""
 
     quantity: str
     statistic: Statistic
@@ -81,7 +77,7 @@ class OneSided(Settings):
 
 
 class Erratum(Settings):
-    """A block of a table, the designs that it is headed with, and those whose figures it has."""
+    """A block of a table, the designs in its heading, and those to which its values belong."""
 
     table: str
     statistics: tuple[Statistic, ...]
@@ -92,9 +88,7 @@ class Erratum(Settings):
 
 
 class Illegible(Settings):
-    """A block of which no figure can be read; ours are `told` if there is nothing else of its
-    section.
-    """
+    """An illegible block; ballplate's values are `told` if the section has no other values."""
 
     table: str
     section: str
@@ -103,7 +97,7 @@ class Illegible(Settings):
 
 
 class RankStatement(Settings):
-    """The rank deficiency of designs: a number, or "some" where none is stated."""
+    """The rank deficiency of designs: a number, or "some"."""
 
     section: str
     designs: tuple[str, ...]
@@ -111,9 +105,9 @@ class RankStatement(Settings):
 
 
 class Remark(Settings):
-    """What is said of averages in words, as limits of their ratios in pairs of designs.
+    """A remark on averages, as limits of their ratios in pairs of designs.
 
-    The quantity `S^2` is the sum of squares that fits of exact readings end with.
+    The quantity `S^2` is the final sum of squares of fits of exact readings.
     """
 
     section: str
@@ -125,12 +119,12 @@ class Remark(Settings):
 
 
 class PublishedIterations(Settings):
-    """Length of step and sum of squares, in square metres with weight 1 for a reading, of
+    """Step lengths and sums of squares, in square metres with weight 1 for a reading, of
     Gauss-Newton iterations.
 
-    It `settles` by the last of them, or does not, or is not compared in that if None; without any
-    figure, it settles at all. With a `misfit` the sum of squares that is left is not that of
-    rounding. Figures that are only shown have a reason.
+    The fit `settles` by the last of them, or not, or is not compared in that respect if None;
+    without any value, it settles at all. With a `misfit`, the final sum of squares is not mere
+    rounding. Values that are only shown have a reason.
     """
 
     table: str
@@ -155,7 +149,7 @@ class Difference(Settings):
 
 
 class Statements(Settings):
-    """What a document states besides the figures of its tables of uncertainties."""
+    """Statements of a document, except for the values in its tables of uncertainties."""
 
     title: str
     sections: tuple[str, ...]
@@ -173,7 +167,7 @@ class Statements(Settings):
 
 @dataclass(frozen=True)
 class PublishedColumn:
-    """One column of a printed table: the legible ones of U1 to U6, in metres and radians, of one
+    """One column of a printed table: the legible values of U1 to U6, in metres and radians, of a
     design.
     """
 
@@ -197,7 +191,7 @@ class Document:
 
 
 def case_of(design: str) -> str:
-    """Variant of a design, or its file where it has none.
+    """Return the variant of a design, or its file without variants.
 
     >>> case_of("6.2.1[n=4 NDEL=5]"), case_of("6.2.1")
     ('n=4 NDEL=5', '6.2.1')
@@ -206,7 +200,7 @@ def case_of(design: str) -> str:
 
 
 def section_of(design: str) -> str:
-    """Section of the document that a design belongs to.
+    """Return the section of the document with a design.
 
     >>> section_of("6.1.1-weights[C w=1]")
     '6.1.1'
@@ -216,8 +210,8 @@ def section_of(design: str) -> str:
 
 @cache
 def npl() -> Document:
-    """NPL Report CISE 15/98, sections 5 and 6: every legible figure of Tables 1 to 12, and what is
-    said.
+    """Return NPL Report CISE 15/98, sections 5 and 6: legible values of Tables 1 to 12, and
+    statements.
     """
     name = "npl-cise-15-98"
     folder = files(__package__)

@@ -1,6 +1,4 @@
-"""`ballplate reproduce`: published experiments and certified problems, computed anew beside what is
-printed of them.
-"""
+"""`ballplate reproduce`: compare published values, or solve certified problems."""
 
 from __future__ import annotations
 
@@ -11,13 +9,12 @@ from ballplate.cli import UsageError, trial_count
 
 DESCRIPTION = (
     "npl: compute the experiments of NPL Report CISE 15/98, sections 5 and 6, from the"
-    " shipped designs. Every legible figure is printed beside the computed one, with the"
-    " ratio and the basis of the comparison, as are statements on rank, errata and open"
-    " differences. The exit status is 0 if everything agrees within the stated limits,"
-    " otherwise 1. certified: solve the problems with certified answers, and count the"
-    " digits that agree, or with --results those of another program. The exit status is"
-    " 0 if every rank and every count is right and every quantity has an answer,"
-    " otherwise 1."
+    " shipped designs. Print every legible value with the computed one, their ratio and"
+    " the assumptions, also statements on rank, errata and open differences. Exit status:"
+    " 0 if everything agrees within the stated limits, otherwise 1. certified: solve the"
+    " problems with certified answers, and count the digits that agree, or with --results"
+    " those of another program. Exit status: 0 if every rank and every count is correct"
+    " and every quantity has an answer, otherwise 1."
 )
 
 
@@ -69,9 +66,7 @@ def add_options(parser: ArgumentParser) -> None:
 
 
 def run(options: Namespace) -> int:
-    """Reproduce a document; 1 if a published figure does not come out within the limits stated, or
-    an answer to a certified problem is wrong or missing.
-    """
+    """Reproduce a document and return 1 unless everything agrees."""
     from ballplate.cli import print_json, print_lines, progress
 
     from .reproduction_result import ReproducedDocument, reproduce_npl
@@ -79,24 +74,24 @@ def run(options: Namespace) -> int:
 
     is_certified = options.document == "certified"
     if is_certified and (options.quick or options.markdown):
-        raise UsageError("--quick and --markdown go with npl only; leave them out")
+        raise UsageError("--quick and --markdown apply to npl only; leave them out")
     if options.results and not is_certified:
-        raise UsageError("--results goes with certified only; leave it out")
+        raise UsageError("--results applies to certified only; leave it out")
     chosen, folder = options.experiment, options.designs
-    found: CertifiedScores | ReproducedDocument
+    result: CertifiedScores | ReproducedDocument
     try:
         with progress(options) as shown:
             if is_certified:
-                found = score_certified(chosen, options.results, folder, shown.show)
+                result = score_certified(chosen, options.results, folder, shown.show)
             else:
                 trials = None if options.quick else options.trials
-                found = reproduce_npl(chosen, trials, folder, shown.show)
+                result = reproduce_npl(chosen, trials, folder, shown.show)
     except ValueError as error:
         raise UsageError(error) from None
     if options.json:
-        print_json([found.to_dict()])
+        print_json([result.to_dict()])
     elif options.markdown:
-        print(found.to_markdown())
+        print(result.to_markdown())
     else:
-        print_lines(found.lines())
-    return 0 if found.is_right else 1
+        print_lines(result.lines())
+    return 0 if result.is_right else 1

@@ -1,4 +1,4 @@
-"""A document's published figures beside ours, as they show themselves."""
+"""A document's published values and ballplate's, as a result."""
 
 from __future__ import annotations
 
@@ -20,9 +20,9 @@ from .shipped import Shipped
 
 @dataclass(frozen=True, repr=False)
 class ReproducedDocument(Result):
-    """A document with its figures `found` anew."""
+    """A document with its comparisons."""
 
-    found: Reproduction
+    reproduction: Reproduction
 
     @property
     def label(self) -> str:
@@ -30,30 +30,30 @@ class ReproducedDocument(Result):
 
     @property
     def title(self) -> str:
-        return self.found.document.statements.title
+        return self.reproduction.document.statements.title
 
     @property
     def is_right(self) -> bool:
-        """Whether everything agrees within what is stated."""
-        return self.found.agrees
+        """Return whether everything agrees within its limits."""
+        return self.reproduction.agrees
 
     def headline(self) -> str:
-        count = len(self.found.sections)
+        count = len(self.reproduction.sections)
         agrees = "agree" if self.is_right else "do not all agree"
         return f"{number_of(count, 'section')}, figures {agrees}"
 
     def lines(self) -> list[str]:
-        return reproduction_lines(self.found)
+        return reproduction_lines(self.reproduction)
 
     def data(self) -> dict[str, Any]:
-        return reproduction_data(self.found)
+        return reproduction_data(self.reproduction)
 
     def to_markdown(self) -> str:
-        """All of it in Markdown, with the assumptions that each figure rests on."""
-        return reproduction_markdown(self.found)
+        """Return all comparisons in Markdown, with the assumptions of each value."""
+        return reproduction_markdown(self.reproduction)
 
     def rows(self) -> list[dict[str, Any]]:
-        """One row for each published figure of the tables."""
+        """Return one row per published value of the tables."""
         names = ("design", "table", "quantity", "statistic", "published", "ours", "ratio")
         return [
             {name: figure[name] for name in (*names, "unit", "agrees")}
@@ -68,16 +68,16 @@ def reproduce_npl(
     folder: Path | None = None,
     report: Report = unreported,
 ) -> ReproducedDocument:
-    """NPL Report CISE 15/98 computed anew, all sections if none are named, from the designs in a
-    folder or those that come with ballplate; see `compare.reproduce`.
+    """Compute the sections of NPL Report CISE 15/98, by default all, from the designs in a folder
+    or the shipped ones.
 
     :raises ValueError: the report has no such section.
     :raises ExperimentError: a design is missing or has errors.
     """
     document, wanted = npl(), tuple(sections)
-    known = document.statements.sections
+    sections_of_document = document.statements.sections
     for name in wanted:
-        if name not in known:
-            raise ValueError(f'no experiment "{name}"; {hint(name, known)}')
+        if name not in sections_of_document:
+            raise ValueError(f'no experiment "{name}"; {hint(name, sections_of_document)}')
     designs = Shipped(folder or shipped("npl"))
     return ReproducedDocument(reproduce(document, designs, wanted, trials, report))

@@ -1,4 +1,4 @@
-"""A reproduction as text for people, as Markdown for documents, and as plain data for programs."""
+"""A reproduction as text, as Markdown, and as plain data."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ from .published import (
 
 @dataclass(frozen=True)
 class Heading:
-    """A heading; level 1 is that of the whole."""
+    """A heading; level 1 is the title."""
 
     level: int
     text: str
@@ -44,14 +44,14 @@ class Heading:
 
 @dataclass(frozen=True)
 class Paragraph:
-    """A sentence or more."""
+    """One or several sentences."""
 
     text: str
 
 
 @dataclass(frozen=True)
 class Grid:
-    """A table: its head, its rows, and which columns stand to the right."""
+    """A table: its head, its rows, and a mask of right-aligned columns."""
 
     head: tuple[str, ...]
     rows: tuple[tuple[str, ...], ...]
@@ -64,7 +64,7 @@ QUANTILES = (0.0, 0.05, 0.5, 0.95, 1.0)
 
 
 def reproduction_lines(reproduction: Reproduction) -> list[str]:
-    """A reproduction as lines of text, tables being no wider than 80 characters."""
+    """Return a reproduction as lines of text, with tables of at most 80 characters."""
     lines: list[str] = []
     for block in _blocks(reproduction):
         if isinstance(block, Heading):
@@ -73,12 +73,12 @@ def reproduction_lines(reproduction: Reproduction) -> list[str]:
             lines.append(block.text)
         else:
             lines += ["", *aligned([block.head, *block.rows], block.right), ""]
-    # Of two empty lines one is enough, and none at the end.
+    # One empty line replaces two, without any at the end.
     return [line for k, line in enumerate(lines) if line or any(lines[k + 1 : k + 2])]
 
 
 def reproduction_markdown(reproduction: Reproduction) -> str:
-    """A reproduction as Markdown, with the assumptions that each figure rests on."""
+    """Return a reproduction as Markdown, with the assumptions of each value."""
     parts = []
     for block in _blocks(reproduction, with_assumptions=True):
         if isinstance(block, Heading):
@@ -98,22 +98,24 @@ def reproduction_markdown(reproduction: Reproduction) -> str:
 
 
 def _blocks(reproduction: Reproduction, with_assumptions: bool = False) -> list[Block]:
-    stated = reproduction.document.statements
-    shown = {assumption for section in reproduction.sections for assumption in section.rests_on}
+    statements = reproduction.document.statements
+    keys = {assumption for section in reproduction.sections for assumption in section.rests_on}
     blocks: list[Block] = [
         Heading(
-            1, f"{stated.title}: published figures and those computed from the shipped designs"
+            1, f"{statements.title}: published values, and those computed from the shipped designs"
         ),
         Paragraph(
-            "Ratios are published over ours. Agreement means that they are within"
-            f" {100 * stated.limits.figure:g} % after the common factor of their column, and that"
-            f" factor within {100 * stated.limits.factor:g} % of 1, unless a numbered exception"
-            " states other limits."
+            "Ratios are published over computed values. They agree if they are within"
+            f" {100 * statements.limits.figure:g} % after the common factor of their column, and"
+            f" that factor is within {100 * statements.limits.factor:g} % of 1, unless a numbered"
+            " exception states other limits."
         ),
         Heading(2, "Assumptions"),
     ]
     blocks += [
-        Paragraph(f"{one.key}: {one.text}.") for one in stated.assumptions if one.key in shown
+        Paragraph(f"{assumption.key}: {assumption.text}.")
+        for assumption in statements.assumptions
+        if assumption.key in keys
     ]
     for section in reproduction.sections:
         blocks += _section_blocks(reproduction.document, section, with_assumptions)
@@ -127,22 +129,27 @@ def _section_blocks(document: Document, section: Section, with_assumptions: bool
     ]
     if section.ranks:
         rows = [
-            (case_of(one.design), _rank(one.published), _rank(one.ours), yes(one.agrees))
-            for one in section.ranks
+            (
+                case_of(statement.design),
+                _rank(statement.published),
+                _rank(statement.ours),
+                yes(statement.agrees),
+            )
+            for statement in section.ranks
         ]
-        blocks.append(_grid(("rank of", "published", "ours", "agrees"), rows, 1))
+        blocks.append(_grid(("rank of", "published", "computed", "agrees"), rows, 1))
     if section.columns:
         blocks.append(
-            Paragraph("Columns of tables, their common factor, and how far figures are from it:")
+            Paragraph("Columns of tables, their common factor, and the largest deviation from it:")
         )
         blocks.append(_factors(section.columns))
         text = (
-            "Published and computed U in µm and µrad; the ratio as it is, and after the common"
+            "Published and computed U in µm and µrad; their ratio, and the ratio after the common"
             " factor. Notes refer to the exceptions and open differences at the end."
         )
         blocks.append(Paragraph(text))
         blocks.append(_figures(section.columns, with_assumptions))
-    blocks += [Paragraph(_remark(one)) for one in section.remarks]
+    blocks += [Paragraph(_remark(statement)) for statement in section.remarks]
     for erratum in section.errata:
         blocks += _erratum(erratum)
     for progress in section.progress:
@@ -155,18 +162,16 @@ def _section_blocks(document: Document, section: Section, with_assumptions: bool
         blocks.append(
             Paragraph(
                 f"Not legible in the copy at hand: Table {block.table}, {block.what}"
-                + ("; ours, in µm and µrad, for whoever has it:" if block.told else ".")
+                + ("; computed values in µm and µrad:" if block.told else ".")
             )
         )
     if section.told:
-        blocks.append(_told(section))
+        blocks.append(_computed_grid(section))
     return blocks
 
 
 def _grid(head: Sequence[str], rows: Iterable[Sequence[str]], left: int) -> Grid:
-    """A table whose first `left` columns stand to the left, and the last one too unless it is a
-    number.
-    """
+    """Return a table with `left` left-aligned columns; the last one, too, unless it is a number."""
     right = [False] * left + [True] * (len(head) - left)
     right[-1] = head[-1] not in ("agrees", "note", "rests on")
     if head[-1] == "rests on":
@@ -175,7 +180,7 @@ def _grid(head: Sequence[str], rows: Iterable[Sequence[str]], left: int) -> Grid
 
 
 def yes(agrees: bool) -> str:
-    """Whether something agrees, so that what does not is seen."""
+    """Return yes, or NO, which is conspicuous."""
     return "yes" if agrees else "NO"
 
 
@@ -186,43 +191,55 @@ def _rank(deficiency: int | str) -> str:
 
 
 def _resting(document: Document, section: Section) -> str:
-    """Keys of the assumptions of a section, those of single quantities apart."""
-    chosen = [one for one in document.statements.assumptions if one.key in section.rests_on]
-    general = [one for one in chosen if not one.quantities]
-    special = [one for one in chosen if one.quantities]
-    text = f"assumptions {', '.join(one.key for one in general)}"
-    return "; ".join([text, *(f"{' and '.join(one.quantities)} on {one.key}" for one in special)])
+    """Return keys of the assumptions of a section, then those of single quantities."""
+    chosen = [
+        assumption
+        for assumption in document.statements.assumptions
+        if assumption.key in section.rests_on
+    ]
+    general = [assumption for assumption in chosen if not assumption.quantities]
+    special = [assumption for assumption in chosen if assumption.quantities]
+    text = f"assumptions {', '.join(assumption.key for assumption in general)}"
+    return "; ".join(
+        [
+            text,
+            *(
+                f"{' and '.join(assumption.quantities)} on {assumption.key}"
+                for assumption in special
+            ),
+        ]
+    )
 
 
 def _factors(columns: Sequence[ComparedColumn]) -> Grid:
     rows = []
-    for one in columns:
-        compared = [f for f in one.figures if f.exception is None]
+    for compared_column in columns:
+        compared = [f for f in compared_column.figures if f.exception is None]
         deviation = max(abs(f.adjusted - 1.0) for f in compared)
         rows.append(
             (
-                one.column.table,
-                one.column.statistic,
-                one.column.case,
-                f"{one.factor:.3f}",
+                compared_column.column.table,
+                compared_column.column.statistic,
+                compared_column.column.case,
+                f"{compared_column.factor:.3f}",
                 str(len(compared)),
                 f"{100 * deviation:.1f}",
-                yes(one.agrees),
+                yes(compared_column.agrees),
             )
         )
-    head = ("table", "statistic", "case", "factor", "figures", "off by at most, %", "agrees")
+    head = ("table", "statistic", "case", "factor", "values", "off by at most, %", "agrees")
     return _grid(head, rows, 3)
 
 
 def _figures(columns: Sequence[ComparedColumn], with_assumptions: bool) -> Grid:
     rows = []
-    for one in columns:
-        for figure in one.figures:
+    for compared_column in columns:
+        for figure in compared_column.figures:
             row = [
-                one.column.table,
+                compared_column.column.table,
                 figure.quantity,
-                one.column.statistic,
-                one.column.case,
+                compared_column.column.statistic,
+                compared_column.column.case,
                 number(1e6 * figure.published, 5),
                 number(1e6 * figure.ours, 5),
                 f"{figure.ratio:.3f}",
@@ -230,7 +247,7 @@ def _figures(columns: Sequence[ComparedColumn], with_assumptions: bool) -> Grid:
                 _note(figure),
             ]
             rows.append(row + ([", ".join(figure.rests_on)] if with_assumptions else []))
-    head = ["table", "", "statistic", "case", "published", "ours", "ratio", "/ factor", "note"]
+    head = ["table", "", "statistic", "case", "published", "computed", "ratio", "/ factor", "note"]
     return _grid(head + (["rests on"] if with_assumptions else []), rows, 4)
 
 
@@ -248,15 +265,15 @@ def _remark(compared: ComparedRemark) -> str:
     names = ", ".join(compared.remark.quantities)
     against = " over the repeatability" if _over_repeatability(compared.remark) else ""
     verdict = "agrees" if compared.agrees else "DIFFERS"
-    what = "" if compared.remark.quantities == (SUM_OF_SQUARES,) else "averages of "
+    of_averages = "" if compared.remark.quantities == (SUM_OF_SQUARES,) else "averages of "
     return (
-        f"Said: {compared.remark.text}. Ratio of {what}{names}{against}: {ratios},"
+        f"Said: {compared.remark.text}. Ratio of {of_averages}{names}{against}: {ratios},"
         f" {_wanted(compared.remark)}; {verdict}."
     )
 
 
 def _over_repeatability(remark: Remark) -> bool:
-    return all(other == REPEATABILITY for _, other in remark.pairs)
+    return all(reference == REPEATABILITY for _, reference in remark.pairs)
 
 
 def _wanted(remark: Remark) -> str:
@@ -284,7 +301,7 @@ def _erratum(compared: ComparedErratum) -> list[Block]:
             ):
                 shown = (f"{ratios[symbol]:.3f}" if symbol in ratios else "-" for symbol in SYMBOLS)
                 rows.append((words, design, *shown, f"{100 * deviation:.0f}"))
-        blocks.append(_grid((statistic, "ratio to ours of", *SYMBOLS, "off, %"), rows, 2))
+        blocks.append(_grid((statistic, "ratio to that of", *SYMBOLS, "off, %"), rows, 2))
     return blocks
 
 
@@ -297,11 +314,11 @@ def _progress(compared: ComparedProgress) -> list[Block]:
         text += f"published as {'settling' if progress.settles else 'not settling'}"
         text += f" within {len(progress.steps)} iterations" if progress.steps else ""
     text += (
-        f", ours {'settles' if compared.settled else 'does not'} ({compared.iterations} in all);"
-        f" {_verdict(compared)}."
+        f", computed: {'settles' if compared.settled else 'does not'}"
+        f" ({compared.iterations} in all); {_verdict(compared)}."
     )
     if progress.reason:
-        text += f" Figures without a limit: {progress.reason}."
+        text += f" Values without a limit: {progress.reason}."
     rows = [
         (
             line.quantity,
@@ -314,7 +331,7 @@ def _progress(compared: ComparedProgress) -> list[Block]:
     ]
     return [
         Paragraph(text),
-        _grid(("iteration", "published", "ours", "ours has to be", "agrees"), rows, 1),
+        _grid(("iteration", "published", "computed", "limit", "agrees"), rows, 1),
     ]
 
 
@@ -339,103 +356,104 @@ def _wanted_of(line: ProgressLine) -> str:
 def _differences(section: Section) -> list[Block]:
     blocks: list[Block] = []
     rows = []
-    for one in section.differences:
-        if one.comparison.failed:
+    for compared in section.differences:
+        if compared.comparison.failed:
             blocks.append(
                 Paragraph(
-                    f"{one.difference.design}: {len(one.comparison.failed)} data sets did not"
-                    " converge."
+                    f"{compared.difference.design}: {len(compared.comparison.failed)} data sets"
+                    " did not converge."
                 )
             )
         rows += [
             (
-                case_of(one.difference.design),
+                case_of(compared.difference.design),
                 {"rms": "rms", "maximum": "largest"}[part.quantity],
                 number(1e6 * part.published),
                 *(number(1e6 * value, 3) for _, value in _quantiles(part)),
                 f"{100 * part.below:.0f} %",
                 yes(part.agrees),
             )
-            for part in one.parts
+            for part in compared.parts
         ]
     first = section.differences[0].comparison
     text = (
-        "Corrected distances by an estimator of distances alone, less those by the full one, in"
-        f" µm: the figure of the one published data set, and the quantiles of {first.trials} data"
-        " sets of ours, into whose range it has to fall, and within a factor"
-        f" {section.differences[0].limit:g} of whose median."
+        "Corrected distances by an estimator of distances alone, minus those by the full one, in"
+        f" µm: the value of the published data set, and the quantiles of {first.trials} data sets."
+        " The value must be in their range, and within a factor"
+        f" {section.differences[0].limit:g} of their median."
     )
     quantiles = ("least", *(f"{100 * q:.0f} %" for q in QUANTILES[1:-1]), "largest")
     head = ("case", "", "published", *quantiles, "below", "agrees")
     return [*blocks, Paragraph(text), _grid(head, rows, 2)]
 
 
-def _told(section: Section) -> Grid:
+def _computed_grid(section: Section) -> Grid:
     rows = [
         (
-            case_of(one.design),
+            case_of(computed.design),
             statistic,
-            *(number(1e6 * getattr(one.quantities[symbol], statistic)) for symbol in SYMBOLS),
+            *(number(1e6 * getattr(computed.quantities[symbol], statistic)) for symbol in SYMBOLS),
         )
-        for one in section.told
+        for computed in section.told
         for statistic in ("maximum", "average")
     ]
     return _grid(("case", "statistic", *SYMBOLS), rows, 2)
 
 
 def _excepted(reproduction: Reproduction) -> list[tuple[Reservation, list[ComparedFigure]]]:
-    """Exceptions that figures of the sections fall under, open ones first, each with its
-    figures.
-    """
+    """Return exceptions of the sections' values, open ones first, each with its values."""
     figures = [
         f for section in reproduction.sections for column in section.columns for f in column.figures
     ]
     pairs = [
-        (one, [f for f in figures if f.exception == one])
-        for one in sorted(reproduction.document.statements.exceptions, key=lambda one: not one.open)
+        (exception, [f for f in figures if f.exception == exception])
+        for exception in sorted(
+            reproduction.document.statements.exceptions, key=lambda exception: not exception.open
+        )
     ]
-    return [(one, under) for one, under in pairs if under]
+    return [(exception, under) for exception, under in pairs if under]
 
 
 def _exception_blocks(reproduction: Reproduction) -> list[Block]:
     blocks: list[Block] = []
     excepted = _excepted(reproduction)
     for title, is_open in (("Open differences", True), ("Exceptions with a reason", False)):
-        chosen = [(one, under) for one, under in excepted if one.open == is_open]
+        chosen = [(exception, under) for exception, under in excepted if exception.open == is_open]
         sides = reproduction.sides if is_open else ()
         if chosen or sides:
             blocks.append(Heading(2, title))
-        blocks += [Paragraph(_side(one)) for one in sides]
-        for one, under in chosen:
+        blocks += [Paragraph(_side(exception)) for exception in sides]
+        for exception, under in chosen:
             ratios = [f.adjusted for f in under]
-            many = f"{len(under)} figures" if len(under) > 1 else "1 figure"
+            many = number_of(len(under), "value")
             between = " to ".join(
                 dict.fromkeys(f"{value:.3f}" for value in (min(ratios), max(ratios)))
             )
             blocks.append(
                 Paragraph(
-                    f"{one.key}: {' and '.join(one.quantities)} in {_tables(one)}, {many}: after"
-                    f" the common factor {between} times ours, held to {one.within[0]:g} to"
-                    f" {one.within[1]:g}. {_sentence(one.reason)}"
+                    f"{exception.key}: {' and '.join(exception.quantities)} in"
+                    f" {_tables(exception)}, {many}: after the common factor {between} times the"
+                    f" computed ones, limits {exception.within[0]:g} to {exception.within[1]:g}."
+                    f" {_sentence(exception.reason)}"
                 )
             )
     return blocks
 
 
 def _side(side: Side) -> str:
-    """A sentence on figures that lie on one side of ours."""
-    stated, count = side.stated, len(side.ratios)
+    """Return a sentence on a one-sided quantity."""
+    one_sided, count = side.stated, len(side.ratios)
     where = f"{'all ' if side.above == count else f'{side.above} of '}{number_of(count, 'column')}"
     return (
-        f"The printed {stated.statistic} {stated.quantity} is above ours in {where}:"
-        f" after the common factor {min(side.ratios):.3f} to {max(side.ratios):.3f} times ours."
-        f" {_sentence(stated.reason)}"
+        f"The printed {one_sided.statistic} {one_sided.quantity} is above the computed one in"
+        f" {where}: after the common factor by {min(side.ratios):.3f} to {max(side.ratios):.3f}."
+        f" {_sentence(one_sided.reason)}"
     )
 
 
 def _tables(reservation: Reservation) -> str:
-    *others, last = reservation.tables
-    return f"Tables {', '.join(others)} and {last}" if others else f"Table {last}"
+    *earlier, last = reservation.tables
+    return f"Tables {', '.join(earlier)} and {last}" if earlier else f"Table {last}"
 
 
 def _sentence(text: str) -> str:
@@ -444,34 +462,38 @@ def _sentence(text: str) -> str:
 
 def _summary(reproduction: Reproduction) -> list[Block]:
     def every(part: str) -> list[Any]:
-        return [one for section in reproduction.sections for one in getattr(section, part)]
+        return [
+            statement for section in reproduction.sections for statement in getattr(section, part)
+        ]
 
     columns = every("columns")
     figures = [figure for column in columns for figure in column.figures]
     regular = [f for f in figures if f.exception is None]
     counted: dict[str, list[bool]] = {
-        "figures of tables within the common limit": [f.agrees for f in regular],
+        "values of tables within the common limit": [f.agrees for f in regular],
         "exceptions within their own": [f.agrees for f in figures if f.exception is not None],
         "common factors": [column.factor_agrees for column in columns],
-        "statements on rank": [one.agrees for one in every("ranks")],
-        "remarks": [one.agrees for one in every("remarks")],
-        "errata confirmed": [one.agrees for one in every("errata")],
-        "fits of exact readings": [one.agrees for one in every("progress")],
-        "differences of estimators": [p.agrees for one in every("differences") for p in one.parts],
+        "statements on rank": [statement.agrees for statement in every("ranks")],
+        "remarks": [statement.agrees for statement in every("remarks")],
+        "errata confirmed": [statement.agrees for statement in every("errata")],
+        "fits of exact readings": [statement.agrees for statement in every("progress")],
+        "differences of estimators": [
+            p.agrees for statement in every("differences") for p in statement.parts
+        ],
     }
     parts = [(words, f"{sum(are)} of {len(are)}") for words, are in counted.items() if are]
-    unexplained = sum(len(under) for one, under in _excepted(reproduction) if one.open)
+    unexplained = sum(len(under) for exception, under in _excepted(reproduction) if exception.open)
     if unexplained:
-        parts.append(("open differences, unexplained", f"{unexplained} figures"))
+        parts.append(("open differences, unexplained", f"{unexplained} values"))
     parts += [
         (
-            f"{one.stated.statistic} {one.stated.quantity} above ours, unexplained",
-            f"{one.above} of {len(one.ratios)}",
+            f"{side.stated.statistic} {side.stated.quantity} above computed, unexplained",
+            f"{side.above} of {len(side.ratios)}",
         )
-        for one in reproduction.sides
+        for side in reproduction.sides
     ]
     text = (
-        "Everything compared agrees within what is stated."
+        "Everything compared agrees within the stated limits."
         if reproduction.agrees
         else "NOT everything compared agrees."
     )
@@ -480,8 +502,8 @@ def _summary(reproduction: Reproduction) -> list[Block]:
         deviations = np.array([abs(f.adjusted - 1.0) for f in regular])
         factors = [column.factor for column in columns]
         text = (
-            f"After the common factors, {min(factors):.3f} to {max(factors):.3f}, figures that are"
-            f" no exceptions are off by {100 * float(np.median(deviations)):.1f} % (median) and"
+            f"After the common factors, {min(factors):.3f} to {max(factors):.3f}, values without an"
+            f" exception are off by {100 * float(np.median(deviations)):.1f} % (median) and"
             f" {100 * deviations.max():.1f} % at most."
         )
         blocks.append(Paragraph(text))
@@ -489,25 +511,32 @@ def _summary(reproduction: Reproduction) -> list[Block]:
 
 
 def reproduction_data(reproduction: Reproduction) -> dict[str, Any]:
-    """A reproduction as plain data in metres and radians; what is undetermined is None."""
-    stated = reproduction.document.statements
-    shown = {key for section in reproduction.sections for key in section.rests_on}
+    """Return a reproduction as plain data in metres and radians; None if undetermined."""
+    statements = reproduction.document.statements
+    keys = {key for section in reproduction.sections for key in section.rests_on}
     data = {
-        "document": stated.title,
+        "document": statements.title,
         "agrees": reproduction.agrees,
-        "limits": stated.limits.model_dump(),
-        "assumptions": {one.key: one.text for one in stated.assumptions if one.key in shown},
+        "limits": statements.limits.model_dump(),
+        "assumptions": {
+            assumption.key: assumption.text
+            for assumption in statements.assumptions
+            if assumption.key in keys
+        },
         "exceptions": {
-            one.key: {**picked(one, "reason", "open", "within"), "figures": len(under)}
-            for one, under in _excepted(reproduction)
+            exception.key: {
+                **picked(exception, "reason", "open", "within"),
+                "figures": len(under),
+            }
+            for exception, under in _excepted(reproduction)
         },
         "one_sided": [
             {
-                **picked(one.stated, "quantity", "statistic", "reason"),
-                **{"columns": len(one.ratios), "above": one.above},
-                **{"least_ratio": min(one.ratios), "largest_ratio": max(one.ratios)},
+                **picked(side.stated, "quantity", "statistic", "reason"),
+                **{"columns": len(side.ratios), "above": side.above},
+                **{"least_ratio": min(side.ratios), "largest_ratio": max(side.ratios)},
             }
-            for one in reproduction.sides
+            for side in reproduction.sides
         ],
         "sections": [_section_data(section) for section in reproduction.sections],
     }
@@ -521,66 +550,71 @@ def _section_data(section: Section) -> dict[str, Any]:
         **picked(section, "title", "agrees"),
         "rests_on": list(section.rests_on),
         "ranks": [
-            picked(one, "design", "published", "ours", "gap", "agrees") for one in section.ranks
+            picked(compared, "design", "published", "ours", "gap", "agrees")
+            for compared in section.ranks
         ],
         "factors": [
             {
-                **picked(one.column, "table", "design", "statistic"),
-                **picked(one, "factor", "within"),
-                "agrees": one.factor_agrees,
+                **picked(compared.column, "table", "design", "statistic"),
+                **picked(compared, "factor", "within"),
+                "agrees": compared.factor_agrees,
             }
-            for one in section.columns
+            for compared in section.columns
         ],
-        "figures": [_figure_data(one, figure) for one in section.columns for figure in one.figures],
+        "figures": [
+            _figure_data(compared, figure)
+            for compared in section.columns
+            for figure in compared.figures
+        ],
         "remarks": [
             {
-                **picked(one.remark, "text", "quantities", "at_least", "at_most"),
-                "least_ratio": one.least,
-                "largest_ratio": one.largest,
-                "agrees": one.agrees,
+                **picked(compared.remark, "text", "quantities", "at_least", "at_most"),
+                "least_ratio": compared.least,
+                "largest_ratio": compared.largest,
+                "agrees": compared.agrees,
             }
-            for one in section.remarks
+            for compared in section.remarks
         ],
         "errata": [
             {
-                **picked(one.erratum, "table", "text"),
-                "confirmed": one.agrees,
-                "columns": one.lines,
+                **picked(compared.erratum, "table", "text"),
+                "confirmed": compared.agrees,
+                "columns": compared.lines,
             }
-            for one in section.errata
+            for compared in section.errata
         ],
         "convergence": [
             {
-                **picked(one.progress, "table", "design"),
-                "published_settles": one.progress.settles,
-                "ours_settles": one.settled,
-                **picked(one, "iterations", "agrees"),
+                **picked(compared.progress, "table", "design"),
+                "published_settles": compared.progress.settles,
+                "ours_settles": compared.settled,
+                **picked(compared, "iterations", "agrees"),
                 "figures": [
                     picked(line, "quantity", "published", "ours", "rule", "limit", "agrees")
-                    for line in one.lines
+                    for line in compared.lines
                 ],
             }
-            for one in section.progress
+            for compared in section.progress
         ],
         "differences": [
             {
-                "design": one.difference.design,
-                "trials": one.comparison.trials,
-                "not_converged": one.comparison.failed,
-                **{part.quantity: _placed_data(part) for part in one.parts},
-                "agrees": one.agrees,
+                "design": compared.difference.design,
+                "trials": compared.comparison.trials,
+                "not_converged": compared.comparison.failed,
+                **{part.quantity: _placed_data(part) for part in compared.parts},
+                "agrees": compared.agrees,
             }
-            for one in section.differences
+            for compared in section.differences
         ],
         "computed_only": [
             {
-                "design": one.design,
+                "design": compared.design,
                 "quantities": {
-                    symbol: picked(one.quantities[symbol], "maximum", "average", "unit")
+                    symbol: picked(compared.quantities[symbol], "maximum", "average", "unit")
                     for symbol in SYMBOLS
                 },
             }
-            for one in section.told
+            for compared in section.told
         ],
         "illegible": [picked(block, "table", "what") for block in section.illegible],
         "left_out": section.skipped or None,
@@ -606,5 +640,5 @@ def _placed_data(part: PlacedFigure) -> dict[str, Any]:
 
 
 def _quantiles(part: PlacedFigure) -> Iterator[tuple[float, float]]:
-    """Some shares with the quantiles of the values."""
+    """Return some shares with the quantiles of the values."""
     return zip(QUANTILES, np.quantile(part.values, QUANTILES), strict=True)

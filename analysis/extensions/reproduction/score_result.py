@@ -1,4 +1,4 @@
-"""Scores of answers to certified problems, as they show themselves."""
+"""Scores of answers to certified problems, as a result."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ class CertifiedScores(Result):
 
     @property
     def is_right(self) -> bool:
-        """Whether every rank and every count is right and nothing is without an answer."""
+        """Return whether every rank and every count is correct and every quantity has an answer."""
         return all_right(self.scores)
 
     def headline(self) -> str:
@@ -51,7 +51,7 @@ class CertifiedScores(Result):
         return score_data(self.scores, self.answers)
 
     def rows(self) -> list[dict[str, Any]]:
-        """One row for each quantity of each problem."""
+        """Return one row per quantity of each problem."""
         return [dict(score) for score in self.to_dict()["scores"]]
 
 
@@ -61,20 +61,19 @@ def score_certified(
     folder: Path | None = None,
     report: Report = unreported,
 ) -> CertifiedScores:
-    """Problems with certified answers solved, or the answers of a JSON file scored; all problems if
-    none are named, of a folder or those that come with ballplate.
+    """Solve problems with certified answers, by default all, or score the answers in a JSON file.
 
     :raises ExperimentError: a file or a problem is missing or has errors.
     """
     problems = certified_problems(folder or shipped("certified"), list(names))
     if results is not None:
-        told = read_results(results, problems)
+        answered = read_results(results, problems)
     else:
         every = counted(problems, "problems", len(problems), report)
-        told = {problem.name: answers(problem) for problem in every}
-    found = tuple(
-        one
+        answered = {problem.name: answers(problem) for problem in every}
+    scored = tuple(
+        score
         for problem in problems
-        for one in scores(problem.name, problem.answers, told.get(problem.name))
+        for score in scores(problem.name, problem.answers, answered.get(problem.name))
     )
-    return CertifiedScores(tuple(problems), told, found)
+    return CertifiedScores(tuple(problems), answered, scored)

@@ -28,19 +28,19 @@ HEADS = ("rank", "S^2", *QUANTITIES[2:])
 
 
 def score_lines(problems: Sequence[CertifiedProblem], scores: Sequence[Score]) -> list[str]:
-    """A line for each problem and part of it, with the digits of every quantity, and notes on what
-    is amiss.
+    """Return one line per part of a problem, with the digits of every quantity, and notes on
+    errors.
     """
     rows = [["problem", "", *HEADS]]
     for problem in problems:
         for part in ("as drawn", "estimate"):
-            own = {
+            by_quantity = {
                 score.quantity: score
                 for score in scores
                 if (score.problem, score.part) == (problem.name, part)
             }
-            if own:
-                cells = [_cell(own.get(quantity)) for quantity in QUANTITIES]
+            if by_quantity:
+                cells = [_cell(by_quantity.get(quantity)) for quantity in QUANTITIES]
                 rows.append([problem.name, part, *cells])
     notes = [
         f"{score.problem}, {score.part}: {score.quantity}: {score.note}"
@@ -66,5 +66,5 @@ def _cell(score: Score | None) -> str:
 
 
 def score_data(scores: Sequence[Score], results: dict[str, Any]) -> dict[str, Any]:
-    """Scores, and the answers that they are of."""
+    """Return scores, with their answers."""
     return {"scores": scores, "problems": results}

@@ -1,4 +1,4 @@
-"""Shipped designs by their names: loaded, planned and fitted once."""
+"""Shipped designs by name: loaded, planned and fitted once."""
 
 from __future__ import annotations
 
@@ -16,9 +16,7 @@ from .published_quantities import tabulated_quantities
 
 @dataclass(frozen=True)
 class Shipped:
-    """The designs in a folder, one YAML file for each experiment; what was loaded and planned is
-    kept.
-    """
+    """The designs in a folder, one YAML file for each experiment, with a cache of results."""
 
     folder: Path
     loaded: dict[str, dict[str, Experiment]] = field(default_factory=dict)
@@ -27,7 +25,7 @@ class Shipped:
 
 
 def variants(shipped: Shipped, name: str) -> dict[str, Experiment]:
-    """Experiments of the file `name`.yaml by their labels.
+    """Return experiments of the file `name`.yaml by their labels.
 
     :raises ExperimentError: the folder or the file is missing, or the file has errors.
     """
@@ -38,50 +36,50 @@ def variants(shipped: Shipped, name: str) -> dict[str, Experiment]:
                 " checkout, with --designs"
             )
             raise refused(shipped.folder, text)
-        shipped.loaded[name] = {one.label: one for one in load(shipped.folder / f"{name}.yaml")}
+        shipped.loaded[name] = {
+            experiment.label: experiment for experiment in load(shipped.folder / f"{name}.yaml")
+        }
     return shipped.loaded[name]
 
 
 def shipped_experiment(shipped: Shipped, label: str) -> Experiment:
-    """The experiment that is labelled `file[variant]`.
+    """Return the experiment with the label `file[variant]`.
 
-    :raises ExperimentError: there is none.
+    :raises ExperimentError: there is no such experiment.
     """
     name = label.partition("[")[0]
-    found = variants(shipped, name)
-    if label not in found:
-        text = f'no experiment "{label}"; {hint(label, found)}'
+    experiments = variants(shipped, name)
+    if label not in experiments:
+        text = f'no experiment "{label}"; {hint(label, experiments)}'
         raise refused(shipped.folder / f"{name}.yaml", text)
-    return found[label]
+    return experiments[label]
 
 
 def planned(shipped: Shipped, label: str) -> Prediction:
-    """The plan of a shipped design, at zero machine error."""
+    """Return the prediction of a shipped design, at zero machine error."""
     if label not in shipped.plans:
         shipped.plans[label] = predict(shipped_experiment(shipped, label))
     return shipped.plans[label]
 
 
 def tabulated(shipped: Shipped, label: str) -> dict[str, Quantity]:
-    """Quantities of a shipped design, at zero machine error, in the form of the document's
-    tables.
+    """Return quantities of a shipped design, at zero machine error, in the form of the
+    document's tables.
     """
     if label not in shipped.tabulated:
-        found = planned(shipped, label)
-        shipped.tabulated[label] = found.quantities | tabulated_quantities(found.design)
+        prediction = planned(shipped, label)
+        shipped.tabulated[label] = prediction.quantities | tabulated_quantities(prediction.design)
     return shipped.tabulated[label]
 
 
 def fitted_exactly(experiment: Experiment) -> Fit:
-    """The fit of readings without noise of an experiment's true machine, with uncertainties as
-    given.
-    """
+    """Return the fit of readings without noise of the true machine, with uncertainties as given."""
     design = lay_out(experiment)
     _, x = exact_readings(*on_stated_machine(experiment, design))
     return fit(experiment, ObservedReadings(design, x, (), ()), sigma="given")
 
 
 def sums_of_squares(fit: Fit) -> list[float]:
-    """S^2 of each iteration in square metres, with weight 1 for a reading."""
+    """Return S^2 of each iteration in square metres, with weight 1 for a reading."""
     scale = float(fit.design.machine.repeatability[0]) ** 2
     return [scale * iteration.sum_of_squares for iteration in fit.solution.iterations]
