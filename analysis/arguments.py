@@ -117,7 +117,7 @@ def observed_of(
         read = service("CertificateFiles").read
         chosen = read(table_of("certificate", certificate), chosen)
     observed = read_readings(tables, lay_out(chosen), settings=chosen.readings)
-    return chosen, replace(observed, of_certificate=chosen.doubts[stated:])
+    return chosen, replace(observed, certificate_doubts=chosen.doubts[stated:])
 
 
 def fit_map_or_path(name: str, given: Fit | FittedMap | PathLike) -> Fit | FittedMap | Path:

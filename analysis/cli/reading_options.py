@@ -123,10 +123,10 @@ def tables(
     from ballplate.simulator.readings.reading_files import read_readings
 
     observed = read_readings(sources, lay_out(experiment), settings=experiment.readings)
-    observed = replace(observed, of_certificate=of_certificate)
-    for remark in observed.told:
+    observed = replace(observed, certificate_doubts=of_certificate)
+    for remark in observed.table_notes:
         note(options, remark)
-    for remark in observed.remarks[len(observed.told) :]:
+    for remark in observed.remarks[len(observed.table_notes) :]:
         complain(f"{', '.join(map(str, sources))}: {remark}")
     warn(observed.doubts)
     return observed

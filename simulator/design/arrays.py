@@ -14,7 +14,7 @@ from typing import Any, ClassVar, Self, TypeVar, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from ..inputs.own_code import own_frame, told
+from ..inputs.own_code import error_text, own_frame
 from ..inputs.unusable import UnusableError
 from ..machines.protocol import Array, ErrorModel, Integers, Unit
 from .influences.protocol import Disturbed, Influence, InfluenceParameter
@@ -276,7 +276,7 @@ def influence_shifts(
         except Exception as error:
             frames = traceback.extract_tb(error.__traceback__)
             own = own_frame(error) or next((f for f in frames[::-1] if f.name == "shifts"), None)
-            text = f"shifts of {type(one).__name__} has failed: {told(error, own)}"
+            text = f"shifts of {type(one).__name__} has failed: {error_text(error, own)}"
             raise UnusableError(text) from error
         shift += stated
         varies = np.array([parameter.uncertainty != 0.0 for parameter in one.parameters], bool)

@@ -1,6 +1,4 @@
-"""Files as text, numbers with units, and messages about errors in them; independent of ball
-plates.
-"""
+"""Text files, numbers with units, and messages about errors in files."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Checks of functions' arguments, with messages about those that cannot be used."""
+"""Checks of functions' arguments, with messages about unusable ones."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ import numpy as np
 from ballplate.simulator.inputs.settings import hint
 
 
-def ensure_whole(least: int, most: int | None = None, **given: object) -> None:
-    """Refuse what is no whole number from `least` to `most`; None is none of its business.
+def ensure_whole(least: int, most: int | None = None, **arguments: object) -> None:
+    """Refuse arguments, except None, that are no whole number from `least` to `most`.
 
     :raises TypeError: no whole number.
     :raises ValueError: too small or too large.
@@ -20,7 +20,7 @@ def ensure_whole(least: int, most: int | None = None, **given: object) -> None:
     ...
     ValueError: workers=0; give 1 at least
     """
-    for name, value in given.items():
+    for name, value in arguments.items():
         if value is None:
             continue
         if isinstance(value, bool) or not isinstance(value, int | np.integer):
@@ -31,8 +31,8 @@ def ensure_whole(least: int, most: int | None = None, **given: object) -> None:
             raise ValueError(f"{name}={value}; give {most} at most")
 
 
-def ensure_positive(what: str, most: float | None = None, **given: object) -> None:
-    """Refuse what is no number above 0, up to `most`; None is none of its business.
+def ensure_positive(expected: str, most: float | None = None, **arguments: object) -> None:
+    """Refuse arguments, except None, that are no number above 0, up to `most`.
 
     :raises TypeError: no number.
     :raises ValueError: not above 0, or too large.
@@ -42,27 +42,27 @@ def ensure_positive(what: str, most: float | None = None, **given: object) -> No
     ...
     ValueError: until=5; give a ratio above 0 and at most 1
     """
-    for name, value in given.items():
+    for name, value in arguments.items():
         if value is None:
             continue
         if isinstance(value, bool) or not isinstance(value, int | float | np.number):
-            raise TypeError(f"{name}={value!r}; give {what}")
+            raise TypeError(f"{name}={value!r}; give {expected}")
         if not 0.0 < value <= (float("inf") if most is None else most):
-            raise ValueError(f"{name}={value}; give {what}")
+            raise ValueError(f"{name}={value}; give {expected}")
 
 
-def ensure_one_of(known: Sequence[str], **given: object) -> None:
-    """Refuse names that are not known; None is none of its business.
+def ensure_one_of(choices: Sequence[str], **arguments: object) -> None:
+    """Refuse arguments, except None, outside the choices.
 
     :raises ValueError: an unknown name.
     """
-    for name, value in given.items():
-        if value is not None and value not in known:
-            raise ValueError(f'{name}: "{value}" is unknown; {hint(str(value), known)}')
+    for name, value in arguments.items():
+        if value is not None and value not in choices:
+            raise ValueError(f'{name}: "{value}" is unknown; {hint(str(value), choices)}')
 
 
-def ensure_type(kind: type, what: str, **given: object) -> None:
-    """Refuse what is of another type; None is none of its business.
+def ensure_type(class_: type, expected: str, **arguments: object) -> None:
+    """Refuse arguments, except None, of another type.
 
     :raises TypeError: another type.
 
@@ -71,22 +71,22 @@ def ensure_type(kind: type, what: str, **given: object) -> None:
     ...
     TypeError: target=0.5; give a text with a unit
     """
-    for name, value in given.items():
-        if value is not None and not isinstance(value, kind):
-            raise TypeError(f"{name}={value!r}; give {what}")
+    for name, value in arguments.items():
+        if value is not None and not isinstance(value, class_):
+            raise TypeError(f"{name}={value!r}; give {expected}")
 
 
-def ensure_path(name: str, given: object) -> None:
-    """Refuse what is no path.
+def ensure_path(name: str, argument: object) -> None:
+    """Refuse an argument that is no path.
 
     :raises TypeError: no text and no path.
     """
-    if not isinstance(given, str | os.PathLike):
-        raise TypeError(f"{name}={given!r}; give the path of a file or folder")
+    if not isinstance(argument, str | os.PathLike):
+        raise TypeError(f"{name}={argument!r}; give the path of a file or folder")
 
 
 def ensure_report(report: object) -> None:
-    """Refuse what cannot be told of steps.
+    """Refuse an argument that is no function of steps.
 
     :raises TypeError: no function.
     """

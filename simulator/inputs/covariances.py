@@ -20,16 +20,16 @@ from .yamltree import Mark
 Floats = NDArray[np.float64]
 
 MOST_NAMES = 2000
-# Two halves of a matrix are the same where they differ by no more than so many halves of their last
-# digit.
+# Tolerance of symmetry, in halves of the last digit: both entries were rounded separately.
 SAME_DIGITS = 2.0
 
 
 @dataclass(frozen=True, eq=False)
 class NamedMatrix:
-    """A covariance matrix (m, m), in square metres, or a correlation matrix of values with `names`;
-    entries are known to `rounding` (m, m), half a unit of their last digit. `marks` are the rows',
-    and `unit` the length whose square the file has, for messages.
+    """A covariance matrix (m, m), in square metres, or a correlation matrix of values with `names`.
+
+    `rounding` (m, m) is half a unit of the entries' last digits, `marks` are those of the rows, and
+    `unit` is the length whose square the file states, for messages.
     """
 
     names: tuple[str, ...]
@@ -40,7 +40,7 @@ class NamedMatrix:
     unit: str = "um"
 
     def shown(self, value: float) -> str:
-        """An entry as the file has it, with its unit."""
+        """Return an entry as in the file, with its unit."""
         if self.is_correlation:
             return f"{value:.6g}"
         area = float(LENGTH_UNITS[self.unit] ** 2)
@@ -48,17 +48,17 @@ class NamedMatrix:
 
 
 def unit_of_area(area: float) -> str:
-    """The length whose square is an area in square metres; the micrometre where none is.
+    """Return the length unit whose square is an area in square metres; by default micrometres.
 
     >>> unit_of_area(1e-6), unit_of_area(1e-18), unit_of_area(2.0)
     ('mm', 'nm', 'um')
     """
-    apart = {name: abs(area / float(one**2) - 1.0) for name, one in LENGTH_UNITS.items()}
-    return next((name for name, one in apart.items() if one < 1e-9), "um")
+    units = LENGTH_UNITS.items()
+    return next((name for name, unit in units if abs(area / float(unit**2) - 1.0) < 1e-9), "um")
 
 
 def half_digit(text: str) -> float:
-    """Half a unit of the last digit of a number; 0 of a whole number without a point.
+    """Return half a unit of a number's last digit; 0 of a whole number without a point.
 
     >>> half_digit("0.040"), half_digit("1.2e-3"), half_digit("4")
     (0.0005, 5e-05, 0.0)
@@ -73,11 +73,13 @@ def half_digit(text: str) -> float:
 
 
 def read_matrix(path: Path) -> NamedMatrix:
-    """The matrix of a CSV file: its first cell is covariance with a unit, such as covariance_um2,
-    or correlation; then names in the first row and in the first column, the same in the same order.
+    """Return the matrix of a CSV file.
+
+    The first cell is correlation, or covariance with a unit, such as covariance_um2; names follow
+    in the first row and, in the same order, in the first column.
 
     :raises ExperimentError: it cannot be read, is not square, not symmetric or no matrix of
-        variances; all that is wrong with it, up to `MOST_MESSAGES`.
+        variances; up to `MOST_MESSAGES` errors.
     """
     lines, file = table_lines(path), str(path)
     if not lines:
@@ -113,54 +115,53 @@ def read_matrix(path: Path) -> NamedMatrix:
             text = f'row "{shorten(name)}", but column {k + 1} is "{shorten(names[k])}"'
             messages.append(mark.message("", f"{text}; name rows and columns in the same order"))
         for j, (column, cell) in enumerate(row[1:]):
-            found = _number(cell)
-            if not math.isfinite(found):
+            entry = _number(cell)
+            if not math.isfinite(entry):
                 place = Mark(file, number, column)
                 text = wrong_number(cell, names[j]) or f'"{shorten(cell)}" is not a number'
                 messages.append(place.message("", text))
-            values[k, j], rounding[k, j] = found, half_digit(cell)
+            values[k, j], rounding[k, j] = entry, half_digit(cell)
         if len(messages) > MOST_MESSAGES:
             break
     if messages:
         raise ExperimentError(messages[:MOST_MESSAGES])
-    is_correlation = factor is None
     scale = 1.0 if factor is None else factor
-    found_matrix = NamedMatrix(
-        *(tuple(names), values * scale, rounding * scale, is_correlation, tuple(marks)),
+    matrix = NamedMatrix(
+        *(tuple(names), values * scale, rounding * scale, factor is None, tuple(marks)),
         unit=unit_of_area(scale),
     )
-    wrong = matrix_problems(found_matrix)
-    if wrong:
-        raise ExperimentError(wrong[:MOST_MESSAGES])
-    return found_matrix
+    errors = matrix_problems(matrix)
+    if errors:
+        raise ExperimentError(errors[:MOST_MESSAGES])
+    return matrix
 
 
 def matrix_problems(matrix: NamedMatrix) -> list[Message]:
-    """What makes a matrix no covariance, or no correlations: entry by entry, with the line."""
+    """Return messages about entries that no covariance or correlation matrix can have."""
     values, size = matrix.values, np.sqrt(np.abs(np.diag(matrix.values)))
     messages = []
     for k, name in enumerate(matrix.names):
-        own = values[k, k]
-        if matrix.is_correlation and abs(own - 1.0) > max(1e-9, matrix.rounding[k, k]):
-            text = f'the correlation of "{name}" with itself is {own:.6g}; it must be 1'
+        variance = values[k, k]
+        if matrix.is_correlation and abs(variance - 1.0) > max(1e-9, matrix.rounding[k, k]):
+            text = f'the correlation of "{name}" with itself is {variance:.6g}; it must be 1'
             messages.append(matrix.marks[k].message("", text))
-        elif own < 0.0:
+        elif variance < 0.0:
             messages.append(matrix.marks[k].message("", f'the variance of "{name}" is negative'))
     digits = matrix.rounding + matrix.rounding.T
-    apart = np.abs(values - values.T) > np.maximum(
+    is_asymmetric = np.abs(values - values.T) > np.maximum(
         SAME_DIGITS * digits, 1e-9 * np.maximum(np.abs(values), np.abs(values.T))
     )
-    for k, j in np.argwhere(np.triu(apart)).tolist():
+    for k, j in np.argwhere(np.triu(is_asymmetric)).tolist():
         text = (
             f'not symmetric: "{matrix.names[k]}" with "{matrix.names[j]}" is'
             f" {matrix.shown(values[k, j])}, the other way round {matrix.shown(values[j, k])};"
             " correct one of the two"
         )
         messages.append(matrix.marks[k].message("", text))
-    bound = np.outer(size, size)
-    slack = matrix.rounding + 1e-9 * bound
+    limit = np.outer(size, size)
+    slack = matrix.rounding + 1e-9 * limit
     slack += 0.5 * (np.diag(matrix.rounding)[:, None] + np.diag(matrix.rounding))
-    large = np.triu(np.abs(values) > bound + slack, 1) & ~apart
+    large = np.triu(np.abs(values) > limit + slack, 1) & ~is_asymmetric
     for k, j in np.argwhere(large).tolist():
         text = (
             f'"{matrix.names[k]}" and "{matrix.names[j]}" are correlated by more than 1, which no'
@@ -171,17 +172,17 @@ def matrix_problems(matrix: NamedMatrix) -> list[Message]:
 
 
 def _factor(mark: Mark, cell: str) -> float | None:
-    """Square metres in the unit of a first cell, None where it says correlation."""
+    """Return the square metres of a first cell's unit, None if it says correlation."""
     if cell.lower() == "correlation":
         return None
-    what, _, unit = cell.rpartition("_")
-    known = [f"{one}2" for one in LENGTH_UNITS]
+    heading, _, unit = cell.rpartition("_")
+    areas = [f"{unit_of_length}2" for unit_of_length in LENGTH_UNITS]
     plain = plain_unit(unit).replace("²", "2").replace("^", "")
-    if what.lower() == "covariance" and plain in known:
+    if heading.lower() == "covariance" and plain in areas:
         return float(LENGTH_UNITS[plain[:-1]] ** 2)
     text = f'the first cell is "{shorten(cell)}"; write covariance_um2, or correlation'
-    if what.lower() == "covariance":
-        text = f'"{shorten(cell)}" has no unit of area; {hint(plain, known)}'
+    if heading.lower() == "covariance":
+        text = f'"{shorten(cell)}" has no unit of area; {hint(plain, areas)}'
     raise mark.refused(text)
 
 

@@ -10,9 +10,9 @@ from pydantic import AfterValidator
 
 
 def parse_day(text: str) -> date:
-    """The day that a text such as 2026-11-22 names.
+    """Return the day that a text such as 2026-11-22 names.
 
-    :raises ValueError: it names none.
+    :raises ValueError: it is no day.
 
     >>> parse_day("2026-11-22").year
     2026
@@ -26,9 +26,9 @@ def parse_day(text: str) -> date:
 
 
 def stated_day(text: str) -> str:
-    """A text that names a day, as it is.
+    """Return a text that names a day, unchanged.
 
-    :raises ValueError: it names none.
+    :raises ValueError: it is no day.
     """
     parse_day(text)
     return text

@@ -1,10 +1,10 @@
-"""Extensions of ballplate, and what each of them provides by name.
+"""Extensions of ballplate, and the names that each provides.
 
-The kernel imports no extension. It asks here for a command, a function, a service, a kind in a file
-or a quantity by its name, and what provides it is loaded then. Extensions that are shipped stand in
-the table `ballplate.extensions.SHIPPED`; those that are installed besides register an `Extension`
-by the entry point `ballplate.extensions`. They are looked up for names that neither the table nor
-the kernel has, and where all names are needed, as by `--help`, `schema` and tables of quantities.
+The kernel imports no extension. It asks here by name for a command, function, service, kind in a
+file or quantity, and then loads the module that provides it. Shipped extensions are listed in
+`ballplate.extensions.SHIPPED`; others register an `Extension` by the entry point
+`ballplate.extensions`. Entry points are read for names that neither that list nor the kernel has,
+and for complete lists of names (`--help`, `schema`, tables of quantities).
 """
 
 from __future__ import annotations
@@ -30,8 +30,8 @@ ENTRY_POINT = "ballplate.extensions"
 OF_FILES = ("artefacts", "calibrations", "error_models", "influences", "sections")
 KINDS = ("commands", "functions", "services", "schemas", *OF_FILES, "quantities")
 
-# Where the kernel's own names of a kind are; it has no services.
-_OWN = {
+# Modules and tables of the kernel's names; the kernel has no services.
+_KERNEL_TABLES = {
     "commands": ("cli", "COMMANDS"),
     "functions": ("", "__all__"),
     "schemas": ("cli.schema", "SCHEMAS"),
@@ -45,20 +45,19 @@ _OWN = {
 
 
 class MissingExtensionError(UnusableError):
-    """An extension that is needed is not installed."""
+    """A needed extension is not installed."""
 
 
 class MissingNameError(MissingExtensionError, AttributeError):
-    """A name of `import ballplate` is of an extension that is not installed."""
+    """A name of `import ballplate` belongs to an extension that is not installed."""
 
 
 @dataclass(frozen=True)
 class Command:
-    """A command, by its `module`, which has DESCRIPTION, add_options and run; `help` is its line of
-    the help, in a `group` of that.
+    """A command: its `module`, which has DESCRIPTION, add_options and run, its line `help` and its
+    `group` in the help.
 
-    The name of a command may be that of another with an option, such as "run --lengths": the option
-    makes another command of it.
+    A name such as "run --lengths" makes a separate command of another command's option.
     """
 
     module: str
@@ -68,15 +67,15 @@ class Command:
 
 @dataclass(frozen=True)
 class Extension:
-    """What a `package` provides, each name with the module below the package that has it.
+    """Names that a `package` provides, each with its module below the package.
 
-    `functions` are those of `import ballplate`, `services` what the kernel asks for, and `schemas`
-    kinds of files whose module has a function `schema`.
+    `functions` are those of `import ballplate`, `services` those that the kernel uses, and
+    `schemas` types of files whose module has a function `schema`.
 
-    `artefacts`, `calibrations`, `error_models` and `influences` are kinds that a file names by
-    `kind`, and `sections` further keys of an experiment; their modules have SETTINGS, the class of
-    what is written there. Those of calibrations and, where they need one, sections have a function
-    `read`, and those of error models an ERROR_MODEL. A module of `quantities` has a QUANTITY.
+    `artefacts`, `calibrations`, `error_models` and `influences` are values of `kind` in a file, and
+    `sections` further keys of an experiment; their modules have SETTINGS, the class of their
+    values. Modules of calibrations, and of sections that need one, have a function `read`, those of
+    error models an ERROR_MODEL, those of `quantities` a QUANTITY.
     """
 
     name: str
@@ -94,16 +93,16 @@ class Extension:
 
     @property
     def is_installed(self) -> bool:
-        """Whether its package is there."""
+        """Return whether the package is there."""
         try:
             return find_spec(self.package) is not None
         except ModuleNotFoundError:
             return False
 
     def load(self, module: str) -> ModuleType:
-        """A module of the extension.
+        """Return a module of the extension.
 
-        :raises MissingExtensionError: the extension, or one that it builds on, is not installed.
+        :raises MissingExtensionError: the extension, or one that it uses, is not installed.
         :raises UnusableError: a module of an extension that is not shipped cannot be loaded.
         """
         try:
@@ -113,12 +112,12 @@ class Extension:
                 raise gone from None
             if self in shipped():
                 raise
-            text = f"module {module} cannot be loaded ({_in_words(error)}); mend or uninstall it"
+            text = f"module {module} cannot be loaded ({_described(error)}); mend or uninstall it"
             raise UnusableError(f"extension {self.name}: {text}") from error
 
 
 def missing(error: BaseException) -> MissingExtensionError | None:
-    """What to say of an error that comes of a shipped extension's absence; None of any other."""
+    """Return the error that names a shipped extension whose absence caused an error, or None."""
     if not isinstance(error, ModuleNotFoundError) or error.name is None:
         return None
     for extension in shipped():
@@ -128,13 +127,13 @@ def missing(error: BaseException) -> MissingExtensionError | None:
     return None
 
 
-def _in_words(error: Exception) -> str:
+def _described(error: Exception) -> str:
     return f"{type(error).__name__}: {error}"
 
 
 @dataclass(frozen=True)
 class Registered:
-    """Extensions that are installed besides those shipped, and what is wrong with others."""
+    """Extensions that are installed but not shipped, and the reasons why others are refused."""
 
     extensions: tuple[Extension, ...]
     complaints: tuple[str, ...]
@@ -142,30 +141,30 @@ class Registered:
 
 @cache
 def registered() -> Registered:
-    """Extensions of other packages. What cannot be loaded, or provides a name that ballplate or
-    another extension has, is left out.
+    """Return extensions of other packages, without those that cannot be loaded or provide a name
+    that ballplate or another extension has.
     """
-    found, complaints = list[Extension](), list[str]()
+    extensions, complaints = list[Extension](), list[str]()
     for point in _entry_points():
         package = point.dist.name if point.dist is not None else point.value
         try:
-            extension = _checked(point.load(), found)
+            extension = _checked(point.load(), extensions)
         except Exception as error:
-            words = str(error) if isinstance(error, UnusableError) else _in_words(error)
-            complaints.append(f"entry point {point.name} of {package} is not used: {words}")
+            reason = str(error) if isinstance(error, UnusableError) else _described(error)
+            complaints.append(f"entry point {point.name} of {package} is not used: {reason}")
         else:
-            found.append(extension)
-    return Registered(tuple(found), tuple(complaints))
+            extensions.append(extension)
+    return Registered(tuple(extensions), tuple(complaints))
 
 
 def _checked(extension: object, before: Sequence[Extension]) -> Extension:
-    """An extension that may be used beside those before it.
+    """Return an extension that is compatible with those before it.
 
-    :raises UnusableError: it is none, or provides what is there already.
+    :raises UnusableError: it is no extension, or provides a name that exists already.
     """
     if not isinstance(extension, Extension):
         raise UnusableError(f"{extension!r} is no Extension")
-    if extension.name in {other.name for other in (*shipped(), *before)}:
+    if extension.name in {earlier.name for earlier in (*shipped(), *before)}:
         raise UnusableError(f"another extension has the name {extension.name} already")
     for kind in KINDS:
         modules = getattr(extension, kind)
@@ -173,28 +172,26 @@ def _checked(extension: object, before: Sequence[Extension]) -> Extension:
             raise UnusableError(f"its {kind} are no mapping of names to modules")
         for name, module in modules.items():
             if not isinstance(module, Command if kind == "commands" else str):
-                what = "Command" if kind == "commands" else "name of a module"
-                raise UnusableError(f"{name} ({kind}) is {module!r}, and no {what}")
-            first = "ballplate" if name in _own(kind) else None
-            for other in (*shipped(), *before):
-                first = other.name if name in getattr(other, kind) else first
+                expected = "Command" if kind == "commands" else "name of a module"
+                raise UnusableError(f"{name} ({kind}) is {module!r}, and no {expected}")
+            first = "ballplate" if name in _kernel_names(kind) else None
+            for earlier in (*shipped(), *before):
+                first = earlier.name if name in getattr(earlier, kind) else first
             if first is not None:
                 raise UnusableError(f"{name} ({kind}) is provided by {first} already")
     return extension
 
 
-def _own(kind: str) -> Collection[str]:
-    """Names of a kind that the kernel has itself."""
-    if kind not in _OWN:
+def _kernel_names(kind: str) -> Collection[str]:
+    if kind not in _KERNEL_TABLES:
         return ()
-    module, table = _OWN[kind]
+    module, table = _KERNEL_TABLES[kind]
     return tuple(getattr(import_module(f"ballplate.{module}".rstrip(".")), table))
 
 
 def _entry_points() -> Iterator[EntryPoint]:
-    """Entry points of extensions. Most often there are none, which reading the files of installed
-    packages tells in a twentieth of the time that it takes to parse all of them.
-    """
+    # Searching the files for the group takes a twentieth of the time that parsing all of them does,
+    # and most often finds none.
     folders = list(filter(_has_extensions, sys.path))
     if folders:
         from importlib.metadata import distributions
@@ -204,7 +201,7 @@ def _entry_points() -> Iterator[EntryPoint]:
 
 
 def _has_extensions(folder: str) -> bool:
-    """Whether packages that are installed in a folder, not the current one, register extensions."""
+    """Return whether packages installed in a folder, not the current one, register extensions."""
     group = f"[{ENTRY_POINT}]".encode()
     with suppress(OSError):
         if os.path.samefile(folder or ".", "."):
@@ -218,7 +215,7 @@ def _has_extensions(folder: str) -> bool:
 
 
 def shipped() -> tuple[Extension, ...]:
-    """Extensions that come with ballplate, whether or not their folders are there."""
+    """Return the extensions that come with ballplate, whether or not their folders are there."""
     return tuple(import_module(ENTRY_POINT).SHIPPED)
 
 
@@ -227,33 +224,35 @@ def _shipped_and_registered() -> tuple[Extension, ...]:
 
 
 def names(kind: str, with_registered: bool = False) -> tuple[str, ...]:
-    """Names that extensions provide of a kind, in the order of the table."""
+    """Return names of a kind that extensions provide, in the order of the table."""
     extensions = _shipped_and_registered() if with_registered else shipped()
-    return tuple(name for one in extensions for name in getattr(one, kind))
+    return tuple(name for extension in extensions for name in getattr(extension, kind))
 
 
 def installed_functions() -> tuple[str, ...]:
-    """Functions of extensions that are there, shipped or installed besides."""
-    there = (*(one for one in shipped() if one.is_installed), *registered().extensions)
-    return tuple(name for one in there for name in one.functions)
+    """Return functions of installed extensions."""
+    extensions = (
+        *filter(lambda extension: extension.is_installed, shipped()),
+        *registered().extensions,
+    )
+    return tuple(name for extension in extensions for name in extension.functions)
 
 
 def provider(kind: str, name: str) -> Extension | None:
-    """The extension that provides a name; None where none does."""
-    for one in shipped():
-        if name in getattr(one, kind):
-            return one
-    for one in registered().extensions:
-        if name in getattr(one, kind):
-            return one
+    """Return the extension that provides a name, or None."""
+    # Entry points are read only for a name that is not shipped.
+    for extensions in (shipped, lambda: registered().extensions):
+        for extension in extensions():
+            if name in getattr(extension, kind):
+                return extension
     return None
 
 
 def module_with(kind: str, name: str) -> ModuleType:
-    """The module that has what a name stands for.
+    """Return the module that has a name's object.
 
     :raises KeyError: no extension provides it.
-    :raises MissingExtensionError: the extension that does is not installed.
+    :raises MissingExtensionError: its extension is not installed.
     """
     extension = provider(kind, name)
     if extension is None:
@@ -263,8 +262,7 @@ def module_with(kind: str, name: str) -> ModuleType:
 
 
 def provided(kind: str, name: str, attribute: str) -> Any | None:
-    """An attribute of the module that has what a name stands for; None where no extension
-    provides it.
+    """Return an attribute of the module that has a name's object; None if no extension provides it.
 
     :raises UnusableError: the module cannot be loaded, or lacks it.
     """
@@ -272,43 +270,48 @@ def provided(kind: str, name: str, attribute: str) -> Any | None:
     if extension is None:
         return None
     module = getattr(extension, kind)[name]
-    found = getattr(extension.load(module), attribute, None)
-    if found is None:
+    value = getattr(extension.load(module), attribute, None)
+    if value is None:
         text = f"module {module} has no {attribute}, which {kind} need"
         raise UnusableError(f"extension {extension.name}: {text}")
-    return found
+    return value
 
 
 def fault_of(error: Exception) -> str | None:
-    """Where code of an extension that is not shipped raised an error, and which; None of others."""
+    """Return file, line and name of the extension, not shipped, whose code raised an error, or
+    None.
+    """
     packages = {extension.package: extension.name for extension in registered().extensions}
     fault, trace = None, error.__traceback__
     while trace is not None:
         module = f"{trace.tb_frame.f_globals.get('__name__')}."
         for package, name in packages.items():
             if module.startswith(f"{package}."):
-                where = f"{trace.tb_frame.f_code.co_filename}:{trace.tb_lineno}"
-                fault = f"{where}: extension {name}: {_in_words(error)}; mend or uninstall it"
+                line = f"{trace.tb_frame.f_code.co_filename}:{trace.tb_lineno}"
+                fault = f"{line}: extension {name}: {_described(error)}; mend or uninstall it"
         trace = trace.tb_next
     return fault
 
 
 def owner(class_: type) -> str | None:
-    """The name of the extension that a class is of; None of one of the kernel."""
+    """Return the name of the extension that has a class; None for the kernel."""
     module = f"{class_.__module__}."
     if module.startswith("ballplate.") and not module.startswith(f"{ENTRY_POINT}."):
         return None
     extensions = _shipped_and_registered()
-    return next((one.name for one in extensions if module.startswith(f"{one.package}.")), None)
+    return next(
+        (extension.name for extension in extensions if module.startswith(f"{extension.package}.")),
+        None,
+    )
 
 
 def is_installed(name: str) -> bool:
-    """Whether an extension is, by its name."""
-    return any(one.name == name for one in _shipped_and_registered())
+    """Return whether an extension of this name is there."""
+    return any(extension.name == name for extension in _shipped_and_registered())
 
 
 def service(name: str) -> Any:
-    """A function or a class that the kernel asks an extension for.
+    """Return a function or class of an extension that the kernel uses.
 
     :raises MissingExtensionError: the extension is not installed.
     """
@@ -316,7 +319,7 @@ def service(name: str) -> Any:
 
 
 def optional_service(name: str) -> Any | None:
-    """A service, or None where the extension that provides it is not installed."""
+    """Return a service, or None if its extension is not installed."""
     try:
         return service(name)
     except MissingExtensionError:
@@ -324,16 +327,16 @@ def optional_service(name: str) -> Any | None:
 
 
 def function(name: str) -> Any:
-    """A function of `import ballplate` that an extension provides.
+    """Return a function of `import ballplate` that an extension provides.
 
     :raises KeyError: no extension provides it.
-    :raises MissingExtensionError: the extension that does is not installed.
+    :raises MissingExtensionError: its extension is not installed.
     """
     return getattr(module_with("functions", name), name)
 
 
 def optional_function(name: str) -> Any | None:
-    """The same, or None where the extension is not installed."""
+    """Return such a function, or None if its extension is not installed."""
     try:
         return function(name)
     except MissingExtensionError:

@@ -1,8 +1,8 @@
-"""Public names of a package, each loaded from the module that has it when it is first used.
+"""Public names of a package, each loaded from its module on first use (PEP 562).
 
 Extensions import from packages such as `ballplate.simulator.design`, whose modules are private. So
-that a command loads only what it needs, a package does not import its modules (PEP 562): the
-imports that it has for type checkers are read as the table of its public names.
+that a command loads only the modules that it needs, a package imports them later: the imports under
+`if TYPE_CHECKING:` serve as the table of public names.
 """
 
 from __future__ import annotations
@@ -18,10 +18,7 @@ from typing import Any
 
 @cache
 def public_names(file: str) -> dict[str, str]:
-    """Public names of the package whose `__init__.py` is given, with the module of each.
-
-    They stand under its `if TYPE_CHECKING:`, as in `from .arrays import Design`.
-    """
+    """Return the public names of the package whose `__init__.py` is `file`, with their modules."""
     body = ast.parse(Path(file).read_text(encoding="utf-8")).body
     [imports] = [
         statement.body
@@ -39,7 +36,7 @@ def public_names(file: str) -> dict[str, str]:
 
 
 def lazily(package: str, file: str) -> tuple[Callable[[str], Any], Callable[[], list[str]]]:
-    """`__getattr__` and `__dir__` of a package, from its `__name__` and `__file__`."""
+    """Return `__getattr__` and `__dir__` of a package, from its `__name__` and `__file__`."""
 
     def load(name: str) -> Any:
         module = None if name.startswith("__") else public_names(file).get(name)

@@ -1,4 +1,4 @@
-"""Messages about an experiment file: the place, the error and the remedy, all of them at once."""
+"""Messages about an experiment file: location, error and remedy."""
 
 from __future__ import annotations
 
@@ -9,11 +9,11 @@ from dataclasses import dataclass
 Step = str | int
 Steps = tuple[Step, ...]
 
-# Errors of a file that are told; beyond, some slip repeats itself.
+# Errors reported of a file; more are repetitions of one error.
 MOST_MESSAGES = 1000
 MORE_ERRORS = f"more than {MOST_MESSAGES} errors; mend these first"
 
-# Names of a file may hold what would break a line in two or reach the terminal as a command.
+# Characters that would break a line or reach the terminal as a command.
 UNPRINTABLE = re.compile(
     "[\x00-\x1f\x7f-\x9f\u2028\u2029\u200e\u200f\u202a-\u202e\u2066-\u2069\ud800-\udfff]"
 )
@@ -21,11 +21,9 @@ UNPRINTABLE = re.compile(
 
 @dataclass(frozen=True, order=True)
 class Message:
-    """One error of a file. ``line`` and ``column`` count from 1 and are 0 where the whole file is
-    meant.
+    """One error of a file; ``line`` and ``column`` count from 1 and are 0 for the whole file.
 
-    ``path`` is the place in the experiment, such as ``positions[1].probes[0]``; empty where there
-    is none.
+    ``path`` is the path in the experiment, such as ``positions[1].probes[0]``, or empty.
     """
 
     file: str
@@ -35,14 +33,12 @@ class Message:
     text: str
 
     def __str__(self) -> str:
-        place = f"{self.file}:{self.line}:{self.column}" if self.line else self.file
-        return in_one_line(": ".join(part for part in (place, self.path, self.text) if part))
+        location = f"{self.file}:{self.line}:{self.column}" if self.line else self.file
+        return in_one_line(": ".join(part for part in (location, self.path, self.text) if part))
 
 
 class ExperimentError(Exception):
-    """An experiment file cannot be used; ``messages`` has every reason found, in the order of
-    lines.
-    """
+    """An experiment file cannot be used; ``messages`` has all reasons in the order of lines."""
 
     def __init__(self, messages: Iterable[Message]) -> None:
         self.messages: tuple[Message, ...] = tuple(messages)
@@ -55,20 +51,20 @@ class ExperimentError(Exception):
 def refused(
     file: object, text: str, path: str = "", line: int = 0, column: int | None = None
 ) -> ExperimentError:
-    """The one error of a file, of a place in it without a line, or of a line, by default from its
+    """Return the error of a file, of a path without a line, or of a line, by default from its
     beginning.
     """
     column = min(line, 1) if column is None else column
     return ExperimentError([Message(str(file), line, column, path, text)])
 
 
-def _by_number(found: re.Match[str]) -> str:
-    number = ord(found[0])
+def _by_number(character: re.Match[str]) -> str:
+    number = ord(character[0])
     return f"\\x{number:02x}" if number < 256 else f"\\u{number:04x}"
 
 
 def in_one_line(text: str) -> str:
-    r"""Write characters that are no part of a line by their numbers.
+    r"""Escape characters that would break or corrupt a line.
 
     >>> in_one_line("a\nb")
     'a\\x0ab'
@@ -77,7 +73,7 @@ def in_one_line(text: str) -> str:
 
 
 def in_lines(text: str) -> str:
-    r"""Write characters that are no part of a text of several lines by their numbers.
+    r"""Escape characters that would corrupt a text of several lines.
 
     >>> in_lines("one\n\x1b[31mtwo")
     'one\n\\x1b[31mtwo'
@@ -86,7 +82,7 @@ def in_lines(text: str) -> str:
 
 
 def format_path(steps: Iterable[Step]) -> str:
-    """Write a path as in messages and in overrides of variants.
+    """Return a path as written in messages and overrides of variants.
 
     >>> format_path(("positions", 1, "probes", 0)), format_path(("artefacts", "ball bar"))
     ('positions[1].probes[0]', 'artefacts[ball bar]')

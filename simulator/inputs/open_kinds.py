@@ -1,4 +1,4 @@
-"""Unions of settings that the word `kind` chooses among, and to which extensions add kinds."""
+"""Unions of settings discriminated by `kind`, which extensions extend."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ from .unusable import UnusableError
 
 @dataclass(frozen=True)
 class OpenKinds:
-    """Annotation of a union: kinds that it lacks are looked for among those that extensions
-    provide, by the name of what they provide.
+    """Annotation of a union: values of `kind` that it lacks are looked up among names that
+    extensions provide under `provided`.
 
-    `base` is the class of their settings, and `form` makes of it the class that the union needs.
+    `base` is the class of their settings; `form` returns the class that the union needs.
     """
 
     discriminator: ClassVar[str] = "kind"
@@ -29,9 +29,9 @@ class OpenKinds:
     form: Callable[[Any], Any] = lambda settings: settings
 
     def settings(self, kind: str) -> Any | None:
-        """The settings of a kind of an extension; None where there is none.
+        """Return an extension's settings of a kind, or None.
 
-        :raises UnusableError: the extension does not have what it says.
+        :raises UnusableError: the extension lacks them.
         """
         settings = provided(self.provided, kind, "SETTINGS")
         if settings is None:
@@ -47,7 +47,7 @@ class OpenKinds:
     def __get_pydantic_core_schema__(
         self, source: Any, handler: GetCoreSchemaHandler
     ) -> CoreSchema:
-        # Chosen here, as a field would choose among what it annotates only afterwards.
+        # The kernel's kinds are discriminated here, since a field would do so only afterwards.
         of_kernel = handler.generate_schema(Annotated[source, Field(discriminator="kind")])
         return core_schema.no_info_wrap_validator_function(self._validated, of_kernel)
 
@@ -66,15 +66,19 @@ class OpenKinds:
     def __get_pydantic_json_schema__(
         self, schema: CoreSchema, handler: GetJsonSchemaHandler
     ) -> dict[str, Any]:
-        found = handler(schema)
-        more: list[Any] = [
+        union_schema = handler(schema)
+        additions: list[Any] = [
             self.settings(kind) for kind in names(self.provided, with_registered=True)
         ]
-        for settings in more:
+        for settings in additions:
             settings.model_rebuild()
-        if more:
-            # Members of a union are put among the definitions.
-            union = core_schema.union_schema([one.__pydantic_core_schema__ for one in more])
-            of_more = handler(union)
-            found.setdefault("oneOf", []).extend(of_more.get("anyOf", [of_more]))
-        return found
+        if additions:
+            # As members of a union their own models are added to the definitions.
+            union = core_schema.union_schema(
+                [settings_class.__pydantic_core_schema__ for settings_class in additions]
+            )
+            extension_schema = handler(union)
+            union_schema.setdefault("oneOf", []).extend(
+                extension_schema.get("anyOf", [extension_schema])
+            )
+        return union_schema

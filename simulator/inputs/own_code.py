@@ -1,6 +1,4 @@
-"""Code of a user's own, neither the program's nor that of its libraries: calls of it, and places of
-errors in it.
-"""
+"""Calls of user code, and the location of errors in it."""
 
 from __future__ import annotations
 
@@ -25,14 +23,14 @@ LIBRARIES = frozenset(
     ("distributed", "filelock", "jinja2", "joblib", "matplotlib", "numpy", "pandas", "pyarrow")
     + ("pydantic", "pydantic_core", "scipy", "threadpoolctl", "tqdm", "yaml", "dask", "tornado")
 )
-# What ends a process at once, whoever wants to know.
+# The real exit, restored after user code has run.
 EXIT = os._exit
 # Folders of the standard library.
 STANDARD = (Path(traceback.__file__).parent, Path(sysconfig.get_path("platstdlib")))
 
 
 def own_frame(error: BaseException) -> traceback.FrameSummary | None:
-    """The innermost place in a user's own code that an error came through; None without any."""
+    """Return the innermost frame of user code that an error came through, or None."""
     program = {
         getattr(module, "__file__", None)
         for name, module in list(sys.modules.items())
@@ -55,21 +53,19 @@ def _is_library(file: str) -> bool:
     return any(Path(file).is_relative_to(folder) for folder in STANDARD)
 
 
-def told(error: BaseException, frame: traceback.FrameSummary | None) -> str:
-    """An error with the place where it arose, in a line."""
-    at = "" if frame is None else f" ({Path(frame.filename).name}, line {frame.lineno})"
-    return f"{shorten(f'{type(error).__name__}: {error}', 200)}{at}"
+def error_text(error: BaseException, frame: traceback.FrameSummary | None) -> str:
+    """Return an error with its file and line, in one line."""
+    location = "" if frame is None else f" ({Path(frame.filename).name}, line {frame.lineno})"
+    return f"{shorten(f'{type(error).__name__}: {error}', 200)}{location}"
 
 
 class OwnCodeError(UnusableError):
-    """Code of a user's own has failed, or returned what cannot be used; the text says where."""
+    """User code has failed or returned an unusable value; the text has its location."""
 
 
 @contextmanager
 def running_own_code() -> Iterator[None]:
-    """What code of a user's own may not do is prevented: mix what it prints with the results, and
-    end the process as if all were well.
-    """
+    """Keep user code from printing among the results and from ending the process."""
     with np.errstate(all="ignore"), redirect_stdout(sys.stderr):
         os._exit = _refused_exit
         try:
@@ -83,7 +79,7 @@ def _refused_exit(status: int = 0) -> NoReturn:
 
 
 def own_result(call: Callable[..., Any], *arguments: Any) -> Any:
-    """What a function of a user's own returns.
+    """Return the result of a user's function.
 
     :raises OwnCodeError: it has failed.
     """
@@ -96,7 +92,7 @@ def own_result(call: Callable[..., Any], *arguments: Any) -> Any:
         frame = own_frame(error)
         where = _definition(call) if frame is None else _place(frame.filename, frame.lineno)
         name = getattr(call, "__name__", "") if frame is None else frame.name
-        raise _failed(where, name, told(error, None)) from error
+        raise _failed(where, name, error_text(error, None)) from error
 
 
 def own_array(
@@ -105,24 +101,23 @@ def own_array(
     *arguments: NDArray[np.float64],
     is_plausible: bool = True,
 ) -> NDArray[np.float64]:
-    """The array of a shape that a function of a user's own returns for arrays; finite for plausible
-    ones.
+    """Return the array (`shape`) of a user's function for arrays; finite for plausible ones.
 
-    :raises OwnCodeError: it has failed, or returned anything else.
+    :raises OwnCodeError: it has failed, or returned another type, shape or number.
     """
-    given = own_result(call, *arguments)
-    wrong = ""
-    if not isinstance(given, np.ndarray):
-        wrong = f"returns {type(given).__name__}; an array of shape {shape} is needed"
-    elif given.shape != shape:
-        wrong = f"returns the shape {given.shape}; {shape} is needed"
-    elif given.dtype.kind not in "fiu":
-        wrong = f"returns values of type {given.dtype}; numbers are needed"
-    elif is_plausible and not np.isfinite(given).all():
-        wrong = "returns values that are not finite numbers"
-    if wrong:
-        raise _failed(_definition(call), getattr(call, "__name__", ""), wrong)
-    return np.asarray(given, float)
+    result = own_result(call, *arguments)
+    fault = ""
+    if not isinstance(result, np.ndarray):
+        fault = f"returns {type(result).__name__}; an array of shape {shape} is needed"
+    elif result.shape != shape:
+        fault = f"returns the shape {result.shape}; {shape} is needed"
+    elif result.dtype.kind not in "fiu":
+        fault = f"returns values of type {result.dtype}; numbers are needed"
+    elif is_plausible and not np.isfinite(result).all():
+        fault = "returns values that are not finite numbers"
+    if fault:
+        raise _failed(_definition(call), getattr(call, "__name__", ""), fault)
+    return np.asarray(result, float)
 
 
 def _failed(where: str, name: str, text: str) -> OwnCodeError:

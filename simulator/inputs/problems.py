@@ -1,6 +1,4 @@
-"""Collection of the errors in an experiment file while it is read, so that all are reported at
-once.
-"""
+"""Collection of all errors in an experiment file while it is read."""
 
 from __future__ import annotations
 
@@ -14,11 +12,11 @@ from .yamltree import Mapping, Mark, Node, Scalar, Sequence, mark_of, to_python,
 
 @dataclass(eq=False)
 class Problems:
-    """Messages about the tree below ``root``; ``doubts`` are about what is possible, and unlikely
-    to be meant, ``notes`` about what was found by itself.
+    """Messages about the tree below ``root``: errors, ``doubts`` about possible but improbable
+    input, and ``notes`` of automatic choices.
 
-    Adding one too many raises an ``ExperimentError`` with all of them: each takes time to word, and
-    a file may have hundreds of thousands.
+    Adding one too many raises all as an ``ExperimentError``, since wording hundreds of thousands
+    takes long.
     """
 
     root: Node
@@ -28,7 +26,7 @@ class Problems:
     _known: set[Message] = field(default_factory=set)
 
     def add(self, steps: Steps, text: str, of_key: bool = False) -> None:
-        """Add a message about a path; ``of_key`` places it at the key instead of the value."""
+        """Add a message about a path; ``of_key`` locates it at the key instead of the value."""
         self.add_at(mark_of(self.root, steps, of_key), steps, text)
 
     def doubt(self, steps: Steps, text: str) -> None:
@@ -40,7 +38,7 @@ class Problems:
         self.notes.append(mark_of(self.root, steps).message(format_path(steps), text))
 
     def add_at(self, mark: Mark, steps: Steps, text: str) -> None:
-        """Add a message about a path, placed elsewhere, such as in a table that the path names."""
+        """Add a message about a path at another location, such as in a table."""
         message = mark.message(format_path(steps), text)
         if message in self._known:
             return
@@ -58,13 +56,13 @@ class Problems:
                 self.add(steps, f"{message.file}: {message.text}")
 
     def add_empty(self) -> None:
-        """Add a message about everything that is empty."""
+        """Add messages about all empty values."""
         for steps, node in walk(self.root):
             if isinstance(node, Scalar) and node.value is None:
                 self.add(steps, "empty; give a value, or leave it out")
 
     def has_below(self, steps: Steps) -> bool:
-        """Tell whether there is a message about a path or something below it."""
+        """Return whether a message concerns a path or a path below it."""
         path = format_path(steps)
         return any(
             message.path == path or message.path.startswith((f"{path}.", f"{path}["))
@@ -75,29 +73,32 @@ class Problems:
 def in_order(
     messages: Iterable[Message], made_up: Iterable[Message], source: Path
 ) -> list[Message]:
-    """Messages by line, those about the source before those about its tables.
+    """Return messages by line, those about the source before those about its tables.
 
-    What stands where one of `made_up` is was made up for it, and nobody should be told about it.
+    `made_up` concern values that were substituted for refused ones: other messages at their
+    locations are dropped.
     """
-    refused = {(one.file, one.line, one.column) for one in made_up}
-    found = [one for one in messages if (one.file, one.line, one.column) not in refused]
-    return sorted({*found, *made_up}, key=lambda one: (one.file != str(source), one))
+    substituted = {(error.file, error.line, error.column) for error in made_up}
+    genuine = [
+        error for error in messages if (error.file, error.line, error.column) not in substituted
+    ]
+    return sorted({*genuine, *made_up}, key=lambda error: (error.file != str(source), error))
 
 
 def written_keys(root: Node, *steps: Step) -> tuple[str, ...]:
-    """Return the keys of the mapping at a path as written, none where there is no mapping."""
+    """Return the keys of the mapping at a path as written; empty without a mapping."""
     node = written(root, *steps)
     return tuple(node.items) if isinstance(node, Mapping) else ()
 
 
 def written_count(root: Node, *steps: Step) -> int:
-    """Return the number of entries of a list at a path, right or wrong."""
+    """Return the number of entries, valid or not, of a list at a path."""
     node = written(root, *steps)
     return len(node.items) if isinstance(node, Sequence) else 0
 
 
 def written_text(root: Node, *steps: Step) -> str | None:
-    """Return a name as written at a path, or None where there is none."""
+    """Return a name as written at a path, or None."""
     node = written(root, *steps)
     value = to_python(node) if node is not None else None
     is_name = isinstance(value, str | int) and not isinstance(value, bool)

@@ -1,8 +1,6 @@
-"""Quantities of an experiment file: a number with its unit, read exactly and kept in metres and
-radians.
+"""Quantities of an experiment file: exact numbers with units, converted to metres and radians.
 
-A factor is held as a fraction and multiplied before rounding, so "0.2 um" is the float nearest to
-2e-7.
+A factor is a fraction and multiplied before rounding, so "0.2 um" is the float nearest to 2e-7.
 """
 
 from __future__ import annotations
@@ -82,7 +80,7 @@ RATIO_DRIFT_UNITS: Mapping[str, Fraction] = {
     for time, seconds in sorted(DURATION_UNITS.items())
     for unit in ("ppm", "um/m", "nm/m", "m/m")
 }
-# Beyond these, squares and their sums are no numbers any more; nothing real is there.
+# Beyond these, squares and their sums overflow or vanish.
 LARGEST, SMALLEST = 10**6, Fraction(1, 10**18)
 SMALLEST_FLOAT = float(SMALLEST)
 BASE_UNITS: Mapping[str, str] = {
@@ -132,16 +130,16 @@ WITH_UNIT_OF_LENGTH = re.compile(
 )
 # Too few digits for a number other than zero to vanish.
 PLAIN = re.compile(r"[+-]?[0-9]{1,15}(?:\.[0-9]{1,30})?")
-# No uncertainty of a length grows so fast: it is millimetres that were divided, as data sheets do.
+# A faster growth comes of a data sheet's L in millimetres.
 STEEPEST = Fraction(1, 10**4)
 
 
 class QuantityError(ValueError):
-    """A text is not the quantity it should be; the message says what would be right."""
+    """A text is not the expected quantity; the message gives the remedy."""
 
 
 def exact_number(text: str) -> Fraction:
-    """Read a decimal number exactly.
+    """Return a decimal number exactly.
 
     :raises QuantityError: not a finite decimal number, or one beyond 1e-300 … 1e300.
 
@@ -159,10 +157,9 @@ def exact_number(text: str) -> Fraction:
 
 
 def metres_or_radians(number: str, factor: Fraction, kind: str = "length") -> float:
-    """Read a decimal number of a unit that is `factor` metres or radians; the result is the nearest
-    float.
+    """Return the float nearest to a decimal number of a unit of `factor` metres or radians.
 
-    :raises QuantityError: not a decimal number, or more or less than there is.
+    :raises QuantityError: not a decimal number, too large or too small.
 
     >>> metres_or_radians("750", LENGTH_UNITS["mm"])
     0.75
@@ -180,8 +177,7 @@ def metres_or_radians(number: str, factor: Fraction, kind: str = "length") -> fl
 
 
 def power_of_ten(factor: Fraction) -> str:
-    """The exponent that multiplies a decimal number by a unit's factor; empty where it is no power
-    of ten.
+    """Return the exponent of a unit's factor; empty if it is no power of ten.
 
     >>> power_of_ten(LENGTH_UNITS["mm"]), power_of_ten(LENGTH_UNITS["in"])
     ('e-3', '')
@@ -191,10 +187,9 @@ def power_of_ten(factor: Fraction) -> str:
 
 
 def plain_number(number: str, power: str) -> float | None:
-    """Read digits with or without a point in between as `metres_or_radians` does, but sooner.
+    """Return `metres_or_radians` of digits with or without a decimal point, but sooner.
 
-    `power` is a unit's `power_of_ten`. None where the number is written otherwise, or is too large
-    or too small.
+    `power` is a unit's `power_of_ten`. None for other notations and numbers out of range.
 
     >>> plain_number("750", "e-3"), plain_number("7.5e2", "e-3")
     (0.75, None)
@@ -232,12 +227,12 @@ def parse_positive_length(value: object) -> float:
 
 
 def parse_length_uncertainty(value: object) -> float:
-    """Read a standard uncertainty of a length, which is zero where it is exact, in metres.
+    """Return a standard uncertainty of a length in metres; zero for an exact length.
 
     :raises QuantityError: not a number with a unit of length, or below zero.
     """
-    found = parse_length(value)
-    return found if found == 0.0 else _positive(value, found)
+    length = parse_length(value)
+    return length if length == 0.0 else _positive(value, length)
 
 
 def parse_angle(value: object) -> float:
@@ -286,10 +281,10 @@ def parse_temperature(value: object) -> float:
     >>> parse_temperature("20.3 degC")
     20.3
     """
-    found = parse_temperature_difference(value)
-    if not str(value).strip().endswith("degC") or found < -273.15:
+    temperature = parse_temperature_difference(value)
+    if not str(value).strip().endswith("degC") or temperature < -273.15:
         raise QuantityError(f'"{value}" is no temperature; write for example "20.3 degC"')
-    return found
+    return temperature
 
 
 def parse_expansion(value: object) -> float:
@@ -333,10 +328,10 @@ def parse_duration(value: object) -> float:
     >>> parse_duration("1.5 h"), parse_duration("20 min")
     (5400.0, 1200.0)
     """
-    found = _parse(value, "duration")
-    if found < 0:
+    seconds = _parse(value, "duration")
+    if seconds < 0:
         raise QuantityError(f'"{value}" is below zero; write for example "{EXAMPLES["duration"]}"')
-    return found
+    return seconds
 
 
 def parse_length_drift(value: object) -> float:
@@ -362,8 +357,7 @@ def parse_ratio_drift(value: object) -> float:
 
 
 def length_text(length: float) -> str:
-    """Write a length in metres, in millimetres if that reads well, so that reading it gives the
-    same float.
+    """Return a length in metres with a unit, so that reading it gives the same float.
 
     >>> length_text(0.75), length_text(2e-7), length_text(1 / 3)
     ('750 mm', '0.2 um', '333.3333333333333 mm')
@@ -373,7 +367,7 @@ def length_text(length: float) -> str:
 
 
 def format_duration(seconds: float) -> str:
-    """Write a duration with the largest unit in which it is at least one.
+    """Return a duration with the largest unit in which it is at least one.
 
     >>> format_duration(5400), format_duration(735), format_duration(0)
     ('1.5 h', '12.25 min', '0 s')
@@ -383,7 +377,7 @@ def format_duration(seconds: float) -> str:
 
 
 def typed_length(length: float) -> str:
-    """Write a length in metres as it is typed into a file, with a unit that reads well.
+    """Return a length in metres as typed into a file, with a suitable unit.
 
     >>> typed_length(0.75), typed_length(2e-7), typed_length(-0.0)
     ('750 mm', '0.2 um', '0 mm')
@@ -393,7 +387,7 @@ def typed_length(length: float) -> str:
 
 
 def format_length(length: float) -> str:
-    """Write a length in metres for people.
+    """Return a length in metres as text for people.
 
     >>> format_length(0.75), format_length(2e-7)
     ('750 mm', '0.2 µm')
@@ -406,7 +400,7 @@ def _in_microradians(angle: float) -> str:
 
 
 def format_angle(angle: float) -> str:
-    """Write an angle in radians in microradians.
+    """Return an angle in radians as text in microradians.
 
     >>> format_angle(2e-6)
     '2 µrad'
@@ -442,8 +436,8 @@ class LengthFunction:
 
 @dataclass(frozen=True)
 class Target:
-    """What an uncertainty is to be within: ``coverage_factor`` times the standard uncertainty, at
-    most ``stated``.
+    """A target uncertainty: ``coverage_factor`` times the standard uncertainty is at most
+    ``stated``.
     """
 
     stated: LengthFunction
@@ -451,7 +445,7 @@ class Target:
 
     @property
     def standard(self) -> LengthFunction:
-        """What the standard uncertainty is to be within.
+        """Target of the standard uncertainty.
 
         >>> Target(LengthFunction(1e-6), 2.0).standard
         LengthFunction(constant=5e-07, slope=0.0)
@@ -460,9 +454,7 @@ class Target:
         return LengthFunction(self.stated.constant / k, self.stated.slope / k)
 
     def at(self, length: ArrayLike) -> NDArray[np.float64]:
-        """Return what standard uncertainties (m, any shape) are to be within at lengths (m, the
-        same shape).
-        """
+        """Return target standard uncertainties (m, any shape) at lengths (m, the same shape)."""
         return self.standard.at(length)
 
 
@@ -506,7 +498,7 @@ def parse_length_function(value: object) -> LengthFunction:
 
 
 def parse_uncertainty_function(value: object) -> LengthFunction:
-    """Read a standard uncertainty that may depend on the measured length; "0 um" where it is exact.
+    """Read a standard uncertainty that may depend on the measured length; "0 um" if exact.
 
     :raises QuantityError: as for `parse_length_function`, but zero is allowed.
 
@@ -551,10 +543,11 @@ def _inverse(value: str, divisor: str) -> Fraction:
 
 
 def _growing(value: str, constant: str, slope: Fraction, in_metres: bool = False) -> LengthFunction:
-    """A length that grows by `slope` metres per metre, if one can; `in_metres` where L is divided
-    without its unit.
+    """Return a length that grows by `slope` metres per metre; `in_metres` if L has no unit of its
+    own.
 
-    :raises QuantityError: it cannot, or it is a data sheet's that is read as something else.
+    :raises QuantityError: negative, too slow, or so fast that a data sheet's L in millimetres is
+        meant.
     """
     text = shorten(value)
     at_zero = parse_length(constant.strip())
@@ -563,16 +556,16 @@ def _growing(value: str, constant: str, slope: Fraction, in_metres: bool = False
             f'"{text}" has a negative part; write for example "{LENGTH_FUNCTION_EXAMPLE}"'
         )
     if slope >= STEEPEST:
-        told = constant.strip() if at_zero else "0 um"
-        by = float(1000 * slope)
-        grows = f"{by:.4g} mm" if by < 1e6 else f"{by / 1000:.4g} m"
+        offset = constant.strip() if at_zero else "0 um"
+        millimetres = float(1000 * slope)
+        grows = f"{millimetres:.4g} mm" if millimetres < 1e6 else f"{millimetres / 1000:.4g} m"
         if not in_metres or slope / 1000 >= STEEPEST:
             raise QuantityError(
                 f'"{text}" grows by {grows} per metre of length; give less than 100 um/m'
             )
         raise QuantityError(
             f'"{text}" grows by {grows} per metre of length, since L is in metres; where L is in'
-            f' millimetres and the result in micrometres, as on data sheets, write "{told} +'
+            f' millimetres and the result in micrometres, as on data sheets, write "{offset} +'
             f' {float(slope * 1000):.9g} um/m"'
         )
     if slope and slope < SMALLEST:
@@ -585,16 +578,15 @@ def _growing(value: str, constant: str, slope: Fraction, in_metres: bool = False
 
 
 def with_quantities(value: Any) -> Any:
-    """The same with every text that is a quantity, in lists and mappings too, replaced by its value
-    in SI units.
+    """Return data with every text that is a quantity replaced by its value in SI units.
 
     >>> with_quantities({"pitch": "200 mm", "axes": ["x", "2 ppm"], "count": 3})
     {'pitch': 0.2, 'axes': ['x', 2e-06], 'count': 3}
     """
     if isinstance(value, Mapping):
-        return {key: with_quantities(part) for key, part in value.items()}
+        return {key: with_quantities(element) for key, element in value.items()}
     if isinstance(value, list | tuple):
-        return [with_quantities(part) for part in value]
+        return [with_quantities(element) for element in value]
     if isinstance(value, str) and re.match(r"\s*[+-.0-9]", value):
         for kind in UNITS:
             with suppress(QuantityError):
@@ -626,10 +618,10 @@ def _parse(value: object, kind: str) -> float:
         raise QuantityError(f'"{text}" has no unit; {_with_unit(text, kind)}')
     plain = plain_unit(unit)
     if plain not in units:
-        for other, other_units in UNITS.items():
-            if plain in other_units:
+        for other_kind, its_units in UNITS.items():
+            if plain in its_units:
                 raise QuantityError(
-                    f'"{text}" is {_article(other)}; {_article(kind)} is expected, for example'
+                    f'"{text}" is {_article(other_kind)}; {_article(kind)} is expected, for example'
                     f' "{example}"'
                 )
         if factor := re.fullmatch(r"(.+?)\s*\(\s*k\s*=\s*([1-9][0-9]*\.?[0-9]*)\s*\)", plain):
@@ -644,19 +636,17 @@ def _parse(value: object, kind: str) -> float:
 
 
 def plain_unit(unit: str) -> str:
-    """A unit in the letters of the tables: both the micro sign and the Greek letter are in use on
-    keyboards.
-    """
+    """Return a unit with u for the micro sign and the Greek letter."""
     return unit.strip().replace("µ", "u").replace("μ", "u")
 
 
-def _positive(value: object, found: float, kind: str = "length") -> float:
-    if found > 0:
-        return found
+def _positive(value: object, number: float, kind: str = "length") -> float:
+    if number > 0:
+        return number
     small = {"length": "1 nm", "angle": "1 nrad", "temperature difference": "1 mK"}[kind]
     example = "0.2 um" if kind == "length" else EXAMPLES[kind]
     remedy = (
-        f"give a small one, such as {small}" if found == 0 else f'write for example "{example}"'
+        f"give a small one, such as {small}" if number == 0 else f'write for example "{example}"'
     )
     raise QuantityError(f'"{value}" must be above zero; {remedy}')
 
@@ -665,8 +655,8 @@ def _article(kind: str) -> str:
     return f"an {kind}" if kind[0] in "aeiou" else f"a {kind}"
 
 
-# What a number without a unit may have been meant in; to name one alone would lead to errors of a
-# thousand times.
+# Second units to suggest for a number without a unit; suggesting one alone would lead to errors of
+# a factor of a thousand.
 ALTERNATIVES = {
     "length": "um",
     "angle": "deg",
@@ -676,14 +666,14 @@ ALTERNATIVES = {
 }
 
 
-# A number without a unit that is smaller than this is one of metres or radians, as programs have.
+# A smaller number without a unit is one of metres or radians, as programs use.
 SMALL = 1e-4
 
 
 def _with_unit(number: str, kind: str) -> str:
     if kind in ("length", "angle") and 0.0 < abs(float(number)) < SMALL:
-        of_si = ("metres", length_text) if kind == "length" else ("radians", _in_microradians)
-        return f'write "{of_si[1](float(number))}" if it is in {of_si[0]}'
+        unit, text = ("metres", length_text) if kind == "length" else ("radians", _in_microradians)
+        return f'write "{text(float(number))}" if it is in {unit}'
     units = [EXAMPLES[kind].split()[1], *([ALTERNATIVES[kind]] if kind in ALTERNATIVES else [])]
     return "write for example " + " or ".join(f'"{number} {unit}"' for unit in units)
 
@@ -701,10 +691,10 @@ def _length_function_schema(*examples: str) -> dict[str, Any]:
     constant, ratio = _pattern("length")[1:-1], _pattern("ratio")[1:-1]
     units = f"({'|'.join(_unit_patterns('length'))})"
     growing = f"{constant}( *\\+( *L */ *{NUMBER}|{ratio}) *)?"
-    stated = f" *\\( *{NUMBER} *\\+ *L */ *{NUMBER} *\\) *{units} +with +L +in +{units} *"
+    bracketed = f" *\\( *{NUMBER} *\\+ *L */ *{NUMBER} *\\) *{units} +with +L +in +{units} *"
     return {
         "type": "string",
-        "pattern": f"^({growing}|{stated})$",
+        "pattern": f"^({growing}|{bracketed})$",
         "examples": [
             *examples,
             LENGTH_FUNCTION_EXAMPLE,

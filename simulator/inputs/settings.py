@@ -1,4 +1,4 @@
-"""Base class of the settings of all sections, and common wording of messages."""
+"""Base class of all sections' settings, and common wording of messages."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from pydantic import BaseModel, ConfigDict, Discriminator, Field, StringConstrai
 
 
 def _form(value: Any) -> str:
-    # Tags in angle brackets are left out of paths in messages.
+    # Messages omit tags in angle brackets from paths.
     return (
         "<mapping>"
         if isinstance(value, dict | BaseModel)
@@ -39,8 +39,8 @@ Forms = Annotated[
     | Annotated[Mapped, Tag("<mapping>")],
     Discriminator(_form),
 ]
-"""A value that is one thing, a list or a mapping; of a form that is none, it stands for the form
-whose message says what is expected.
+"""A value that is one thing, a list or a mapping; an invalid value is validated as one thing, whose
+message states the expected form.
 """
 
 Text = Annotated[str, StringConstraints(min_length=1)]
@@ -76,36 +76,36 @@ def listing(words: Iterable[str], limit: int = 8) -> str:
     return ", ".join(words)
 
 
-def number_of(count: int, thing: str) -> str:
-    """A number of things in words.
+def number_of(count: int, noun: str) -> str:
+    """Return a count and its noun.
 
     >>> number_of(1, "line"), number_of(2, "line")
     ('1 line', '2 lines')
     """
-    return f"{count} {thing}{'' if count == 1 else 's'}"
+    return f"{count} {noun}{'' if count == 1 else 's'}"
 
 
-def hint(word: str, known: Iterable[str]) -> str:
-    """Say which known word was probably meant, or which there are.
+def hint(word: str, choices: Iterable[str]) -> str:
+    """Return a suggestion of the nearest choice, or the list of choices.
 
     >>> hint("plat", ["plate", "bar"])
     'did you mean "plate"?'
     >>> hint("x", ["plate", "bar"])
     'known: plate, bar'
     """
-    known = list(dict.fromkeys(known))
-    meant = nearest(word, known)
-    if meant is not None:
-        return f'did you mean "{meant}"?'
-    return f"known: {listing(known)}" if known else "there is none"
+    choices = list(dict.fromkeys(choices))
+    candidate = nearest(word, choices)
+    if candidate is not None:
+        return f'did you mean "{candidate}"?'
+    return f"known: {listing(choices)}" if choices else "there is none"
 
 
-def nearest(word: str, known: Iterable[str]) -> str | None:
-    """The known word that was probably meant, or None."""
-    folded = {candidate.casefold(): candidate for candidate in reversed(list(known))}
-    # Beyond this length a word is no slip of the pen, and comparing it would take long.
-    found = difflib.get_close_matches(word.casefold(), folded, n=1) if len(word) <= 100 else []
-    return folded[found[0]] if found else None
+def nearest(word: str, choices: Iterable[str]) -> str | None:
+    """Return the nearest known word, or None."""
+    folded = {candidate.casefold(): candidate for candidate in reversed(list(choices))}
+    # Comparing longer words would take long, and none is a typing error.
+    matches = difflib.get_close_matches(word.casefold(), folded, n=1) if len(word) <= 100 else []
+    return folded[matches[0]] if matches else None
 
 
 def describe(value: Any) -> str:
@@ -136,5 +136,5 @@ def shorten(text: str, limit: int = 60) -> str:
 
 
 def listed(words: list[str]) -> str:
-    """Words with commas and an "and" before the last."""
+    """Return words with commas and an "and" before the last."""
     return words[0] if len(words) == 1 else f"{', '.join(words[:-1])} and {words[-1]}"

@@ -1,6 +1,4 @@
-"""Escaping of text in CSV files: spreadsheets would compute names such as =A1 or @home as
-formulas.
-"""
+"""Escaping of text in CSV files, where spreadsheets would compute names such as =A1 or @home."""
 
 from __future__ import annotations
 
@@ -10,15 +8,13 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any, TextIO
 
-# What a spreadsheet takes for the start of a formula, behind the apostrophes that protect it; a
-# sign alone is none.
+# Start of a formula, behind the apostrophes that protect it; a sign alone is none.
 _FORMULA = re.compile(r"'*[=+\-@\t\r].", re.DOTALL)
 _NUMBER = re.compile(r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?|[+-]?(?:inf|nan)")
 
 
 def cell_of_text(text: str) -> str:
-    """A text as it is written into a cell, with an apostrophe before what a spreadsheet would
-    compute.
+    """Return the cell of a text, with an apostrophe before a formula.
 
     >>> [cell_of_text(text) for text in ("z low", "=1+1", "-0.25", "'=1+1")]
     ['z low', "'=1+1", '-0.25', "''=1+1"]
@@ -27,7 +23,7 @@ def cell_of_text(text: str) -> str:
 
 
 def text_of_cell(cell: str) -> str:
-    """The text that a cell was made of.
+    """Return the text of a cell.
 
     >>> [text_of_cell(cell) for cell in ("z low", "'=1+1", "-0.25", "''=1+1", "'quoted'")]
     ['z low', '=1+1', '-0.25', "'=1+1", "'quoted'"]
@@ -38,7 +34,7 @@ def text_of_cell(cell: str) -> str:
 
 @dataclass(frozen=True)
 class CsvWriter:
-    """Writes rows of cells; lines end with a line feed."""
+    """Writer of rows of cells; lines end with a line feed."""
 
     stream: TextIO
 

@@ -1,4 +1,4 @@
-"""Tables in CSV files: columns by name, lengths with the unit as a suffix of the column's name."""
+"""CSV tables: columns by name, lengths with the unit as a suffix of the column's name."""
 
 from __future__ import annotations
 
@@ -28,15 +28,13 @@ CELL = re.compile(r'(?:\s*"((?:[^"]|"")*)"\s*|([^,"]*))(,|$)')
 MOST_ROWS = 1_000_000
 # Far more than there are names for.
 MOST_COLUMNS = 1000
-# Texts of rows that are kept to be shared by those that have the same.
-MOST_KNOWN = 100_000
+# Different texts of rows that are cached.
+MOST_CACHED = 100_000
 
 
 @dataclass(frozen=True, slots=True)
 class FileRow:
-    """A line of a table: texts of its named columns and lengths, in metres, of its length
-    columns.
-    """
+    """A line of a table: texts of its named columns, lengths (m) of its length columns."""
 
     mark: Mark
     texts: tuple[str, ...]
@@ -44,7 +42,7 @@ class FileRow:
 
 
 def table_lines(path: Path | GivenText) -> list[tuple[int, str]]:
-    """Lines of a CSV file with their numbers, those that are empty or comments left out.
+    """Return lines of a CSV file with their numbers, without empty lines and comments.
 
     :raises ExperimentError: the file cannot be read.
     """
@@ -68,15 +66,13 @@ def read_table(
     units: Mapping[str, Mapping[str, Fraction]] = MappingProxyType({}),
     empty: Collection[str] = (),
 ) -> tuple[FileRow, ...]:
-    """Read a comma-separated file whose first line names the columns.
+    """Return the rows of a comma-separated file whose first line names the columns.
 
-    ``texts`` are required columns of text, ``lengths`` required columns of lengths, written with a
-    unit such as ``x_mm``; ``optional`` are length columns that may be missing and then are
-    ``absent``; those of ``units`` are no lengths and have units of their own; ``defaults`` tell
-    what required columns of text say where they are missing; lengths in columns ``empty`` are NaN
-    where their cells are empty. Empty lines and lines that begin with # are skipped. Messages about
-    rows are added to ``problems`` if it is given, so that the caller can say more at once; a length
-    that is wrong is then NaN.
+    ``texts`` are required columns of text, ``lengths`` required columns of lengths with a unit such
+    as ``x_mm``, and ``optional`` length columns, by default ``absent``. Columns of ``units`` have
+    units of their own. ``defaults`` are texts of missing columns; empty cells of columns ``empty``
+    are NaN. Empty lines and lines that begin with # are skipped. ``problems``, if given, collects
+    messages about rows, whose invalid lengths are then NaN.
 
     :raises ExperimentError: the file cannot be read, a column is missing or unknown, a cell is not
         a number, there are no rows; all problems of the file at once.
@@ -87,15 +83,15 @@ def read_table(
     example = ",".join([*texts, *(f"{name}_mm" for name in lengths)])
     if not lines:
         raise refused(file, f"the file is empty; its first line should be {example}", line=1)
-    places, factors = _columns(
+    columns, factors = _columns(
         Mark(file, lines[0][0], 1), lines[0][1], texts, lengths, optional, defaults, example, units
     )
-    _refuse_unfilled(file, places, lengths, lines)
-    count, names = len(places), (*lengths, *optional)
-    places += [name for name in defaults if name not in places]
-    constants = [defaults[name] for name in places[count:]]
+    _refuse_unfilled(file, columns, lengths, lines)
+    count, names = len(columns), (*lengths, *optional)
+    columns += [name for name in defaults if name not in columns]
+    constants = [defaults[name] for name in columns[count:]]
     rows = []
-    plain = _PlainRows.of(places, factors, texts, (*lengths, *optional), constants, absent)
+    plain = _PlainRows.create(columns, factors, texts, names, constants, absent)
     for number, line in islice(lines, 1, MOST_ROWS + 1):
         mark = Mark(file, number, 1)
         if len(messages) >= MOST_MESSAGES:
@@ -109,16 +105,17 @@ def read_table(
         if cells is None or len(cells) != count:
             messages.append(mark.message("", wrong_count(line, cells, count)))
             continue
-        by_name = dict(zip(places, [*cells, *((1, text) for text in constants)], strict=True))
+        by_name = dict(zip(columns, [*cells, *((1, text) for text in constants)], strict=True))
         for name in texts:
             if not by_name[name][1]:
-                place = Mark(file, number, by_name[name][0])
-                messages.append(place.message("", f"no {name}; write its name"))
-        given = {name: cell for name, cell in by_name.items() if cell[1] or name not in empty}
-        left_out = [name in empty and name in by_name and name not in given for name in names]
-        values = _lengths_of(mark, given, names, factors, absent, messages)
+                cell_mark = Mark(file, number, by_name[name][0])
+                messages.append(cell_mark.message("", f"no {name}; write its name"))
+        filled = {name: cell for name, cell in by_name.items() if cell[1] or name not in empty}
         values = tuple(
-            math.nan if out else value for out, value in zip(left_out, values, strict=True)
+            math.nan
+            if name in by_name and name not in filled
+            else _length_of(mark, filled.get(name), name, factors, absent, messages)
+            for name in names
         )
         rows.append(FileRow(mark, tuple(text_of_cell(by_name[name][1]) for name in texts), values))
     if len(lines) == 1:
@@ -137,52 +134,50 @@ def read_table(
 
 
 def _refuse_unfilled(
-    file: str, places: Sequence[str], lengths: Sequence[str], lines: Sequence[tuple[int, str]]
+    file: str, columns: Sequence[str], lengths: Sequence[str], lines: Sequence[tuple[int, str]]
 ) -> None:
-    """Refuse a table in which no length is filled in, in one message instead of one for each cell.
+    """Refuse a table without any length, in one message instead of one per cell.
 
     :raises ExperimentError: all required lengths are empty, in all rows.
     """
-    columns = [places.index(name) for name in lengths]
+    required = [columns.index(name) for name in lengths]
     rows = (split_cells(line) for _, line in lines[1:])
-    is_empty = len(lines) > 1 and bool(columns)
-    if is_empty and all(
-        cells is not None and len(cells) == len(places) and not any(cells[k][1] for k in columns)
-        for cells in rows
+    if (
+        len(lines) > 1
+        and required
+        and all(
+            cells is not None
+            and len(cells) == len(columns)
+            and not any(cells[k][1] for k in required)
+            for cells in rows
+        )
     ):
         text = f"nothing is filled in: {listing(lengths)} are empty in all {len(lines) - 1} rows"
         text += "; write in what was read, and remove the lines of what was not"
         raise refused(file, text, line=lines[1][0])
 
 
-def _lengths_of(
+def _length_of(
     mark: Mark,
-    by_name: Mapping[str, tuple[int, str]],
-    names: Sequence[str],
+    cell: tuple[int, str] | None,
+    name: str,
     factors: Mapping[str, Fraction],
     absent: float,
     messages: list[Message],
-) -> tuple[float, ...]:
-    """Lengths of a row by column, which messages about them are added to."""
-    found = []
-    for name in names:
-        if name not in by_name:
-            found.append(absent)
-            continue
-        column, cell = by_name[name]
-        place = Mark(mark.file, mark.line, column)
-        found.append(read_number(cell, name, factors[name], place, messages))
-    return tuple(found)
+) -> float:
+    if cell is None:
+        return absent
+    cell_mark = Mark(mark.file, mark.line, cell[0])
+    return read_number(cell[1], name, factors[name], cell_mark, messages)
 
 
 @dataclass(frozen=True)
 class _PlainRows:
-    """Reads lines that hold nothing unusual, in a fraction of the time that others take.
+    """Reader of lines without quotation marks and errors, in a fraction of the time.
 
-    ``count`` is the number of columns, ``texts`` and ``lengths`` where each of the row's is, -1
-    where it is not and is ``absent``; the latter come with the power of ten that makes metres of
-    the column's unit, empty where none does. ``constants`` are texts behind the columns, the same
-    in all rows, and ``known`` has texts of rows before, of which there are as a rule few.
+    ``texts`` and ``lengths`` are indices of columns, the latter -1 for columns that are ``absent``
+    and with the unit's `power_of_ten`. ``constants`` are texts of missing columns. ``cache`` shares
+    the texts of rows: few differ.
     """
 
     count: int
@@ -190,29 +185,29 @@ class _PlainRows:
     absent: float
     texts: tuple[int, ...]
     lengths: tuple[tuple[int, str], ...]
-    known: dict[tuple[str, ...], tuple[str, ...]]
+    cache: dict[tuple[str, ...], tuple[str, ...]]
 
     @classmethod
-    def of(
+    def create(
         cls,
-        places: Sequence[str],
+        columns: Sequence[str],
         factors: dict[str, Fraction],
         texts: Sequence[str],
         lengths: Sequence[str],
         constants: list[str],
         absent: float,
     ) -> _PlainRows:
-        by_name = {name: i for i, name in enumerate(places)}
+        by_name = {name: i for i, name in enumerate(columns)}
         powers = [
             (by_name.get(name, -1), power_of_ten(factors.get(name, Fraction(1))))
             for name in lengths
         ]
-        of_texts = tuple(by_name[name] for name in texts)
-        count = len(places) - len(constants)
-        return cls(count, constants, absent, of_texts, tuple(powers), {})
+        indices = tuple(by_name[name] for name in texts)
+        count = len(columns) - len(constants)
+        return cls(count, constants, absent, indices, tuple(powers), {})
 
     def row(self, mark: Mark, line: str) -> FileRow | None:
-        """The row of a line; None where it has to be looked at more closely."""
+        """Return the row of a line; None if it needs the thorough reader."""
         if '"' in line:
             return None
         cells = [cell.strip() for cell in line.split(",")]
@@ -225,22 +220,22 @@ class _PlainRows:
             if value is None:
                 return None
             lengths.append(value)
-        own = tuple(cells[i] for i in self.texts)
-        texts = self.known.get(own)
+        named = tuple(cells[i] for i in self.texts)
+        texts = self.cache.get(named)
         if texts is None:
-            if not all(own):
+            if not all(named):
                 return None
-            texts = tuple(map(text_of_cell, own))
-            if len(self.known) < MOST_KNOWN:
-                self.known[own] = texts
+            texts = tuple(map(text_of_cell, named))
+            if len(self.cache) < MOST_CACHED:
+                self.cache[named] = texts
         return FileRow(mark, texts, tuple(lengths))
 
 
 def header_cells(mark: Mark, header: str, example: str) -> Iterator[tuple[Mark, str, str, str]]:
-    """The cells of a first line: where each stands, what it says, its name and its unit.
+    """Yield mark, text, name and unit of each cell of a first line.
 
-    :raises ExperimentError: there are more than a thousand, so that saying what is wrong with each
-        would take long, or they are separated by semicolons or tabs.
+    :raises ExperimentError: there are more than a thousand, or they are separated by semicolons or
+        tabs.
     """
     count = header.count(",") + 1
     if count > MOST_COLUMNS:
@@ -255,7 +250,7 @@ def header_cells(mark: Mark, header: str, example: str) -> Iterator[tuple[Mark, 
 
 
 def header_texts(path: Path | GivenText) -> set[str]:
-    """What the cells of the first line of a comma-separated file say; nothing where there are none.
+    """Return the texts of the first line's cells of a comma-separated file; may be empty.
 
     :raises ExperimentError: the file cannot be read.
     """
@@ -264,8 +259,7 @@ def header_texts(path: Path | GivenText) -> set[str]:
 
 
 def header_names(path: Path | GivenText) -> set[str]:
-    """Names of the columns of a comma-separated file, without their units; none where there are
-    none.
+    """Return names of the columns of a comma-separated file, without their units; may be empty.
 
     :raises ExperimentError: the file cannot be read.
     """
@@ -280,7 +274,7 @@ def read_number(
     messages: list[Message],
     kind: str = "length",
 ) -> float:
-    """The number in a cell, times its column's factor; NaN after saying what is wrong."""
+    """Return the number in a cell, times its column's factor; NaN after adding a message."""
     try:
         return metres_or_radians(cell, factor, kind)
     except QuantityError as error:
@@ -289,7 +283,7 @@ def read_number(
 
 
 def wrong_number(cell: str, name: str) -> str:
-    """Say what is wrong with a cell that is nearly a number, or nothing."""
+    """Return the fault of a cell that is nearly a number, or an empty text."""
     if not cell:
         return f"no {name}; write a number, or remove the line"
     if re.fullmatch(r"[+-]?[0-9]+,[0-9]+(?:[eE][+-]?[0-9]+)?", cell):
@@ -302,23 +296,23 @@ def wrong_number(cell: str, name: str) -> str:
 
 
 def wrong_count(line: str, cells: list[tuple[int, str]] | None, expected: int) -> str:
-    """Say what is wrong with a line that does not have as many cells as there are columns."""
+    """Return the fault of a line with more or fewer cells than columns."""
     if cells is None:
         return "a quotation mark too many; write one line per row, its columns separated by commas"
-    what = f"{len(cells)} columns instead of {expected}"
+    fact = f"{len(cells)} columns instead of {expected}"
     halves = [
-        f"{one}.{other}"
-        for (_, one), (_, other) in pairwise(cells)
-        if re.fullmatch(r"[+-]?[0-9]+", one) and re.fullmatch(r"[0-9]+", other)
+        f"{whole}.{decimals}"
+        for (_, whole), (_, decimals) in pairwise(cells)
+        if re.fullmatch(r"[+-]?[0-9]+", whole) and re.fullmatch(r"[0-9]+", decimals)
     ]
     if len(cells) > expected and halves:
         return (
-            f"{what}; if a comma is meant as the decimal point, write a point, as in"
+            f"{fact}; if a comma is meant as the decimal point, write a point, as in"
             f" {shorten(halves[-1])}"
         )
     if len(cells) == 1 and re.search("[;\t]", line):
-        return f"{what}; separate them by commas"
-    return f"{what}; write one line per row, its columns separated by commas"
+        return f"{fact}; separate them by commas"
+    return f"{fact}; write one line per row, its columns separated by commas"
 
 
 def _columns(
@@ -331,38 +325,40 @@ def _columns(
     example: str,
     units: Mapping[str, Mapping[str, Fraction]],
 ) -> tuple[list[str], dict[str, Fraction]]:
-    """Return the names of the columns without their units, and the factor of each unit."""
+    """Return the names of the columns without their units, and the factors of units."""
     messages: list[Message] = []
     names: list[str] = []
     factors: dict[str, Fraction] = {}
-    for place, cell, name, unit in header_cells(mark, header, example):
-        of_name = units.get(name, LENGTH_UNITS)
+    for cell_mark, cell, name, unit in header_cells(mark, header, example):
+        its_units = units.get(name, LENGTH_UNITS)
         if cell in texts:
             name = cell
-        elif name in (*lengths, *optional) and unit in of_name:
-            factors[name] = of_name[unit]
+        elif name in (*lengths, *optional) and unit in its_units:
+            factors[name] = its_units[unit]
         elif name in (*lengths, *optional):
             messages.append(
-                place.message("", f'unknown unit in the column "{cell}"; {hint(unit, of_name)}')
+                cell_mark.message(
+                    "", f'unknown unit in the column "{cell}"; {hint(unit, its_units)}'
+                )
             )
         elif cell in (*lengths, *optional):
             name, example = cell, next(iter(units.get(cell, {"mm": 1})))
             text = f'the column "{cell}" has no unit; write for example {cell}_{example}'
-            messages.append(place.message("", text))
+            messages.append(cell_mark.message("", text))
         else:
-            known = [
+            expected = [
                 *texts,
                 *(
-                    f"{one}_{next(iter(units.get(one, {'mm': 1})))}"
-                    for one in (*lengths, *optional)
+                    f"{length}_{next(iter(units.get(length, {'mm': 1})))}"
+                    for length in (*lengths, *optional)
                 ),
             ]
             messages.append(
-                place.message("", f'unknown column "{shorten(cell)}"; {hint(cell, known)}')
+                cell_mark.message("", f'unknown column "{shorten(cell)}"; {hint(cell, expected)}')
             )
         if name in names:
             messages.append(
-                place.message("", f'a second column "{shorten(cell)}"; remove one of them')
+                cell_mark.message("", f'a second column "{shorten(cell)}"; remove one of them')
             )
         names.append(name)
     missing = [name for name in (*texts, *lengths) if name not in (*names, *defaults)]
@@ -378,8 +374,8 @@ def _columns(
 
 
 def split_cells(line: str) -> list[tuple[int, str]] | None:
-    """Split a line into cells with their columns, from 1; None if its quotation marks do not
-    match.
+    """Return the cells of a line with their columns, from 1; None if a quotation mark has no
+    partner.
     """
     cells, start = [], 0
     while True:
@@ -396,7 +392,7 @@ def split_cells(line: str) -> list[tuple[int, str]] | None:
 
 
 def headings(text: str) -> set[str]:
-    """Names of the columns in the first line that is no comment, without their units."""
+    """Return names of the columns in the first line that is no comment, without their units."""
     lines = (line for line in text.splitlines() if line.strip() and line[:1] != "#")
     line = next(lines, "")
     cells = (cell.strip().strip('"') for cell in re.split("[,;\t]", line))

@@ -1,4 +1,4 @@
-"""Trust in a file: whether code that it names is run, and where the files that it names may lie."""
+"""Trust in a file: whether its code is run, and which folder its files must be in."""
 
 from __future__ import annotations
 
@@ -10,8 +10,10 @@ from .messages import refused
 
 @dataclass(frozen=True)
 class Trust:
-    """What reading a file may do for it: import the `modules` that it names, and read files
-    `within` a folder, or anywhere. `remedy` is what to do where modules are refused.
+    """Permissions of a file: to import its `modules`, and to read files `within` a folder, or
+    anywhere.
+
+    `remedy` is the advice when modules are refused.
     """
 
     modules: bool = False
@@ -19,9 +21,9 @@ class Trust:
     remedy: str = "allow them if you trust the file"
 
     def file(self, folder: Path, name: object) -> Path:
-        """The file that a name means in a folder.
+        """Return the path of a name in a folder.
 
-        :raises ExperimentError: it lies elsewhere than it may, links followed.
+        :raises ExperimentError: it is outside the permitted folder, links followed.
         """
         path = folder / str(name)
         if self.within is not None and not path.resolve().is_relative_to(self.within.resolve()):
@@ -30,5 +32,5 @@ class Trust:
         return path
 
 
-# Of a file that somebody opened by its name, and of one that came with something else.
+# Of a file that the user opened by its name, and of one that came with another.
 OPENED, UNKNOWN = Trust(modules=True), Trust()

@@ -1,7 +1,7 @@
-"""What a computation works with or into, and cannot use: a store, a cluster."""
+"""Error of a store, cluster or other object that a computation cannot use."""
 
 from __future__ import annotations
 
 
 class UnusableError(Exception):
-    """Something cannot be used; the text says what, why, and what would help."""
+    """An object cannot be used; the text has fact, reason and remedy."""

@@ -1,4 +1,4 @@
-"""Validation of a tree against the settings that it should state."""
+"""Validation of a tree against settings."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ T = TypeVar("T")
 
 
 def validated(kind: type[T], root: Node, problems: Problems) -> T | None:
-    """The settings of a kind that a tree states, or None after saying what is wrong with it."""
+    """Return the settings of a type that a tree states, or None after adding messages."""
     adapter = type_adapter(cast(Any, kind))
     try:
-        found: T = adapter.validate_python(to_python(root))
-        return found
+        settings: T = adapter.validate_python(to_python(root))
+        return settings
     except ValidationError as error:
         explain_in(problems, error, adapter, root)
         return None
@@ -33,14 +33,14 @@ def explain_in(
     node: Node,
     steps: Steps = (),
 ) -> None:
-    """Add what is wrong with a node, which stands at a path."""
-    for one in explain(error.errors(include_url=False), node, _schema(adapter)):
-        problems.add((*steps, *one.steps), one.text, one.of_key)
+    """Add messages about a node at a path."""
+    for explanation in explain(error.errors(include_url=False), node, _schema(adapter)):
+        problems.add((*steps, *explanation.steps), explanation.text, explanation.of_key)
 
 
 @cache
 def type_adapter(kind: Any) -> TypeAdapter[Any]:
-    """What validates a kind of settings, made once."""
+    """Return the validator of a type of settings, made once."""
     return TypeAdapter(kind)
 
 

@@ -1,4 +1,4 @@
-"""Translation of pydantic's errors into messages for the person who wrote the file."""
+"""Messages for the file's author from pydantic's errors."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ Schema = AnyMapping[str, Any]
 
 # Keys that may state an expanded uncertainty in place of a standard one.
 NOT_STANDARD = ("expanded_uncertainty", "uncertainty", "expanded", "u", "u95", "accuracy")
-# What may be missing where a kind or key is unknown.
+# Remedy for an unknown kind or key that an extension may provide.
 LACKING = "if an extension provides it, install that"
-# Kinds by other names that they have, in lower case without what is no letter.
+# Kinds by their synonyms, in lower case, letters only.
 OTHER_NAMES = {
     **dict.fromkeys(("ballbar", "barbell", "dumbbell"), "two_spheres"),
     **dict.fromkeys(("bryangauge", "bryan"), "bryan_gauge"),
@@ -50,9 +50,7 @@ COMPARISONS = {
 
 @dataclass(frozen=True)
 class Explanation:
-    """A path below the validated node and what to say about it; ``of_key``: about the key, not its
-    value.
-    """
+    """A path below the validated node and its message; ``of_key``: about the key, not its value."""
 
     steps: Steps
     text: str
@@ -60,26 +58,25 @@ class Explanation:
 
 
 def explain(errors: list[ErrorDetails], node: Node, schema: Schema) -> list[Explanation]:
-    """Explain errors of validating ``node``; ``schema`` is the JSON schema of what it should be."""
+    """Return explanations of errors in ``node``; ``schema`` is its JSON schema."""
     explanations: list[Explanation] = []
     choices: dict[Steps, dict[str, list[tuple[Explanation, bool]]]] = {}
-    # What is explained beyond would not be told.
+    # More than `MOST_MESSAGES` are not reported.
     for error in errors[: 2 * MOST_MESSAGES]:
-        place = _place(error, node)
-        # Pydantic counts entries that are wrong in themselves as missing.
-        items = getattr(place.node, "items", ())
+        location = _location(error, node)
+        # Pydantic counts invalid entries as missing.
+        items = getattr(location.node, "items", ())
         if error["type"] == "too_short" and items and len(items) >= error["ctx"]["min_length"]:
             continue
-        explanation = _explain(error, place, node, schema)
-        if place.choice is None:
+        explanation = _explain(error, location, node, schema)
+        if location.choice is None:
             explanations.append(explanation)
             continue
-        above, label = place.choice
-        # The choice fails already because of the form that was written, not because of a mistake
-        # within it.
+        above, label = location.choice
+        # The choice fails because of the form that was written, not because of an error within it.
         is_other_form = explanation.steps == above and (
             error["type"] in EXPECTED
-            or (error["type"] == "literal_error" and not isinstance(place.node, Scalar))
+            or (error["type"] == "literal_error" and not isinstance(location.node, Scalar))
         )
         choices.setdefault(above, {}).setdefault(label, []).append((explanation, is_other_form))
     for by_label in choices.values():
@@ -88,12 +85,13 @@ def explain(errors: list[ErrorDetails], node: Node, schema: Schema) -> list[Expl
 
 
 def _nearest_choice(choices: list[list[tuple[Explanation, bool]]]) -> list[Explanation]:
+    # The choice that failed deepest in the tree is the one that the author meant.
     same_form = [
         choice for choice in choices if not any(other_form for _, other_form in choice)
     ] or choices
     deepest = max(len(explanation.steps) for choice in same_form for explanation, _ in choice)
     nearest = [
-        choice for choice in same_form if any(len(one.steps) == deepest for one, _ in choice)
+        choice for choice in same_form if any(len(error.steps) == deepest for error, _ in choice)
     ]
     if len(nearest) == 1:
         return [explanation for explanation, _ in nearest[0]]
@@ -104,15 +102,15 @@ def _nearest_choice(choices: list[list[tuple[Explanation, bool]]]) -> list[Expla
 
 
 @dataclass(frozen=True)
-class _Place:
+class _Location:
     steps: Steps
-    # The node at the path, or above it where the last step does not exist.
+    # The node at the path, or above it if the last step does not exist.
     node: Node
-    # Where one of several forms was tried, and which.
+    # The path at which one of several forms was tried, and that form.
     choice: tuple[Steps, str] | None
 
 
-def _place(error: ErrorDetails, root: Node) -> _Place:
+def _location(error: ErrorDetails, root: Node) -> _Location:
     steps: Steps = ()
     node, choice, tagged = root, None, False
     for i, step in enumerate(error["loc"]):
@@ -129,7 +127,7 @@ def _place(error: ErrorDetails, root: Node) -> _Place:
             steps = (*steps, step)
         elif choice is None and step != "[key]":
             choice = (steps, str(step))
-    return _Place(steps, node, choice)
+    return _Location(steps, node, choice)
 
 
 def _kind(node: Node) -> str | None:
@@ -137,16 +135,16 @@ def _kind(node: Node) -> str | None:
     return str(kind.value) if isinstance(kind, Scalar) else None
 
 
-def _explain(error: ErrorDetails, place: _Place, root: Node, schema: Schema) -> Explanation:
-    kind, context, steps, node = error["type"], error.get("ctx", {}), place.steps, place.node
+def _explain(error: ErrorDetails, location: _Location, root: Node, schema: Schema) -> Explanation:
+    kind, context, steps, node = error["type"], error.get("ctx", {}), location.steps, location.node
     value = (
         to_python(node) if isinstance(node, Scalar) else () if isinstance(node, Sequence) else {}
     )
     if kind == "missing":
         if isinstance(steps[-1], int):
             return Explanation(steps[:-1], _wrong_length(root, steps[:-1], schema))
-        about = _description(schema, root, steps)
-        return Explanation(steps, f'missing; add "{steps[-1]}"{about}')
+        note = _description(schema, root, steps)
+        return Explanation(steps, f'missing; add "{steps[-1]}"{note}')
     if kind == "extra_forbidden":
         return _unknown_key(steps, root, schema)
     if isinstance(node, Scalar) and node.value is None:
@@ -157,12 +155,12 @@ def _explain(error: ErrorDetails, place: _Place, root: Node, schema: Schema) -> 
         if tag is None:
             return Explanation((*steps, "kind"), f'missing; add "kind", one of: {listing(kinds)}')
         if isinstance(tag, Scalar) and tag.value is not None:
-            other = OTHER_NAMES.get("".join(filter(str.isalnum, str(tag.value).casefold())))
-            meant = f'write "{other}"' if other in kinds else hint(str(tag.value), kinds)
-            if kind == "open_tag_invalid" and meant.startswith("known"):
-                meant = f"{meant}; {LACKING}"
+            synonym = OTHER_NAMES.get("".join(filter(str.isalnum, str(tag.value).casefold())))
+            advice = f'write "{synonym}"' if synonym in kinds else hint(str(tag.value), kinds)
+            if kind == "open_tag_invalid" and advice.startswith("known"):
+                advice = f"{advice}; {LACKING}"
             return Explanation(
-                (*steps, "kind"), f'unknown kind "{shorten(str(tag.value))}"; {meant}'
+                (*steps, "kind"), f'unknown kind "{shorten(str(tag.value))}"; {advice}'
             )
         return Explanation((*steps, "kind"), f"expected one of: {listing(kinds)}")
     if kind == "literal_error":
@@ -172,10 +170,10 @@ def _explain(error: ErrorDetails, place: _Place, root: Node, schema: Schema) -> 
             return Explanation(steps, text)
         return Explanation(steps, _wrong_literal(value, _allowed(schema, root, steps)))
     if kind in EXPECTED:
-        about = _description(schema, root, steps) if not steps or isinstance(steps[-1], str) else ""
+        note = _description(schema, root, steps) if not steps or isinstance(steps[-1], str) else ""
         quotes = "; put it in quotes" if kind == "string_type" and isinstance(node, Scalar) else ""
         return Explanation(
-            steps, f"expected {EXPECTED[kind]}, found {describe(value)}{quotes}{about}"
+            steps, f"expected {EXPECTED[kind]}, found {describe(value)}{quotes}{note}"
         )
     if kind in ("too_short", "too_long", "string_too_short"):
         return Explanation(steps, _wrong_length(root, steps, schema))
@@ -194,41 +192,43 @@ def _explain(error: ErrorDetails, place: _Place, root: Node, schema: Schema) -> 
 
 
 def _unknown_key(steps: Steps, root: Node, schema: Schema) -> Explanation:
-    known = [
-        key for one in _schemas_at(schema, root, steps[:-1]) for key in one.get("properties", {})
+    keys = [
+        key for part in _schemas_at(schema, root, steps[:-1]) for key in part.get("properties", {})
     ]
-    taken = written_keys(root, *steps[:-1])
-    free = [key for key in dict.fromkeys(known) if key not in taken]
-    # A misspelt key may stand beside the right one.
-    meant = hint(str(steps[-1]), known)
-    meant = meant if meant.startswith("did") else hint(str(steps[-1]), free or known)
+    used = written_keys(root, *steps[:-1])
+    free = [key for key in dict.fromkeys(keys) if key not in used]
+    # The file may also have the key that was misspelt.
+    advice = hint(str(steps[-1]), keys)
+    advice = advice if advice.startswith("did") else hint(str(steps[-1]), free or keys)
     if "standard_uncertainty" in free and str(steps[-1]).casefold() in NOT_STANDARD:
-        meant = (
+        advice = (
             "uncertainties are standard ones, U / k of an expanded uncertainty U; give U / k as"
             " standard_uncertainty"
         )
-    return Explanation(steps, f"unknown key; {meant}", of_key=True)
+    return Explanation(steps, f"unknown key; {advice}", of_key=True)
 
 
 def _across(plane: str) -> str:
-    """The axis that a plane of two axes is normal to; empty where a text is no such plane.
+    """Return the axis normal to a plane of two axes; empty for other texts.
 
     >>> _across("xy"), _across("Z-X"), _across("xx")
     ('z', 'y', '')
     """
     axes = re.fullmatch("([xyz])[ /-]?([xyz])", plane.strip().casefold())
-    left = {"x", "y", "z"}.difference(axes.groups() if axes else ())
-    return left.pop() if len(left) == 1 else ""
+    normals = {"x", "y", "z"}.difference(axes.groups() if axes else ())
+    return normals.pop() if len(normals) == 1 else ""
 
 
 def _wrong_literal(value: Any, meanings: AnyMapping[str, str]) -> str:
     allowed = list(meanings)
     if isinstance(value, str):
-        meant = hint(value, meanings)
-        meant = "" if meant.startswith("known") else f"{meant} "
-        if not meant:
-            allowed = [f"{name} ({words})" if words else name for name, words in meanings.items()]
-        return f'unknown value "{shorten(value)}"; {meant}allowed: {listing(allowed, 12)}'
+        suggestion = hint(value, meanings)
+        suggestion = "" if suggestion.startswith("known") else f"{suggestion} "
+        if not suggestion:
+            allowed = [
+                f"{name} ({meaning})" if meaning else name for name, meaning in meanings.items()
+            ]
+        return f'unknown value "{shorten(value)}"; {suggestion}allowed: {listing(allowed, 12)}'
     return f"expected one of: {listing(allowed, 12)}; found {describe(value)}"
 
 
@@ -239,11 +239,11 @@ def _wrong_length(root: Node, steps: Steps, schema: Schema) -> str:
     items = getattr(node, "items", ())
     bounds = [
         (
-            one.get("minItems", one.get("minProperties", 0)),
-            one.get("maxItems", one.get("maxProperties")),
+            part.get("minItems", part.get("minProperties", 0)),
+            part.get("maxItems", part.get("maxProperties")),
         )
-        for one in _schemas_at(schema, root, steps)
-        if one.get("type") == ("array" if isinstance(node, Sequence) else "object")
+        for part in _schemas_at(schema, root, steps)
+        if part.get("type") == ("array" if isinstance(node, Sequence) else "object")
     ]
     lower, upper = bounds[0] if bounds else (1, None)
     if not items and upper is None:
@@ -262,19 +262,19 @@ def _wrong_length(root: Node, steps: Steps, schema: Schema) -> str:
 
 
 def _description(schema: Schema, root: Node, steps: Steps) -> str:
-    for one in _schemas_at(schema, root, steps, expanded=False):
+    for part in _schemas_at(schema, root, steps, expanded=False):
         # The description of a whole class is its docstring, written for another reader.
-        if "description" in one and "properties" not in one:
-            return f" ({one['description'].rstrip('.')})"
+        if "description" in part and "properties" not in part:
+            return f" ({part['description'].rstrip('.')})"
     return ""
 
 
 def _allowed(schema: Schema, root: Node, steps: Steps) -> dict[str, str]:
-    """The values that are allowed at a path, with what they mean where the schema says it."""
+    """Return the values allowed at a path, with their meanings if the schema has them."""
     allowed: dict[str, str] = {}
-    for one in _schemas_at(schema, root, steps, any_kind=True):
-        values = one.get("enum", [one["const"]] if "const" in one else [])
-        meanings = one.get("enumDescriptions", [""] * len(values))
+    for part in _schemas_at(schema, root, steps, any_kind=True):
+        values = part.get("enum", [part["const"]] if "const" in part else [])
+        meanings = part.get("enumDescriptions", [""] * len(values))
         allowed |= dict(zip(map(str, values), meanings, strict=True))
     return allowed
 
@@ -282,16 +282,22 @@ def _allowed(schema: Schema, root: Node, steps: Steps) -> dict[str, str]:
 def _schemas_at(
     schema: Schema, root: Node, steps: Steps, expanded: bool = True, any_kind: bool = False
 ) -> list[Schema]:
-    """Return the schemas that apply at a path, those of other kinds left out."""
-    found: list[Schema] = [schema]
+    """Return the schemas that apply at a path, without those of other kinds."""
+    matches: list[Schema] = [schema]
     node: Node | None = root
     for step in steps:
-        parts = [part for one in found for part in _expand(one, schema, None if any_kind else node)]
-        found = [below for part in parts for below in _below(part, step)]
+        parts = [
+            part
+            for branch in matches
+            for part in _expand(branch, schema, None if any_kind else node)
+        ]
+        matches = [below for part in parts for below in _below(part, step)]
         node = child(node, step)
     if not expanded:
-        return found
-    return [part for one in found for part in _expand(one, schema, None if any_kind else node)]
+        return matches
+    return [
+        part for branch in matches for part in _expand(branch, schema, None if any_kind else node)
+    ]
 
 
 def _expand(part: Schema, schema: Schema, node: Node | None) -> Iterator[Schema]:

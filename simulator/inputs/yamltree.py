@@ -1,8 +1,8 @@
-"""A YAML file as a tree of nodes that know their line and column.
+"""A YAML file as a tree of nodes with line and column.
 
-The tree is built from PyYAML's events, because its constructors follow YAML 1.1 (where ``on`` is
-true and 1e-6 is a text), drop duplicate keys and expand aliases without bound. Scalars follow the
-core schema of YAML 1.2.
+PyYAML's events are used, because its constructors follow YAML 1.1 (where ``on`` is true and 1e-6 is
+a text), drop duplicate keys and expand aliases without bound. Scalars follow the core schema of
+YAML 1.2.
 """
 
 from __future__ import annotations
@@ -26,12 +26,12 @@ MOST_NODES = 500_000
 # Room for a table of a million rows.
 MOST_BYTES = 200_000_000
 
-# What YAML 1.2 does not allow even in quotes.
+# Characters that YAML 1.2 does not allow even in quotes.
 NOT_PRINTABLE = re.compile("[^\t\n\r\x20-\x7e\x85\xa0-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
 
 LOADER: Any = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
 
-# What YAML's parser says → what the writer of the file can do about it.
+# Part of the YAML parser's message → fact and remedy for the author.
 REMEDIES = (
     (
         "mapping values are not allowed",
@@ -67,18 +67,18 @@ REMEDIES = (
 
 @dataclass(frozen=True, slots=True)
 class Mark:
-    """A place in a file; line and column count from 1."""
+    """A location in a file; line and column count from 1."""
 
     file: str
     line: int
     column: int
 
     def message(self, path: str, text: str) -> Message:
-        """Return a message about this place."""
+        """Return a message with this location."""
         return Message(self.file, self.line, self.column, path, text)
 
     def refused(self, text: str, path: str = "") -> ExperimentError:
-        """The one error of a file, about this place."""
+        """Return the only error of a file, at this location."""
         return ExperimentError([self.message(path, text)])
 
 
@@ -100,7 +100,7 @@ class Sequence:
 
 @dataclass(frozen=True, eq=False)
 class Mapping:
-    """A mapping; ``key_marks`` says where each key stands."""
+    """A mapping; ``key_marks`` are the locations of its keys."""
 
     mark: Mark
     items: dict[str, Node]
@@ -114,15 +114,14 @@ def read_tree(path: Path, minor: list[Message] | None = None) -> Node:
     """Read a YAML file; see ``parse_tree``.
 
     :raises ExperimentError: the file cannot be read, is not YAML, is empty, holds several
-        documents, repeats a key or uses what experiment files do not: merge keys, tags, recursive
-        aliases.
+        documents, repeats a key or uses merge keys, tags or recursive aliases.
     """
     return parse_tree(read_text(path), str(path), minor)
 
 
 @dataclass(frozen=True)
 class GivenText:
-    """A text that is in no file, under the name that messages have for it."""
+    """A text that is in no file, with the name that messages use for it."""
 
     name: str
     text: str
@@ -132,7 +131,7 @@ class GivenText:
 
 
 def read_bytes(path: Path | GivenText) -> bytes:
-    """Read a file as it is.
+    """Return the content of a file.
 
     :raises ExperimentError: the file is missing, is a directory, is too large or cannot be read.
     """
@@ -145,7 +144,7 @@ def read_bytes(path: Path | GivenText) -> bytes:
             raise refused(file, "this is a folder; name a file in it")
         if stat.S_ISCHR(kind) or stat.S_ISBLK(kind) or stat.S_ISSOCK(kind):
             raise refused(file, "this is a device; name a file")
-        # A pipe of the shell's has a writer; any other may wait for one for ever.
+        # A pipe of the shell has a writer; another might be awaited for ever.
         if stat.S_ISFIFO(kind) and not file.startswith(("/dev/", "/proc/")):
             raise refused(file, "this is a pipe; name a file")
         with path.open("rb") as stream:
@@ -171,7 +170,7 @@ def read_text(path: Path | GivenText) -> str:
 
 
 def utf8_text(content: bytes, file: str) -> str:
-    """The text of a UTF-8 file's content; ``file`` is named in messages.
+    """Return the text of a UTF-8 file's content; ``file`` is named in messages.
 
     :raises ExperimentError: it is not UTF-8, or has too long a line.
     """
@@ -191,8 +190,7 @@ def utf8_text(content: bytes, file: str) -> str:
 def parse_tree(text: str, file: str, minor: list[Message] | None = None) -> Node:
     """Read YAML text; ``file`` is named in messages.
 
-    Errors that leave a usable tree, such as a repeated key, are added to ``minor`` if it is
-    given.
+    ``minor``, if given, collects errors that leave a usable tree, such as a repeated key.
 
     :raises ExperimentError: as ``read_tree``.
 
@@ -203,15 +201,15 @@ def parse_tree(text: str, file: str, minor: list[Message] | None = None) -> Node
     control = NOT_PRINTABLE.search(text)
     if control is not None:
         before = text[: control.start()]
-        place = Mark(file, before.count("\n") + 1, len(before) - before.rfind("\n"))
+        location = Mark(file, before.count("\n") + 1, len(before) - before.rfind("\n"))
         builder.stop(
-            place, f"the control character U+{ord(control[0]):04X} is not allowed; remove it"
+            location, f"the control character U+{ord(control[0]):04X} is not allowed; remove it"
         )
     try:
         for event in yaml.parse(text, Loader=LOADER):
             builder.take(event)
     except yaml.MarkedYAMLError as error:
-        # Since 6.0.4, PyYAML refuses a thousand brackets in a line before it tells of the first.
+        # Since 6.0.4, PyYAML refuses a thousand brackets in a line before it yields the first.
         end = error.problem_mark
         if end is not None and "nesting depth" in str(error.problem):
             return parse_tree(text[: end.index], file)
@@ -231,7 +229,7 @@ def parse_tree(text: str, file: str, minor: list[Message] | None = None) -> Node
 
 
 def to_list(value: Any) -> Any:
-    """Plain data with lists for tuples."""
+    """Return plain data with lists for tuples."""
     if isinstance(value, abc.Mapping):
         return {key: to_list(item) for key, item in value.items()}
     return [to_list(item) for item in value] if isinstance(value, tuple | list) else value
@@ -247,7 +245,7 @@ def to_python(node: Node) -> Any:
 
 
 def child(node: Node | None, step: Step) -> Node | None:
-    """Return what stands under a key or an index, or None."""
+    """Return the node at a key or an index, or None."""
     if isinstance(node, Mapping) and isinstance(step, str):
         return node.items.get(step)
     if isinstance(node, Sequence) and isinstance(step, int) and 0 <= step < len(node.items):
@@ -264,10 +262,10 @@ def written(root: Node, *steps: Step) -> Node | None:
 
 
 def mark_of(root: Node, steps: Steps, of_key: bool = False) -> Mark:
-    """Return the place of a path, or of the nearest thing above it that exists.
+    """Return the location of a path, or of its nearest existing parent.
 
-    A block below its key is placed at the key, since its own first line says nothing about the
-    whole.
+    A block below its key is located at the key, since the block's first line is only its first
+    entry.
     """
     node, mark = root, root.mark
     for step in steps:
@@ -293,9 +291,9 @@ def walk(node: Node, steps: Steps = ()) -> Iterator[tuple[Steps, Node]]:
 
 
 def resolve_scalar(text: str) -> str | int | float | bool | None:
-    """Return what an unquoted scalar means in the core schema of YAML 1.2.
+    """Return the value of an unquoted scalar in the core schema of YAML 1.2.
 
-    :raises ValueError: a whole number too long to be one.
+    :raises ValueError: a whole number of more than 300 digits.
 
     >>> texts = ("1e-6", "yes", "010", "0o10", "12:30", "~", "-.inf", "TRUE")
     >>> [resolve_scalar(text) for text in texts]
@@ -324,7 +322,7 @@ def resolve_scalar(text: str) -> str | int | float | bool | None:
 
 @dataclass(eq=False)
 class _Open:
-    """A list or a mapping whose end has not been met yet."""
+    """A list or a mapping that has not ended yet."""
 
     mark: Mark
     anchor: str | None
@@ -340,7 +338,7 @@ class _Open:
 
 
 class _Builder:
-    """Puts YAML events together to nodes; collects what it refuses."""
+    """Builder of nodes from YAML events; collects refused ones."""
 
     def __init__(self, file: str) -> None:
         self.file = file
@@ -455,11 +453,11 @@ class _Builder:
                 mark,
                 f"the alias *{anchor} is inside the value that it refers to; write the value out",
             )
-        known = listing(f"&{name}" for name in self.anchors)
+        anchors = listing(f"&{name}" for name in self.anchors)
         self.refuse(
             mark,
             f"nothing is anchored as &{anchor}; "
-            + (f"known: {known}" if known else "write the value out"),
+            + (f"known: {anchors}" if anchors else "write the value out"),
         )
         self._add(Scalar(mark, "?"), None)
 

@@ -15,7 +15,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from ..inputs.own_code import own_array, own_frame, own_result, running_own_code, told
+from ..inputs.own_code import error_text, own_array, own_frame, own_result, running_own_code
 from ..inputs.quantities import with_quantities
 from ..inputs.settings import hint, listing
 from ..inputs.trust import Trust
@@ -228,7 +228,7 @@ def attempt(what: str, call: Callable[[], Result], key: str = "object") -> Resul
             return call()
     except (Exception, SystemExit) as error:
         # Without a place in the user's code, the call itself was wrong.
-        text = told(error, own_frame(error))
+        text = error_text(error, own_frame(error))
         raise CustomModelError(f"{what}: {text}", key) from error
 
 

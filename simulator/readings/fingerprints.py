@@ -1,4 +1,4 @@
-"""Fingerprints of readings, by which two campaigns are found to have some in common."""
+"""Fingerprints of readings, by which campaigns with common readings are detected."""
 
 from __future__ import annotations
 
@@ -14,9 +14,10 @@ DIGITS = 16
 
 
 def position_fingerprints(observed: ObservedReadings) -> dict[str, str]:
-    """Beginnings of the SHA-256 of what the readings of each position say, by its name: balls,
-    probes and scale readings, in whatever order and form tables have them, and whatever positions
-    are called.
+    """Return the beginning of the SHA-256 of each position's readings, by its name.
+
+    Hashed are balls, probes and scale readings, independently of the order and form of tables and
+    of the positions' names.
     """
     design, readings = observed.design, observed.design.readings
     balls = np.array(design.balls.names)[readings.ball]
@@ -24,16 +25,16 @@ def position_fingerprints(observed: ObservedReadings) -> dict[str, str]:
     order = np.lexsort((*observed.x.T[::-1], probes, balls, readings.position))
     position = readings.position[order]
     starts = np.flatnonzero(np.diff(position, prepend=-1)).tolist()
-    found = {}
+    fingerprints = {}
     for start, end in pairwise([*starts, len(order)]):
         rows = order[start:end]
         digest = hashlib.sha256("\n".join([*balls[rows], *probes[rows]]).encode())
         digest.update(np.ascontiguousarray(observed.x[rows], "<f8").tobytes())
-        found[design.positions.names[int(position[start])]] = digest.hexdigest()[:DIGITS]
-    return found
+        fingerprints[design.positions.names[int(position[start])]] = digest.hexdigest()[:DIGITS]
+    return fingerprints
 
 
 def fingerprint(observed: ObservedReadings) -> str:
-    """SHA-256 of what all readings say."""
+    """Return the SHA-256 of all readings."""
     parts = sorted(position_fingerprints(observed).values())
     return hashlib.sha256("\n".join(parts).encode()).hexdigest()

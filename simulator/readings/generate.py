@@ -1,4 +1,4 @@
-"""Synthetic readings of a stated true machine."""
+"""Synthetic readings of a true machine."""
 
 from __future__ import annotations
 
@@ -28,14 +28,12 @@ class NoReadingError(ValueError):
 
 
 def on_true_machine(design: Design, machine: TrueMachine) -> tuple[Design, State]:
-    """The design as drawn on the true machine, whose error model may be another than the
-    design's.
-    """
+    """Return the nominal design on the true machine, whose error model may be another."""
     return replace(design, model=machine.model), replace(nominal_state(design), a=machine.a)
 
 
 def scale_readings(model: ErrorModel, true: Array, a: Array, p: Array) -> Array:
-    """Scale readings x (m, d) with x + e(x, a, p) = `true`, exact to rounding.
+    """Return scale readings x (m, d) with x + e(x, a, p) = `true`, exact to rounding.
 
     :raises NoReadingError: the errors are too large for the iteration x <- true - e(x) to settle.
     """
@@ -58,15 +56,15 @@ def scale_readings(model: ErrorModel, true: Array, a: Array, p: Array) -> Array:
 def true_readings(
     design: Design, truth: State, readings: Readings, model: ErrorModel | None = None
 ) -> Array:
-    """Scale readings (m, d) without noise, of a true machine with another error model than the
-    design's if one is given.
+    """Return scale readings (m, d) without noise, of a true machine, whose error model is by
+    default the design's.
 
     :raises NoReadingError: as `scale_readings`.
     """
     model = model or design.model
     p, true = truth.probes[readings.probe], locations(design, truth, readings)
     x = scale_readings(model, true, truth.a, p)
-    # Each time what the scales say decides a ten-thousandth of the shift at the most.
+    # Scale readings determine at most a ten-thousandth of the shift: five passes reach rounding.
     for _ in range(5 if design.influences else 0):
         shift, _ = influence_shifts(design, truth, readings, x)
         x = scale_readings(model, true + shift, truth.a, p)
@@ -74,7 +72,7 @@ def true_readings(
 
 
 def exact_readings(design: Design, truth: State) -> tuple[Readings, Array]:
-    """Readings of a design, one row for each repeat, without noise: (rows, d) metres."""
+    """Return readings of a design, one row per repeat, without noise: (rows, d) metres."""
     readings = in_sequence(design.readings.expanded(), design.influences)
     return readings, true_readings(design, truth, readings)
 
@@ -82,59 +80,57 @@ def exact_readings(design: Design, truth: State) -> tuple[Readings, Array]:
 def noisy_readings(
     design: Design, truth: State, generator: np.random.Generator
 ) -> tuple[Readings, Array]:
-    """The same with noise of the readings' standard uncertainties added to each co-ordinate."""
+    """Return `exact_readings` with noise of the readings' standard uncertainties."""
     readings, x = exact_readings(design, truth)
     noise = design.noise.draw(generator, x.shape, readings.position, 0)
     return readings, x + noise * reading_uncertainties(design, readings)
 
 
 def true_influences(design: Design, generator: np.random.Generator) -> Array:
-    """True values (p,) of influence quantities, drawn from what is stated of them; of those that
-    are unknown, the stated values.
+    """Draw true values (p,) of influence quantities about the stated ones; unknown ones keep their
+    stated values.
     """
-    u = np.array([one.uncertainty for one in design.influence_parameters], float)
+    u = np.array([parameter.uncertainty for parameter in design.influence_parameters], float)
     errors = np.where(np.isfinite(u), u, 0.0) * generator.standard_normal(len(u))
     return np.asarray(design.influence_values + errors)
 
 
-# In one piece: random numbers are drawn in an order on which what a seed gives depends.
+# In one function, since the order in which random numbers are drawn determines a seed's values.
 def true_artefacts(design: Design, generator: np.random.Generator) -> Array:
-    """True balls (n, d) of artefacts whose certificates are the design's, each item wrong by its
-    uncertainty.
+    """Draw true balls (n, d) of artefacts, each certified item in error by its uncertainty.
 
-    Of all artefacts that differ so from their certificate, the nearest to the drawing; where there
-    are more certified items than can vary independently, as nearly as a real artefact can. The
-    length of a bar moves the second of its balls along the line between the two, that of a Bryan
-    gauge the places of its ball; lengths that share balls move these together. Lengths without
-    certificates are as drawn.
+    Of all artefacts that differ so from their certificate, this is the nearest to the nominal one;
+    more certified items than can vary independently are met by least squares. The length of a bar
+    moves its second ball along the line between its two, that of a Bryan gauge its ball; lengths
+    that share balls move these together. Artefacts without certificates are nominal.
     """
     balls = design.balls.places.copy()
-    known = [one for one in design.observations if one.balls.shape[1]]
-    rows = [one.rows(design, nominal_state(design), None) for one in known]
-    d, off = design.dimension, np.concatenate([np.zeros(0), *(one.residual for one in rows)])
+    certified = [kind for kind in design.observations if kind.balls.shape[1]]
+    rows = [kind.rows(design, nominal_state(design), None) for kind in certified]
+    d, off = design.dimension, np.concatenate([np.zeros(0), *(block.residual for block in rows)])
     sought = np.split(
-        generator.standard_normal(len(off)) - off, np.cumsum([len(one) for one in known])
+        generator.standard_normal(len(off)) - off, np.cumsum([len(kind) for kind in certified])
     )
-    # Balls that nothing ties to others vary along each axis by themselves, however many there are.
-    oblique = [one.balls[one.along < 0].ravel() for one in known]
+    # Balls without oblique items vary along each axis separately, which needs no large matrix.
+    oblique = [kind.balls[kind.along < 0].ravel() for kind in certified]
     ends = np.unique(np.concatenate([np.zeros(0, np.int64), *oblique]))
     among = np.zeros(len(balls), np.int64)
     among[ends] = np.arange(len(ends))
     pull, stiffness = np.zeros(balls.shape), np.zeros(balls.shape)
     together, sides = [np.zeros((0, d * len(ends)))], [np.zeros(0)]
-    for one, of_one, side in zip(known, rows, sought, strict=False):
-        alone = np.flatnonzero((one.along >= 0) & ~np.isin(one.balls[:, 0], ends))
-        place = one.balls[alone, 0], one.along[alone]
-        slope = of_one.by_ball[alone, 0, place[1]]
-        np.add.at(pull, place, slope * side[alone])
-        np.add.at(stiffness, place, slope**2)
-        others = np.setdiff1d(np.arange(len(one)), alone)
+    for kind, block, side in zip(certified, rows, sought, strict=False):
+        separate = np.flatnonzero((kind.along >= 0) & ~np.isin(kind.balls[:, 0], ends))
+        coordinate = kind.balls[separate, 0], kind.along[separate]
+        slope = block.by_ball[separate, 0, coordinate[1]]
+        np.add.at(pull, coordinate, slope * side[separate])
+        np.add.at(stiffness, coordinate, slope**2)
+        joint = np.setdiff1d(np.arange(len(kind)), separate)
         if len(ends):
-            columns = d * among[one.balls[others]][:, :, None] + np.arange(d)
-            together.append(np.zeros((len(others), d * len(ends))))
-            at = np.broadcast_to(np.arange(len(others))[:, None, None], columns.shape)
-            np.add.at(together[-1], (at, columns), of_one.by_ball[others])
-            sides.append(side[others])
+            columns = d * among[kind.balls[joint]][:, :, None] + np.arange(d)
+            together.append(np.zeros((len(joint), d * len(ends))))
+            row = np.broadcast_to(np.arange(len(joint))[:, None, None], columns.shape)
+            np.add.at(together[-1], (row, columns), block.by_ball[joint])
+            sides.append(side[joint])
     balls += np.divide(pull, stiffness, out=np.zeros(balls.shape), where=stiffness > 0)
     if len(ends):
         tied = np.concatenate(together)
@@ -142,47 +138,48 @@ def true_artefacts(design: Design, generator: np.random.Generator) -> Array:
         move = np.zeros(tied.shape[1])
         move[used] = np.linalg.lstsq(tied[:, used], np.concatenate(sides), rcond=None)[0]
         balls[ends] += move.reshape(-1, d)
-    given = design.of(Lengths)
-    given = given.select(given.is_known)
-    pivoted = given.select(given.to_pivot)
+    lengths = design.of(Lengths)
+    lengths = lengths.select(lengths.is_known)
+    pivoted = lengths.select(lengths.to_pivot)
     for certificate in np.unique(pivoted.certificate):
         k = int(np.flatnonzero(pivoted.certificate == certificate)[0])
-        own = design.balls.artefact == design.balls.artefact[design.readings.ball[pivoted.first[k]]]
+        gauge = design.balls.artefact[design.readings.ball[pivoted.first[k]]]
+        on_gauge = design.balls.artefact == gauge
         true = pivoted.value[k] + pivoted.uncertainty[k] * generator.standard_normal()
-        balls[own] *= true / np.sqrt((balls[own] ** 2).sum(axis=1))[:, None]
-    given = given.select(~given.to_pivot)
-    ends = np.stack([design.readings.ball[given.first], design.readings.ball[given.second]])
+        balls[on_gauge] *= true / np.sqrt((balls[on_gauge] ** 2).sum(axis=1))[:, None]
+    lengths = lengths.select(~lengths.to_pivot)
+    ends = np.stack([design.readings.ball[lengths.first], design.readings.ball[lengths.second]])
     pairs, first = np.unique(ends, axis=1, return_index=True)
     ball, times = np.unique(pairs, return_counts=True)
-    # Of artefacts whose lengths share balls.
+    # Lengths of artefacts whose lengths share balls.
     shared = np.isin(design.balls.artefact[pairs[0]], design.balls.artefact[ball[times > 1]])
     if shared.any():
-        of_shared = given.select(first[shared])
+        of_shared = lengths.select(first[shared])
         wanted = of_shared.value + of_shared.uncertainty * generator.standard_normal(len(of_shared))
         uncertainty = at_least_exact(of_shared.uncertainty)
         balls += _moved_by_lengths(balls, pairs[:, shared], wanted, uncertainty)
         pairs, first = pairs[:, ~shared], first[~shared]
-    for (one, other), k in zip(pairs.T.tolist(), first.tolist(), strict=True):
-        between = balls[other] - balls[one]
+    for (start, end), k in zip(pairs.T.tolist(), first.tolist(), strict=True):
+        between = balls[end] - balls[start]
         length = float(np.sqrt(between @ between))
-        true = given.value[k] + given.uncertainty[k] * generator.standard_normal()
-        balls[other] += between * (true / length - 1.0)
+        true = lengths.value[k] + lengths.uncertainty[k] * generator.standard_normal()
+        balls[end] += between * (true / length - 1.0)
     return balls
 
 
 def _moved_by_lengths(balls: Array, pairs: Integers, wanted: Array, uncertainty: Array) -> Array:
-    """The least displacements (n, d) of balls that bring the lengths of `pairs` (2, m) nearest to
-    those wanted (m,).
+    """Return the least displacements (n, d) of balls that bring the lengths of `pairs` (2, m)
+    nearest to those `wanted` (m,).
     """
-    ends, place = np.unique(pairs, return_inverse=True)
-    place = place.reshape(pairs.shape)
+    ends, index = np.unique(pairs, return_inverse=True)
+    index = index.reshape(pairs.shape)
     moved = np.zeros_like(balls)
     for _ in range(2):
         between = balls[pairs[0]] + moved[pairs[0]] - balls[pairs[1]] - moved[pairs[1]]
         length = np.sqrt((between**2).sum(axis=1))
         rows = np.zeros((len(wanted), len(ends), balls.shape[1]))
-        rows[np.arange(len(wanted)), place[0]] = between / (length * uncertainty)[:, None]
-        rows[np.arange(len(wanted)), place[1]] = -rows[np.arange(len(wanted)), place[0]]
+        rows[np.arange(len(wanted)), index[0]] = between / (length * uncertainty)[:, None]
+        rows[np.arange(len(wanted)), index[1]] = -rows[np.arange(len(wanted)), index[0]]
         step = np.linalg.lstsq(
             rows.reshape(len(wanted), -1), (wanted - length) / uncertainty, rcond=FLAT
         )[0]
@@ -193,13 +190,13 @@ def _moved_by_lengths(balls: Array, pairs: Integers, wanted: Array, uncertainty:
 def noisy_certificate(
     design: Design, truth: State, generator: np.random.Generator, model: ErrorModel | None = None
 ) -> Design:
-    """The design with calibration values, of length standards as well, and priors, drawn about
-    those of the truth.
+    """Return the design with values of calibrations, length standards and priors drawn about the
+    truth.
 
-    `model` is the error model of the true machine where it is not the design's.
+    `model` is the error model of the true machine, by default the design's.
     """
     drawn = []
-    for one in design.observations:
-        true = one.true_values(design, truth, model or design.model)
-        drawn.append(one.given(value=true + one.errors(generator, 1)[0]))
+    for kind in design.observations:
+        true = kind.true_values(design, truth, model or design.model)
+        drawn.append(kind.given(value=true + kind.errors(generator, 1)[0]))
     return design.observed(*drawn)

@@ -1,6 +1,4 @@
-"""Readings as observations of a design: each as it was read, but of length standards, whose
-repeats are taken together.
-"""
+"""Readings as observations of a design; repeats of length standards are averaged."""
 
 from __future__ import annotations
 
@@ -18,7 +16,7 @@ from ..inputs.settings import listing
 from ..inputs.yamltree import Mark
 from ..machines.protocol import Array, Integers
 
-# A gauge whose directions are no further from the planned ones than this (rad) has them.
+# Directions of a gauge within this (rad) of the planned ones are taken as planned.
 AS_PLANNED = 0.01
 
 
@@ -27,12 +25,11 @@ class ObservedReadings:
     """A design whose readings are those of a file, with their scale readings x (readings, d) in
     metres.
 
-    `missing` names planned readings that the file lacks, `unplanned` those in the file that the
-    design did not foresee. `marks` tell where each reading stands; of the mean of several, where
-    the first does. `told` is how tables were read, `redone` what was left out of them because it
-    was read again, and `of_offsets` what is doubtful about offsets of probes in them, and about
-    part co-ordinates that two positions have alike; `of_certificate` what is doubtful about values
-    of a certificate that came with them.
+    `missing` names planned readings that the file lacks, `unplanned` further readings of the file.
+    `marks` are the readings' locations, the first of averaged ones. `table_notes` describes the
+    reading of tables, and `redone` rows that later readings replace. `offset_doubts` are doubts
+    about probe offsets and equal part co-ordinates in tables, `certificate_doubts` about values of
+    a certificate.
     """
 
     design: Design
@@ -40,43 +37,39 @@ class ObservedReadings:
     missing: tuple[str, ...]
     unplanned: tuple[str, ...]
     marks: tuple[Mark, ...] = ()
-    told: tuple[str, ...] = ()
-    of_offsets: tuple[str, ...] = ()
-    of_certificate: tuple[str, ...] = ()
+    table_notes: tuple[str, ...] = ()
+    offset_doubts: tuple[str, ...] = ()
+    certificate_doubts: tuple[str, ...] = ()
     redone: tuple[str, ...] = ()
 
     @property
     def remarks(self) -> tuple[str, ...]:
-        """How tables that are no plain CSV files were read, and how far the readings are those that
-        were planned, in words; nothing where they are.
-        """
-        both = (("planned but not read", self.missing), ("read but not planned", self.unplanned))
-        differ = (f"{what} ({len(names)}): {listing(names)}" for what, names in both if names)
-        return (*self.told, *differ)
+        """Notes on tables that are no plain CSV files, and on unplanned and missing readings."""
+        lists = (("planned but not read", self.missing), ("read but not planned", self.unplanned))
+        notes = (f"{title} ({len(names)}): {listing(names)}" for title, names in lists if names)
+        return (*self.table_notes, *notes)
 
     @cached_property
     def doubts(self) -> tuple[str, ...]:
-        """What of them is possible, and unlikely to be meant: lengths, places, temperatures; or
-        that nobody looked.
-        """
+        """Warnings of possible but improbable readings, or that these were not checked."""
         try:
             checks = service("ReadingChecks")
         except MissingExtensionError as error:
-            found: tuple[str, ...] = (f"mistakes in readings were not looked for ({error})",)
+            doubts: tuple[str, ...] = (f"mistakes in readings were not looked for ({error})",)
         else:
-            found = checks.doubts_about_readings(self.design, self.x, self.marks)
-        return (*self.of_certificate, *self.of_offsets, *found)
+            doubts = checks.doubts_about_readings(self.design, self.x, self.marks)
+        return (*self.certificate_doubts, *self.offset_doubts, *doubts)
 
 
 def reading_keys(readings: Readings) -> list[tuple[int, int, int]]:
-    """Position, ball and probe of each reading."""
+    """Return position, ball and probe of each reading."""
     table = np.stack([readings.position, readings.ball, readings.probe], axis=1)
     return [(row[0], row[1], row[2]) for row in table.tolist()]
 
 
 def observe(design: Design, readings: Readings, x: Array) -> ObservedReadings:
-    """Readings of a design, one row for each repeat, with scale readings `x` (readings, d), as if a
-    file had them.
+    """Return readings of a design, one row per repeat, with scale readings `x` (readings, d), as if
+    read from a file.
     """
     return combine_standards(design, readings, x, (), (), ())
 
@@ -89,10 +82,10 @@ def combine_standards(
     unplanned: tuple[str, ...],
     marks: tuple[Mark, ...],
 ) -> ObservedReadings:
-    """Take the mean of what a length standard's repeats read, and let its lengths point to it.
+    """Average the repeats of each length standard, and connect its lengths to the means.
 
-    A length of which an end was not read drops out. Every reading of a Bryan gauge is a length of
-    its own, since its ball need not be where it was before.
+    A length with an unread end is omitted. Every reading of a Bryan gauge is a separate length,
+    since its ball may have moved.
     """
     on_plate = design.artefacts.is_plate[design.balls.artefact[readings.ball]]
     groups: dict[tuple[int, int, int], list[int]] = {}
@@ -107,11 +100,11 @@ def combine_standards(
     )
     first = np.array([members[0] for members in groups.values()], np.int64)
     repeats = np.array([len(members) for members in groups.values()], np.int64)
-    place = {key: len(plate) + i for i, key in enumerate(groups)}
+    row = {key: len(plate) + i for i, key in enumerate(groups)}
     planned = reading_keys(design.readings)
 
     def moved(old: Integers) -> Integers:
-        return np.array([place.get(planned[i], -1) for i in old], np.int64)
+        return np.array([row.get(planned[i], -1) for i in old], np.int64)
 
     ends = moved(design.of(Lengths).first), moved(design.of(Lengths).second)
     present = ~design.of(Lengths).to_pivot & (ends[0] >= 0) & (ends[1] >= 0)
@@ -125,7 +118,7 @@ def combine_standards(
     )
     if readings.uncertainty is not None:
         variance = readings.uncertainty**2
-        # The mean is a plain one, whatever the uncertainties of its parts.
+        # The mean is unweighted, regardless of the uncertainties.
         of_means = np.sqrt([variance[members].mean(axis=0) for members in groups.values()]).reshape(
             -1, x.shape[1]
         )
@@ -144,35 +137,36 @@ def combine_standards(
 def _with_radii(
     design: Design, lengths: Lengths, readings: Readings, x: Array, carried: Integers, start: int
 ) -> Lengths:
-    """Lengths with those of the readings `carried` of Bryan gauges added, which stand from `start`
-    on.
+    """Return lengths with those of the readings `carried` of Bryan gauges, in rows from `start`,
+    added.
 
     Their directions are those of the readings about the centre of a sphere; the nearest planned
-    ones, whatever their names, if all of a position are met, so that noise and errors do not seem
-    to tell what the plan leaves open.
+    ones, regardless of names, if all of a position agree with these, so that noise does not seem to
+    determine anything that the plan leaves undetermined.
     """
     from scipy.spatial import cKDTree
 
-    given = design.of(Lengths)
-    planned = np.flatnonzero(given.to_pivot)
-    # Of the same gauge all are alike.
-    of_gauge = design.balls.artefact[design.readings.ball[given.first[planned]]]
-    own = design.balls.artefact[readings.ball[carried]]
-    gauges, first = np.unique(of_gauge, return_index=True)
-    like = planned[first[np.searchsorted(gauges, own)]]
-    seen = x[carried] + design.probes.offsets[readings.probe[carried]]
-    direction = np.empty_like(seen)
+    radii = design.of(Lengths)
+    planned = np.flatnonzero(radii.to_pivot)
+    planned_gauge = design.balls.artefact[design.readings.ball[radii.first[planned]]]
+    gauge = design.balls.artefact[readings.ball[carried]]
+    # All planned radii of a gauge agree except in direction: its first serves as a template.
+    gauges, first = np.unique(planned_gauge, return_index=True)
+    template = planned[first[np.searchsorted(gauges, gauge)]]
+    points = x[carried] + design.probes.offsets[readings.probe[carried]]
+    direction = np.empty_like(points)
     for k in np.unique(readings.position[carried]):
         rows = readings.position[carried] == k
-        away = seen[rows] - fit_sphere(seen[rows], design.positions.origins[k])[0]
+        away = points[rows] - fit_sphere(points[rows], design.positions.origins[k])[0]
         direction[rows] = away / np.sqrt((away**2).sum(axis=1))[:, None]
-        drawn = given.direction[planned[of_gauge == own[rows][0]]]
-        nearest = drawn[cKDTree(drawn).query(direction[rows])[1]]
+        nominal = radii.direction[planned[planned_gauge == gauge[rows][0]]]
+        nearest = nominal[cKDTree(nominal).query(direction[rows])[1]]
         if np.abs(nearest - direction[rows]).max() < AS_PLANNED:
             direction[rows] = nearest
-    added = replace(given.select(like), first=start + np.arange(len(carried)), direction=direction)
-    both: dict[str, Any] = {
+    first_rows = start + np.arange(len(carried))
+    added = replace(radii.select(template), first=first_rows, direction=direction)
+    columns: dict[str, Any] = {
         name: None if values is None else np.concatenate([values, getattr(added, name)])
         for name, values in vars(lengths).items()
     }
-    return Lengths(**both)
+    return Lengths(**columns)

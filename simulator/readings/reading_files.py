@@ -1,6 +1,4 @@
-"""Readings as a CSV file: one row for each reading, lengths with their unit in the column's
-name.
-"""
+"""Readings as a CSV file: one row per reading, lengths with their unit in the column's name."""
 
 from __future__ import annotations
 
@@ -31,8 +29,8 @@ Thinning = Callable[[Sequence[FileRow], Design], tuple[tuple[FileRow, ...], tupl
 
 
 def reading_columns(design: Design, readings: Readings, x: Array) -> dict[str, list[Any]]:
-    """Readings in millimetres as the columns of their file: position, ball, probe, x_mm, y_mm and
-    z_mm, NaN where a co-ordinate is not read.
+    """Return readings as the columns of their file: position, ball, probe, x_mm, y_mm and z_mm, NaN
+    for unread co-ordinates.
     """
     names = {
         "position": [design.positions.names[k] for k in readings.position],
@@ -45,7 +43,7 @@ def reading_columns(design: Design, readings: Readings, x: Array) -> dict[str, l
 
 
 def write_readings(stream: TextIO, design: Design, readings: Readings, x: Array) -> None:
-    """Write the columns of readings with all digits, empty where a co-ordinate is not read."""
+    """Write the columns of readings with all digits; unread co-ordinates are empty."""
     writer = CsvWriter(stream)
     columns = reading_columns(design, readings, x)
     writer.writerow(list(columns))
@@ -53,7 +51,7 @@ def write_readings(stream: TextIO, design: Design, readings: Readings, x: Array)
         writer.writerow([*row[:3], *("" if v != v else repr(v) for v in row[3:])])
 
 
-# In one piece: what is refused, in which order, each before what relies on it.
+# In one function, since the order of its refusals matters: each precedes code that relies on it.
 def read_readings(
     source: Source | Sequence[Source],
     design: Design,
@@ -61,44 +59,44 @@ def read_readings(
     settings: ReadingsSettings | None = None,
     thinned: Thinning | None = None,
 ) -> ObservedReadings:
-    """Readings of a file, or of several, as observations of a design.
+    """Return readings of one or several files as observations of a design.
 
-    A plain CSV file has the columns position, ball, probe, x_mm, y_mm and z_mm; how other tables
-    are written is found, or said by the `settings`, which also tell what their co-ordinates are of.
-    The probe's column may be left out where there is one probe only. An optional column u, with a
-    unit as in u_um, states the standard uncertainty of each co-ordinate of a reading; without it a
-    reading has the uncertainty that the design plans for it, and one that is not planned the
-    machine's repeatability. Influence quantities have further columns. A reading stands in the file
-    no more often than the design plans it; one that is not planned, once. Unless `every_ball` has
-    to be read, some may be missing. `thinned` tells which rows count, and in words what was
-    left out, which is `redone`.
+    A plain CSV file has the columns position, ball, probe, x_mm, y_mm and z_mm; the layout of other
+    tables is detected, or stated by the `settings`, as are the points that co-ordinates refer to.
+    The column probe is optional for a single probe, as is a column u, with a unit as in u_um: the
+    standard uncertainty of each co-ordinate of a reading, by default that planned or, for an
+    unplanned reading, the machine's repeatability. Influence quantities have further columns. A
+    reading may occur as often as planned; an unplanned one, once. Without `every_ball`, some balls
+    may be unread. `thinned` selects rows and describes omitted ones (`redone`).
 
-    Whether readings can be of the ball that they name, and their co-ordinates of the stated kind,
-    the extension judges that reads other tables.
+    The extension that reads other tables also checks that readings belong to their balls and their
+    co-ordinates are of the stated type.
 
-    :raises ExperimentError: a wrong table, names that the design does not know, or readings that
-        cannot be of the ball they name; all of a kind at once.
-    :raises MissingExtensionError: what the settings ask for needs that extension.
+    :raises ExperimentError: an invalid table, names that the design lacks, or readings that cannot
+        be of the ball they name; all errors of one type at once.
+    :raises MissingExtensionError: the settings need that extension.
     """
-    d, asked = design.dimension, settings or no_settings()
+    d, settings = design.dimension, settings or no_settings()
+    stated_coordinates = settings.coordinates
     sources = [source] if isinstance(source, Path | GivenText) else list(source)
     messages: list[Message] = []
-    units = {name: one for kind in design.influences for name, one in kind.columns.items()}
+    units = {name: unit for kind in design.influences for name, unit in kind.columns.items()}
     empty = AXES[:d] if design.positions.across is not None else ()
 
     def is_possible(x: Array) -> bool:
-        return asked.coordinates == "part" or not design.machine.volume.far_outside(x).any()
+        return stated_coordinates == "part" or not design.machine.volume.far_outside(x).any()
 
-    found = source_rows(sources, design, asked, messages, is_possible, units, empty)
-    settings = found.settings
-    rows, redone = thinned(found.rows, design) if thinned else (found.rows, ())
+    table = source_rows(sources, design, settings, messages, is_possible, units, empty)
+    # Reports state some settings themselves.
+    settings = table.settings
+    rows, redone = thinned(table.rows, design) if thinned else (table.rows, ())
     index, unknown = _indices(rows, design)
     lengths = np.array([row.lengths for row in rows])
     has_uncertainty = not np.isnan(lengths[:, d]).all()
     if has_uncertainty:
         text = "a standard uncertainty must be above zero; correct it, or leave the column out"
-        wrong = [row.mark for row in rows if row.lengths[d] <= 0.0]
-        messages += [mark.message("", text) for mark in wrong[:MOST_MESSAGES]]
+        zero = [row.mark for row in rows if row.lengths[d] <= 0.0]
+        messages += [mark.message("", text) for mark in zero[:MOST_MESSAGES]]
     for k, name in enumerate(("standard uncertainty", *units), start=d):
         blank = np.isnan(lengths[:, k])
         if blank.any() and not blank.all():
@@ -106,23 +104,23 @@ def read_readings(
             without = [rows[i].mark for i in np.flatnonzero(blank)[:MOST_MESSAGES].tolist()]
             messages += [mark.message("", text) for mark in without]
     if messages or unknown:
-        hints = found.hints if unknown else ()
+        hints = table.hints if unknown else ()
         raise ExperimentError([*sorted([*messages, *unknown]), *hints])
-    given, stated = lengths[:, :d], lengths[:, d]
+    coordinates, stated_uncertainty = lengths[:, :d], lengths[:, d]
     beside = None
     if design.influences:
         beside = dict(zip(units, lengths[:, d + 1 :].T, strict=True))
     readings = Readings(index[:, 0], index[:, 1], index[:, 2], np.ones(len(rows), np.int64))
-    is_plain = settings.coordinates in (None, "scale readings")
-    x = given
-    if not is_plain or settings.compensation not in (None, "off", "on"):
-        kinds = service("ReadingChecks")
-        x = kinds.as_scale_readings(design, readings, given, settings, sources[0])
+    x = coordinates
+    are_scale_readings = settings.coordinates in (None, "scale readings")
+    if not are_scale_readings or settings.compensation not in (None, "off", "on"):
+        convert = service("ReadingChecks").as_scale_readings
+        x = convert(design, readings, coordinates, settings, sources[0])
     x = _where_not_read(rows, x, design, readings)
     if settings.coordinates != "part":
-        _refuse_far_outside(rows, x if empty else given, design)
+        _refuse_far_outside(rows, x if empty else coordinates, design)
     uncertainty = (
-        np.repeat(stated[:, None], d, axis=1)
+        np.repeat(stated_uncertainty[:, None], d, axis=1)
         if has_uncertainty
         else _planned_uncertainty(design, readings)
     )
@@ -140,14 +138,16 @@ def read_readings(
         raise refused(
             sources[0], f"no reading of the balls {names}; read each at least once", line=1
         )
-    told, doubt = (*found.told, *swapped), found.doubts
+    table_notes, doubt = (*table.notes, *swapped), table.doubts
     checks = optional_service("ReadingChecks")
     if checks is not None:
-        own = stated if has_uncertainty else None
-        doubt += checks.doubts_about_table(design, readings, given, own, settings, rows[0].mark)
-        told += checks.said_of(settings)
+        uncertainties = stated_uncertainty if has_uncertainty else None
+        doubt += checks.doubts_about_table(
+            design, readings, coordinates, uncertainties, settings, rows[0].mark
+        )
+        table_notes += checks.said_of(settings)
     observed = combine_standards(design, readings, x, missing, unplanned, marks)
-    observed = replace(observed, told=told, of_offsets=doubt, redone=redone)
+    observed = replace(observed, table_notes=table_notes, offset_doubts=doubt, redone=redone)
     if checks is not None:
         checks.refuse_gross_errors(observed.design, observed.x, observed.marks, settings)
     _refuse_repeated(rows, readings, design)
@@ -155,47 +155,59 @@ def read_readings(
 
 
 def _indices(rows: tuple[FileRow, ...], design: Design) -> tuple[Integers, list[Message]]:
-    """Indices (rows, 3) of ball, position and probe, and the messages about names unknown."""
+    """Return indices (rows, 3) of ball, position and probe, and messages about unknown names."""
     positions = {name: k for k, name in enumerate(design.positions.names)}
     probes = {name: k for k, name in enumerate(design.probes.names)}
     balls = [
         {design.balls.names[b]: int(b) for b in design.balls.of(artefact)}
         for artefact in range(len(design.artefacts.names))
     ]
-    # Rows of the same names, of which there are many, are looked up once.
-    places: dict[tuple[str, ...], tuple[int, int, int]] = {}
-    wrong: dict[tuple[str, ...], list[str]] = {}
+    # Equal names, which are frequent, are looked up once.
+    indices: dict[tuple[str, ...], tuple[int, int, int]] = {}
+    faults: dict[tuple[str, ...], list[str]] = {}
     index: list[tuple[int, int, int]] = []
     unknown: dict[str, list[FileRow]] = {}
     for row in rows:
         if len(unknown) >= MOST_MESSAGES:
             unknown.setdefault(MORE_ERRORS, []).append(row)
             break
-        if row.texts not in places:
+        if row.texts not in indices:
             position, ball, probe = row.texts
-            texts = wrong.setdefault(row.texts, [])
-            own: dict[str, int] = {}
+            texts = faults.setdefault(row.texts, [])
+            balls_of_plate: dict[str, int] = {}
             if position not in positions:
                 texts.append(f'unknown position "{position}"; {hint(position, positions)}')
             else:
-                own = balls[design.positions.artefact[positions[position]]]
-                texts += [] if ball in own else [f'unknown ball "{ball}"; {hint(ball, own)}']
+                balls_of_plate = balls[design.positions.artefact[positions[position]]]
+                texts += (
+                    []
+                    if ball in balls_of_plate
+                    else [f'unknown ball "{ball}"; {hint(ball, balls_of_plate)}']
+                )
                 texts += (
                     [] if probe in probes else [f'unknown probe "{probe}"; {hint(probe, probes)}']
                 )
-            places[row.texts] = own.get(ball, 0), positions.get(position, 0), probes.get(probe, 0)
-        for text in wrong[row.texts]:
+            indices[row.texts] = (
+                balls_of_plate.get(ball, 0),
+                positions.get(position, 0),
+                probes.get(probe, 0),
+            )
+        for text in faults[row.texts]:
             unknown.setdefault(text, []).append(row)
-        index.append(places[row.texts])
+        index.append(indices[row.texts])
     messages = []
-    for text, found in unknown.items():
-        more = f" (and in {number_of(len(found) - 1, 'line')} more)" if len(found) > 1 else ""
-        messages.append(found[0].mark.message("", text + more))
+    for text, rows_with_text in unknown.items():
+        more = (
+            f" (and in {number_of(len(rows_with_text) - 1, 'line')} more)"
+            if len(rows_with_text) > 1
+            else ""
+        )
+        messages.append(rows_with_text[0].mark.message("", text + more))
     return np.array(index, np.int64).reshape(-1, 3), messages
 
 
 def _refuse_far_outside(rows: tuple[FileRow, ...], x: Array, design: Design) -> None:
-    """Refuse readings far outside the volume: their unit is not what it says."""
+    """Refuse readings far outside the volume: their unit is wrongly stated."""
     messages: list[Message] = []
     for i, axis in np.argwhere(design.machine.volume.far_outside(x)).tolist():
         if len(messages) >= MOST_MESSAGES:
@@ -213,9 +225,9 @@ def _refuse_far_outside(rows: tuple[FileRow, ...], x: Array, design: Design) -> 
 def _where_not_read(
     rows: tuple[FileRow, ...], x: Array, design: Design, readings: Readings
 ) -> Array:
-    """Scale readings (n, d) with those of the drawing in place of co-ordinates that are not read.
+    """Return scale readings (n, d) with nominal ones for unread co-ordinates.
 
-    :raises ExperimentError: a co-ordinate is missing, or stands where it is not read.
+    :raises ExperimentError: a co-ordinate is missing, or present although unread.
     """
     is_read = measured(design, readings)
     messages: list[Message] = []
@@ -230,28 +242,26 @@ def _where_not_read(
         messages.append(rows[i].mark.message("", text))
     if messages:
         raise ExperimentError(messages)
-    drawn = expected_readings(design, nominal_state(design), readings)
-    return np.where(is_read, x, drawn)
+    nominal = expected_readings(design, nominal_state(design), readings)
+    return np.where(is_read, x, nominal)
 
 
 def _refuse_repeated(rows: tuple[FileRow, ...], readings: Readings, design: Design) -> None:
-    """Refuse readings that stand in the file more often than planned: a copied line counts as
-    knowledge otherwise.
-    """
+    # A copied line would count as further information.
     planned = Counter(reading_keys(design.readings.expanded()))
-    places: dict[tuple[int, int, int], list[FileRow]] = {}
+    rows_by_key: dict[tuple[int, int, int], list[FileRow]] = {}
     for key, row in zip(reading_keys(readings), rows, strict=True):
-        places.setdefault(key, []).append(row)
+        rows_by_key.setdefault(key, []).append(row)
     messages = []
-    for (position, ball, probe), found in places.items():
+    for (position, ball, probe), occurrences in rows_by_key.items():
         allowed = max(planned[position, ball, probe], 1)
-        # Some of each ball's, so that no ball is left out and no list is endless.
-        for row in found[allowed : allowed + 10]:
+        # At most ten per ball, so that every ball is named and the list stays short.
+        for row in occurrences[allowed : allowed + 10]:
             text = (
                 f'ball "{design.ball_label(ball)}" is repeated in position'
                 f' "{design.positions.names[position]}" with probe "{design.probes.names[probe]}"'
-                f" (first in line {found[0].mark.line}); remove the line, or state repeats:"
-                f" {len(found)} for that position in the experiment"
+                f" (first in line {occurrences[0].mark.line}); remove the line, or state repeats:"
+                f" {len(occurrences)} for that position in the experiment"
             )
             messages.append(row.mark.message("", text))
     if messages:
@@ -259,8 +269,10 @@ def _refuse_repeated(rows: tuple[FileRow, ...], readings: Readings, design: Desi
 
 
 def _planned_uncertainty(design: Design, readings: Readings) -> Array | None:
-    """Standard uncertainties (m, d) that the design plans for the readings, None where it plans
-    none in particular. Repeats that differ in them count in the order of their groups.
+    """Return the planned standard uncertainties (m, d) of readings; None if the plan has only the
+    machine's repeatability.
+
+    Repeats with different uncertainties are matched in the order of their groups.
     """
     if design.readings.uncertainty is None:
         return None
@@ -269,19 +281,19 @@ def _planned_uncertainty(design: Design, readings: Readings) -> Array | None:
     of_key: dict[tuple[int, int, int], list[Array]] = {}
     for key, u in zip(reading_keys(planned), planned.uncertainty, strict=True):
         of_key.setdefault(key, []).append(u)
-    read: Counter[tuple[int, int, int]] = Counter()
+    matched: Counter[tuple[int, int, int]] = Counter()
     uncertainties = []
     for key in reading_keys(readings):
-        stated = of_key.get(key, [design.machine.repeatability])
-        uncertainties.append(stated[min(read[key], len(stated) - 1)])
-        read[key] += 1
+        candidates = of_key.get(key, [design.machine.repeatability])
+        uncertainties.append(candidates[min(matched[key], len(candidates) - 1)])
+        matched[key] += 1
     return np.array(uncertainties)
 
 
 def _compare(
     design: Design, readings: Readings, marks: Sequence[Mark]
 ) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    planned, found = reading_keys(design.readings.expanded()), reading_keys(readings)
+    planned, actual = reading_keys(design.readings.expanded()), reading_keys(readings)
 
     def name(key: tuple[int, int, int]) -> str:
         position, ball, probe = key
@@ -290,19 +302,19 @@ def _compare(
             f" {design.probes.names[probe]}"
         )
 
-    def without(these: list[tuple[int, int, int]], others: list[tuple[int, int, int]]) -> list[int]:
-        left = Counter(others)
+    def without(keys: list[tuple[int, int, int]], matches: list[tuple[int, int, int]]) -> list[int]:
+        remaining = Counter(matches)
         surplus = []
-        for i, key in enumerate(these):
-            if left[key]:
-                left[key] -= 1
+        for i, key in enumerate(keys):
+            if remaining[key]:
+                remaining[key] -= 1
             else:
                 surplus.append(i)
         return surplus
 
-    missing = tuple(name(planned[i]) for i in without(planned, found))
+    missing = tuple(name(planned[i]) for i in without(planned, actual))
     several = len({mark.file for mark in marks}) > 1
-    where = [f"{mark.file}, " if several else "" for mark in marks]
+    files = [f"{mark.file}, " if several else "" for mark in marks]
     return missing, tuple(
-        f"{name(found[i])} ({where[i]}line {marks[i].line})" for i in without(found, planned)
+        f"{name(actual[i])} ({files[i]}line {marks[i].line})" for i in without(actual, planned)
     )

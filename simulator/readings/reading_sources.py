@@ -1,6 +1,6 @@
-"""Rows of readings from plain CSV files, one or several, with the names that the design has.
+"""Rows of readings from plain CSV files that use the design's names.
 
-Tables of any other form, reports, and names that differ are read by an extension.
+An extension reads other layouts, reports and other names.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ ROLES = ("position", "ball", "probe")
 
 @dataclass(frozen=True)
 class SourceText:
-    """A table of readings as text: its file or name, what it says, and its encoding."""
+    """A table of readings as text: its file or name, its content, and its encoding."""
 
     source: Source
     text: GivenText
@@ -38,30 +38,32 @@ class SourceText:
 
 @dataclass(frozen=True)
 class SourceRows:
-    """Rows of all tables; `told` is how they were read and what was matched, `hints` what to say
-    where names are not known, and `settings` those given, with what reports say of co-ordinates.
-    `doubts` are about names that were matched.
+    """Rows of all tables: `notes` describes how they were read and matched, `hints` help with
+    unknown names.
+
+    `settings` are those stated, with the co-ordinates that reports state; `doubts` concern matched
+    names.
     """
 
     rows: tuple[FileRow, ...]
-    told: tuple[str, ...]
+    notes: tuple[str, ...]
     settings: ReadingsSettings
     hints: tuple[Message, ...] = ()
     doubts: tuple[str, ...] = ()
 
 
 def source_text(source: Source, encoding: str | None = None) -> SourceText:
-    """The text of a table of readings.
+    """Return the text of a table of readings.
 
     :raises ExperimentError: it cannot be read, or is no text.
     """
     if isinstance(source, GivenText):
         return SourceText(source, source, "")
-    text, found = text_and_encoding(read_bytes(source), source, encoding)
+    text, encoding_used = text_and_encoding(read_bytes(source), source, encoding)
     # A report in XML may be a single line.
     if not text.lstrip().startswith("<"):
         refuse_long_lines(text, source)
-    return SourceText(source, GivenText(str(source), text.rstrip(END_OF_FILE)), found)
+    return SourceText(source, GivenText(str(source), text.rstrip(END_OF_FILE)), encoding_used)
 
 
 def source_rows(
@@ -73,12 +75,12 @@ def source_rows(
     units: Units,
     empty: Collection[str] = (),
 ) -> SourceRows:
-    """Rows of tables of readings: plain ones with the names of the design, or any others as far as
-    they can be matched.
+    """Return rows of tables of readings, plain ones with the names of the design or others that can
+    be matched.
 
-    Messages about rows of plain tables are added to `messages`, so that more can be said at once.
+    `messages` collects errors in rows of plain tables, to be reported with later ones.
 
-    :raises ExperimentError: a table that cannot be read, or names that could be several.
+    :raises ExperimentError: an unreadable table, or ambiguous names.
     """
     _refuse_named_twice(sources)
     tables = [source_text(source, settings.encoding) for source in sources]
@@ -89,23 +91,25 @@ def source_rows(
     }
     axes = AXIS_NAMES[: design.dimension]
     rows: list[FileRow] = []
-    wrong: list[Message] = []
-    others = [one for one in tables if not _has_own_columns(one, settings, axes, units)]
-    read = optional_service("OtherTables")
-    if not others:
-        for one in tables:
-            rows += plain_rows(one, names, axes, wrong, units, empty)
-        known = [set(of_role) for of_role in names.values()]
-        is_known = all(row.texts[k] in known[k] for row in rows for k in range(len(known)))
-        # Which names are not is told of all rows together.
-        if not wrong and (is_known or read is None):
+    errors: list[Message] = []
+    foreign = [table for table in tables if not _has_plain_columns(table, settings, axes, units)]
+    reader = optional_service("OtherTables")
+    if not foreign:
+        for table in tables:
+            rows += plain_rows(table, names, axes, errors, units, empty)
+        name_sets = [set(of_role) for of_role in names.values()]
+        # Without the extension, `read_readings` reports unknown names of all rows together.
+        if not errors and (
+            reader is None
+            or all(row.texts[k] in name_sets[k] for row in rows for k in range(len(name_sets)))
+        ):
             return SourceRows(tuple(rows), (), settings)
-    if read is None:
-        raise ExperimentError(wrong) if wrong else _not_plain(others[0])
-    found: SourceRows = read.of_sources(
+    if reader is None:
+        raise ExperimentError(errors) if errors else _not_plain(foreign[0])
+    matched: SourceRows = reader.of_sources(
         tables, design, settings, messages, is_possible, units, empty
     )
-    return found
+    return matched
 
 
 def named_rows(
@@ -115,28 +119,30 @@ def named_rows(
     dimension: int,
     empty: Collection[str] = (),
 ) -> tuple[FileRow, ...]:
-    """Rows of one table with the names that it has.
+    """Return rows of one table with the names in it.
 
     :raises ExperimentError: it cannot be read.
     """
     table, axes = source_text(source, settings.encoding), AXIS_NAMES[:dimension]
-    wrong: list[Message] = []
-    if _has_own_columns(table, settings, axes, {}):
-        rows = plain_rows(table, names, axes, wrong, {}, empty)
-        if not wrong:
+    errors: list[Message] = []
+    if _has_plain_columns(table, settings, axes, {}):
+        rows = plain_rows(table, names, axes, errors, {}, empty)
+        if not errors:
             return rows
     messages: list[Message] = []
-    read = optional_service("OtherTables")
-    if read is None:
-        raise ExperimentError(wrong) if wrong else _not_plain(table)
-    found = read.of_table(table, names, settings, messages, lambda x: False, dimension, {}, empty)
+    reader = optional_service("OtherTables")
+    if reader is None:
+        raise ExperimentError(errors) if errors else _not_plain(table)
+    result = reader.of_table(
+        table, names, settings, messages, lambda x: False, dimension, {}, empty
+    )
     if messages:
         raise ExperimentError(messages)
-    return tuple(found.rows)
+    return tuple(result.rows)
 
 
 def _not_plain(table: SourceText) -> ExperimentError:
-    """The error of a table that only an extension reads, which is not installed."""
+    """Return the error of a table that needs an extension."""
     text = (
         "these are not the columns of a plain table; other tables need the extension laboratory,"
         " which is not installed"
@@ -145,16 +151,16 @@ def _not_plain(table: SourceText) -> ExperimentError:
 
 
 def is_plain(table: SourceText, settings: ReadingsSettings, axes: Sequence[str]) -> bool:
-    """Whether a table may be a plain CSV file, of which nothing is stated."""
-    stated = (settings.columns, settings.separator, settings.decimal, settings.header)
-    is_read = table.encoding in ("", "UTF-8") and header_names(table.text) & set(axes)
-    return bool(is_read) and all(one is None for one in stated)
+    """Return whether a table may be a plain CSV file; stated columns or formats exclude it."""
+    layout = (settings.columns, settings.separator, settings.decimal, settings.header)
+    has_axes = table.encoding in ("", "UTF-8") and header_names(table.text) & set(axes)
+    return bool(has_axes) and all(choice is None for choice in layout)
 
 
-def _has_own_columns(
+def _has_plain_columns(
     table: SourceText, settings: ReadingsSettings, axes: Sequence[str], units: Units
 ) -> bool:
-    """Whether a table has the columns of a plain CSV file and no others."""
+    """Return whether a table has the columns of a plain CSV file and no others."""
     lengths = {*axes, "u", *units}
     return is_plain(table, settings, axes) and all(
         text in ROLES or ("_" in text and text.rpartition("_")[0] in lengths)
@@ -166,36 +172,32 @@ def plain_rows(
     table: SourceText,
     names: Mapping[str, Sequence[str]],
     axes: Sequence[str],
-    wrong: list[Message],
+    errors: list[Message],
     units: Units,
     empty: Collection[str] = (),
 ) -> tuple[FileRow, ...]:
-    """Rows of a plain CSV file; what is wrong with them is added to a list."""
-    # One probe need not be named.
+    """Return rows of a plain CSV file, and add its errors to a list."""
+    # A single probe need not be named.
     defaults = {"probe": names["probe"][0]} if len(names["probe"]) == 1 else {}
     further = ["u", *units]
     try:
         return tuple(
             read_table(
-                table.text, list(ROLES), axes, further, wrong, defaults, np.nan, units, empty
+                table.text, list(ROLES), axes, further, errors, defaults, np.nan, units, empty
             )
         )
     except ExperimentError as error:
-        wrong += [one for one in error.messages if one not in wrong]
+        errors += [message for message in error.messages if message not in errors]
         return ()
 
 
 def _refuse_named_twice(sources: Sequence[Source]) -> None:
-    """Refuse a file that is given more than once, by whatever paths.
-
-    :raises ExperimentError: one is.
-    """
-    seen: dict[Path, Path] = {}
+    first_names: dict[Path, Path] = {}
     for source in sources:
         if not isinstance(source, Path) or not source.is_file():
             continue
-        place = source.resolve()
-        if place in seen:
-            known = "" if seen[place] == source else f", as {seen[place]} as well"
-            raise refused(source, f"the file is named twice{known}; name it once")
-        seen[place] = source
+        target = source.resolve()
+        if target in first_names:
+            also = "" if first_names[target] == source else f", as {first_names[target]} as well"
+            raise refused(source, f"the file is named twice{also}; name it once")
+        first_names[target] = source

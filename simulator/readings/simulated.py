@@ -27,7 +27,7 @@ class Simulated:
     """Scale readings `x` (readings, d) in metres of the true artefacts on the true machine, `truth`
     on `model`.
 
-    `generator` goes on where the readings have ended; None where there is no noise.
+    `generator` continues after the readings; None without noise.
     """
 
     design: Design
@@ -40,26 +40,24 @@ class Simulated:
 
 
 def on_stated_machine(experiment: Experiment, design: Design) -> tuple[Design, State]:
-    """A design of an experiment as drawn on the true machine that its file states."""
+    """Return an experiment's nominal design on the true machine that its file states."""
     machine = true_machine(experiment.true_machine, design.model, *design.machine.volume.corners)
     return on_true_machine(design, machine)
 
 
 def too_large(experiment: Experiment, error: Exception) -> ExperimentError:
-    """That there are no readings, or no fit of them, with such a true machine."""
+    """Return the error of a true machine whose errors prevent readings or a fit."""
     return experiment.refused(("true_machine",), f"{error}; state smaller ones")
 
 
 def simulated_readings(
     experiment: Experiment, seed: int | None = None, exact: bool = False
 ) -> Simulated:
-    """Readings that the true machine gives of artefacts that differ from their certificates as
-    stated, with noise.
+    """Return noisy readings of the true machine, of artefacts that differ from their certificates.
 
-    `seed` replaces that of the experiment. `exact` leaves all noise out, and artefacts are as
-    drawn.
+    `seed` replaces that of the experiment. `exact` omits all noise and uses nominal artefacts.
 
-    :raises ExperimentError: the true machine's errors are so large that there is no reading.
+    :raises ExperimentError: the true machine's errors are too large for a reading to exist.
     """
     design = lay_out(experiment)
     on_truth, truth = on_stated_machine(experiment, design)

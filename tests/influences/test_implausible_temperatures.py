@@ -80,6 +80,6 @@ def test_a_column_of_temperatures_that_is_not_used_is_told_what_uses_it(tmp_path
     path = tmp_path / "readings.csv"
     for name, is_told in (("remark", False), ("temperature_artefact_degC", True)):
         table.assign(**{name: 21.5}).to_csv(path, index=False)
-        said = " ".join(bp.fit(experiment, path).observed.told)
+        said = " ".join(bp.fit(experiment, path).observed.table_notes)
         assert f'not used: "{name}"' in said
         assert ("kind: temperature" in said) == is_told

@@ -161,7 +161,7 @@ class NextStep(Result):
     def notes(self) -> tuple[str, ...]:
         cautions = () if self.fit is None else (self.fit.untested,)
         doubts = (f"warning: {one}" for one in (*self.observed.doubts, *cautions) if one)
-        return (*self.observed.told, *doubts)
+        return (*self.observed.table_notes, *doubts)
 
     def data(self) -> dict[str, Any]:
         fit = self.fit
