@@ -133,7 +133,7 @@ class AlternativeFit(FitResult):
             "rank_deficiency": self.solution.deficiency,
             "iterations": [picked(it, "step", "sum_of_squares") for it in self.solution.iterations],
             "estimates": by_name(self.estimates, "value", "unit"),
-            **self.said(),
+            **self.notes_data(),
         }
 
     def columns(self) -> tuple[Columns, Sequence[Any]]:

@@ -128,7 +128,7 @@ class LengthFit(FitResult):
             "pivots": dict(self.pivots),
             "spheres": dict(self.spheres),
             "lengths": dict(self.lengths),
-            **self.said(),
+            **self.notes_data(),
         }
 
     def columns(self) -> tuple[Columns, Sequence[Any]]:

@@ -184,7 +184,7 @@ class ReversalFit(FitResult):
                 "relation": by_name(self.redundant, *FIGURES),
                 **self.full.to_dict(),
             },
-            **self.said(),
+            **self.notes_data(),
         }
 
     def columns(self) -> tuple[Columns, Sequence[Any]]:

@@ -1,4 +1,4 @@
-"""Figures that show themselves in a notebook, whatever has been set up there for drawing."""
+"""Figures that show themselves in a notebook with their own drawing parameters."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ from matplotlib.figure import Figure
 
 
 class Picture(Figure):
-    """A figure of `settings` of its own; the words for those who do not see it are its label."""
+    """A figure with its own `settings`; its label is the alternative text."""
 
     settings: Any
 
     def _repr_png_(self) -> bytes:
-        found = io.BytesIO()
+        stream = io.BytesIO()
         with matplotlib.rc_context(self.settings):
-            self.savefig(found, format="png", facecolor="white", dpi=144)
-        return found.getvalue()
+            self.savefig(stream, format="png", facecolor="white", dpi=144)
+        return stream.getvalue()

@@ -1,4 +1,4 @@
-"""Files that are written: each is put in its place as a whole, and several together or none."""
+"""Atomic writing of files: each as a whole, several together or none."""
 
 from __future__ import annotations
 
@@ -13,17 +13,17 @@ from functools import partial
 from pathlib import Path
 
 Writer = Callable[[Path], object]
-"""Writes a file of the kind that the path's name ends in."""
+"""A function that writes the file of a path, in the format of the name's suffix."""
 
 
 class UnwrittenError(OSError):
-    """A file cannot be written; the cause says why."""
+    """A file cannot be written; the cause has the reason."""
 
 
 def write_file(path: str | Path, content: bytes) -> None:
     """Write a file as a whole.
 
-    :raises OSError: it cannot be written; where its folder is missing the text says so.
+    :raises OSError: it cannot be written; the text names a missing folder.
 
     >>> from tempfile import TemporaryDirectory
     >>> with TemporaryDirectory() as folder:
@@ -31,7 +31,7 @@ def write_file(path: str | Path, content: bytes) -> None:
     ...     Path(folder, "page.html").read_bytes()
     b'<p>'
     """
-    # Loads numpy, which the commands do only when interruptions are answered.
+    # Imported late: it loads numpy, and a command answers interruptions first.
     from ballplate.simulator.inputs.arguments import ensure_path
 
     ensure_path("path", path)
@@ -47,15 +47,14 @@ def write_files(
     force: bool,
     held: Callable[[], AbstractContextManager[None]] = nullcontext,
 ) -> None:
-    """Let each writer write its file, all of them or, as far as the system allows, none.
+    """Let each writer write its file: all of them or, if the system permits, none.
 
-    Each is written beside its place under another name and put there only when all have been
-    written to the disk, with the permissions of the file that was there before. A link stays one:
-    what it leads to is replaced. Devices and pipes are written as they are. Without `force` no file
-    is put in the place of another that has come meanwhile. `held` keeps signals back while files
-    are put into their places or taken away.
+    Each is written to a temporary name in the same folder, with the permissions of the existing
+    file, and renamed when all are on the disk. Links stay: their targets are replaced. Devices and
+    pipes are written directly. Without `force` no existing file is replaced, even one created
+    meanwhile. `held` blocks signals while files are renamed or removed.
 
-    :raises UnwrittenError: one of them cannot be written, or what it needs is not installed.
+    :raises UnwrittenError: one cannot be written, or a library that it needs is not installed.
     """
     temporaries: dict[Path, Path] = {}
     path = Path()
@@ -69,9 +68,9 @@ def write_files(
         for path, writer in writers.items():
             if is_device(path):
                 _write_device(path, writer)
-        with held(), _exchange(force, len(temporaries) > 1) as put:
+        with held(), _exchange(force, len(temporaries) > 1) as replace:
             for path, temporary in temporaries.items():
-                put(temporary, real(path))
+                replace(temporary, real(path))
     except (OSError, UnicodeEncodeError, ImportError) as error:
         why = getattr(error, "strerror", None) or str(error)
         raise UnwrittenError(getattr(error, "errno", None), why, str(path)) from error
@@ -81,7 +80,7 @@ def write_files(
 
 
 def status_of(path: Path) -> os.stat_result | None:
-    """What there is, None where that cannot be told."""
+    """Return the status of a path, or None."""
     try:
         return path.stat()
     except (OSError, ValueError):
@@ -89,37 +88,35 @@ def status_of(path: Path) -> os.stat_result | None:
 
 
 def real(path: Path) -> Path:
-    """Where a path leads to by its links."""
+    """Return the target of a path's links."""
     return Path(os.path.realpath(path))
 
 
 def is_device(path: Path) -> bool:
-    """Whether it is a device or a pipe, of which no file can take the place."""
+    """Return whether a path is a device or a pipe, which no file can replace."""
     status = status_of(path)
     return status is not None and not (stat.S_ISREG(status.st_mode) or stat.S_ISDIR(status.st_mode))
 
 
 def beside(target: Path) -> Path:
-    """A name that no other file has, beside one, for a content of the same kind."""
+    """Return a new temporary name in the folder of a file, with its suffix."""
     return target.with_name(f".ballplate-{os.urandom(8).hex()}{target.suffix.lower()}")
 
 
 def make(path: Path) -> None:
-    """Make a new file with the permissions that new files have."""
+    """Create a file with default permissions."""
     os.close(os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o666))
 
 
 def _settle(temporary: Path, target: Path) -> None:
-    """Give a finished file the permissions of the one whose place it takes, and have all of it on
-    the disk.
-    """
+    """Flush a finished file to the disk, with the permissions of the file that it will replace."""
     with temporary.open("r+b") as stream:
         os.fsync(stream.fileno())
     before = status_of(target)
     if before is None:
         return
     if hasattr(os, "chown"):
-        # Of root, who may give files away; others own what they write.
+        # Only root may change the owner.
         with suppress(OSError):
             os.chown(temporary, before.st_uid, before.st_gid)
     temporary.chmod(stat.S_IMODE(before.st_mode))
@@ -133,33 +130,33 @@ def _remove(paths: Iterable[Path]) -> None:
 
 @contextmanager
 def _exchange(force: bool, are_several: bool) -> Iterator[Callable[[Path, Path], None]]:
-    """Put files in the places of others; if one cannot be put, those before it go back."""
+    """Yield a function that replaces files; if it fails, restore those replaced before."""
     with ExitStack() as names, ExitStack() as back:
 
-        def put(temporary: Path, target: Path) -> None:
+        def replace(temporary: Path, target: Path) -> None:
             undo: Callable[[], object] = partial(target.unlink, missing_ok=True)
             if force and status_of(target) is not None:
-                kept = beside(target)
-                undo = partial(os.replace, kept, target)
+                backup = beside(target)
+                undo = partial(os.replace, backup, target)
                 try:
                     if are_several:
-                        os.link(target, kept)
-                        names.callback(_remove, [kept])
+                        os.link(target, backup)
+                        names.callback(_remove, [backup])
                 except (OSError, NotImplementedError):
-                    # On disks without hard links the file that was there cannot come back.
+                    # Without hard links the former file cannot be restored.
                     undo = nullcontext
-            _put(temporary, target, force)
+            _replace(temporary, target, force)
             if are_several:
                 back.callback(undo)
 
-        yield put
+        yield replace
         back.pop_all()
 
 
-def _put(temporary: Path, target: Path, force: bool) -> None:
+def _replace(temporary: Path, target: Path, force: bool) -> None:
     if not force:
         try:
-            # Unlike a change of name this never takes the place of another file.
+            # Unlike a renaming, a link never replaces another file.
             os.link(temporary, target)
         except FileExistsError:
             raise
@@ -175,7 +172,7 @@ def _put(temporary: Path, target: Path, force: bool) -> None:
 
 
 def _write_device(path: Path, writer: Writer) -> None:
-    """Write a device or pipe: what is drawn may need a file in which one can go back."""
+    # Drawings need a file that can be rewound, which a device or pipe cannot.
     with tempfile.TemporaryDirectory(prefix="ballplate-") as folder:
         whole = Path(folder, f"whole{path.suffix.lower()}")
         writer(whole)

@@ -17,7 +17,7 @@ WIDTH = 120
 
 
 def as_text(title: str, tables: Sequence[Table]) -> str:
-    """Tables for reading as they are."""
+    """Return tables as aligned text."""
     parts = [title]
     for table in tables:
         parts += ["", f"{table.caption}", *_text_rows(table)]
@@ -48,7 +48,7 @@ def _text_rows(table: Table) -> list[str]:
 
 
 def as_markdown(title: str, tables: Sequence[Table]) -> str:
-    """Tables as GitHub and Pandoc read them."""
+    """Return tables in the Markdown of GitHub and Pandoc."""
     parts = [f"# {_markdown(title)}"]
     for table in tables:
         parts += ["", f"## {_markdown(table.caption)}"]
@@ -69,7 +69,7 @@ def _markdown_row(texts: Sequence[str]) -> str:
 
 
 def _markdown(text: str) -> str:
-    r"""Text whose characters mean nothing but themselves.
+    r"""Return text with Markdown's special characters escaped.
 
     >>> _markdown("a|b *c* <d>")
     'a\\|b \\*c\\* \\<d\\>'
@@ -78,7 +78,7 @@ def _markdown(text: str) -> str:
 
 
 def as_html(title: str, tables: Sequence[Table]) -> str:
-    """Tables as elements of a page, with a title in front."""
+    """Return tables as HTML elements, below a title."""
     parts = [f"<p><strong>{escape(title)}</strong></p>"] if title else []
     for table in tables:
         head = [*table.headings, *table.spanned]
@@ -97,9 +97,8 @@ def as_html(title: str, tables: Sequence[Table]) -> str:
     return "\n".join(parts) + "\n"
 
 
-def _html_row(texts: Sequence[str], element: str, left: int) -> str:
-    """A row whose first cells are aligned to the left, the others to the right."""
-    sides = ["left"] * left + ["right"] * (len(texts) - left)
+def _html_row(texts: Sequence[str], element: str, stubs: int) -> str:
+    sides = ["left"] * stubs + ["right"] * (len(texts) - stubs)
     cells = (
         f'<{element} style="text-align: {side}">{escape(text)}</{element}>'
         for text, side in zip(texts, sides, strict=True)
@@ -108,11 +107,11 @@ def _html_row(texts: Sequence[str], element: str, left: int) -> str:
 
 
 def as_csv(title: str, tables: Sequence[Table]) -> str:
-    """Tables with an empty line between them, each with a line of headings; blocks are a column."""
+    """Return tables separated by empty lines, each with a line of headings; blocks are a column."""
     parts = []
     for table in tables:
-        found = io.StringIO()
-        writer = CsvWriter(found)
+        stream = io.StringIO()
+        writer = CsvWriter(stream)
         first = [table.block] if table.block else []
         headings = [heading or "figure" for heading in table.headings]
         writer.writerow([*first, *map(ascii_units, [*headings, *table.spanned])])
@@ -122,12 +121,12 @@ def as_csv(title: str, tables: Sequence[Table]) -> str:
                 [*label, *map(ascii_units, row.headings), *(e.text for e in row.entries)]
                 for row in block.rows
             )
-        parts.append(found.getvalue())
+        parts.append(stream.getvalue())
     return "\n".join(parts)
 
 
 def as_latex(title: str, tables: Sequence[Table]) -> str:
-    """A table environment for each table, without any package."""
+    """Return a table environment for each table, without any package."""
     parts = [f"% {' '.join(title.split())}"]
     for table in tables:
         stubs, count = len(table.headings), len(table.columns)
@@ -175,7 +174,7 @@ LATEX = {
 
 
 def _latex(text: str) -> str:
-    r"""Text whose characters mean nothing but themselves, units of micrometres as they are printed.
+    r"""Return text with LaTeX's special characters escaped, and micrometres in math mode.
 
     >>> _latex("50 % of a_b, um")
     '50 \\% of a\\_b, $\\mu$m'

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from ballplate.simulator.computing.rounding import printable
 
-# Small lengths and angles are shown in these; the factor takes metres and radians there.
+# Unit of small values → unit in which tables show them, 1e-6 as large.
 SHOWN = {
     "m": "µm",
     "rad": "µrad",
@@ -24,7 +24,7 @@ SHOWN = {
 
 
 def amount_of(value: float, unit: str) -> tuple[float, str]:
-    """A small value with the unit it reads well in.
+    """Return a small value with its unit in tables.
 
     >>> amount_of(0.02, "K")
     (20.0, 'mK')
@@ -33,7 +33,7 @@ def amount_of(value: float, unit: str) -> tuple[float, str]:
 
 
 def unit_of(unit: str) -> str:
-    """The unit in which `amount_of` shows values of a unit.
+    """Return the unit in which `amount_of` shows values of a unit.
 
     >>> unit_of("m"), unit_of("K")
     ('µm', 'mK')
@@ -42,7 +42,7 @@ def unit_of(unit: str) -> str:
 
 
 def shown_unit(unit: str) -> str:
-    """Unit in which tables show values of a unit.
+    """Return the unit in which tables show values of a unit.
 
     >>> shown_unit("m, rad")
     'µm, µrad'
@@ -51,7 +51,7 @@ def shown_unit(unit: str) -> str:
 
 
 def micro(text: str) -> str:
-    """Units of micrometres as they are printed.
+    """Return text with µ in units of micrometres and microradians.
 
     >>> micro("U2 maximum, um or urad"), micro("um")
     ('U2 maximum, µm or µrad', 'µm')
@@ -60,7 +60,7 @@ def micro(text: str) -> str:
 
 
 def ascii_units(text: str) -> str:
-    """Units as programs read them.
+    """Return text with u for µ in units, as programs read them.
 
     >>> ascii_units("U4 average, µm"), ascii_units("µm or µrad"), ascii_units("at 0.5 µm")
     ('U4 average, um', 'um or urad', 'at 0.5 µm')
@@ -69,7 +69,7 @@ def ascii_units(text: str) -> str:
 
 
 def number(value: float, digits: int = 4) -> str:
-    """A number with significant digits, and a dash for what is undetermined.
+    """Return a number with significant digits, or a dash for NaN.
 
     >>> number(0.123456), number(12345.678), number(float("nan"))
     ('0.1235', '12350', '-')
@@ -87,7 +87,7 @@ def number(value: float, digits: int = 4) -> str:
 
 
 def fixed(value: float, decimals: int) -> str:
-    """A number with so many decimals; what rounds to zero has no sign.
+    """Return a number with `decimals` decimals; zero has no sign.
 
     >>> fixed(-1e-9, 2), fixed(1.005e3, 1)
     ('0.00', '1005.0')
@@ -96,7 +96,7 @@ def fixed(value: float, decimals: int) -> str:
 
 
 def percent(share: float) -> str:
-    """A share in words, never rounded up.
+    """Return a share as text, never rounded up.
 
     >>> percent(0.99999), percent(0.125)
     ('99.99 %', '12.5 %')
@@ -105,7 +105,7 @@ def percent(share: float) -> str:
 
 
 def uncertainty_words(coverage_factor: float) -> str:
-    """The uncertainty that a target is compared with.
+    """Return the name of the uncertainty that a target is compared with.
 
     >>> uncertainty_words(1.0), uncertainty_words(2.0)
     ('standard uncertainty u', 'expanded uncertainty U = 2 u')
@@ -118,7 +118,7 @@ def uncertainty_words(coverage_factor: float) -> str:
 
 
 def to_uncertainty(value: float, uncertainty: float) -> str:
-    """A value to the third digit of its standard uncertainty, zero without a sign.
+    """Return a value to the third digit of its standard uncertainty; zero has no sign.
 
     >>> to_uncertainty(50000.2134, 0.169), to_uncertainty(-0.0421495, 0.597)
     ('50000.213', '-0.042')
@@ -133,7 +133,7 @@ def to_uncertainty(value: float, uncertainty: float) -> str:
 
 
 def aligned(rows: Sequence[Sequence[str]], right: Sequence[bool]) -> list[str]:
-    """Rows of cells as lines of text with aligned columns.
+    """Return rows of cells as lines of text with aligned columns.
 
     >>> aligned([["a", "1"], ["bb", "22"]], [False, True])
     ['a    1', 'bb  22']
@@ -150,19 +150,18 @@ def aligned(rows: Sequence[Sequence[str]], right: Sequence[bool]) -> list[str]:
 
 
 def finite(value: float) -> float | None:
-    """A value as JSON can have it; None for what is undetermined."""
+    """Return a value for JSON: None for NaN and infinity."""
     return value if math.isfinite(value) else None
 
 
 def as_data(value: Any) -> Any:
-    """A result as JSON can have it: objects by their fields, arrays and tuples as lists, and None
-    for what is undetermined.
+    """Return a result for JSON: objects as mappings of fields, arrays as lists, NaN as None.
 
     >>> as_data({"u": (0.5, math.nan)})
     {'u': [0.5, None]}
     """
     if is_dataclass(value):
-        value = {one.name: getattr(value, one.name) for one in fields(value)}
+        value = {field.name: getattr(value, field.name) for field in fields(value)}
     if hasattr(value, "tolist"):
         value = value.tolist()
     if isinstance(value, dict):
@@ -173,7 +172,7 @@ def as_data(value: Any) -> Any:
 
 
 def records(**columns: Any) -> list[dict[str, Any]]:
-    """Columns of the same length as a mapping for each row.
+    """Return columns of equal length as one mapping per row.
 
     >>> records(x=(1, 2), y="ab")
     [{'x': 1, 'y': 'a'}, {'x': 2, 'y': 'b'}]
@@ -182,19 +181,19 @@ def records(**columns: Any) -> list[dict[str, Any]]:
 
 
 def csv_lines(heads: Iterable[str], *columns: np.ndarray) -> Iterator[str]:
-    """Numbers (m,) or (m, k) as lines of CSV with twelve digits; what is undetermined is empty."""
+    """Yield numbers (m,) or (m, k) as lines of CSV with twelve digits; NaN is empty."""
     yield ",".join(heads)
     for row in np.column_stack(columns).tolist():
         yield ",".join("" if value != value else f"{value + 0.0:.12g}" for value in row)
 
 
 def by_name(items: Iterable[Any], *names: str) -> dict[str, dict[str, Any]]:
-    """Some attributes of objects, by the names of these."""
-    return {one.name: picked(one, *names) for one in items}
+    """Return some attributes of objects, by the objects' names."""
+    return {item.name: picked(item, *names) for item in items}
 
 
 def given(**values: Any) -> dict[str, Any]:
-    """Values that are neither empty nor missing.
+    """Return the values that are not empty.
 
     >>> given(tasks=[], title="plate")
     {'title': 'plate'}
@@ -203,7 +202,7 @@ def given(**values: Any) -> dict[str, Any]:
 
 
 def picked(source: object, *names: str) -> dict[str, Any]:
-    """Some attributes of an object by their names.
+    """Return some attributes of an object by their names.
 
     >>> picked(1 + 2j, "real", "imag")
     {'real': 1.0, 'imag': 2.0}

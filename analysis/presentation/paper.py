@@ -1,4 +1,4 @@
-"""Small parts of drawings that are written as SVG within a page."""
+"""Elements of SVG drawings within a page."""
 
 from __future__ import annotations
 
@@ -10,20 +10,20 @@ from ballplate.simulator.machines.protocol import Array
 
 
 def escaped(text: str) -> str:
-    """A text within a page, in one line."""
+    """Return a text for HTML, in one line."""
     return escape(in_one_line(text))
 
 
 def pitch(points: Array) -> float:
-    """The least distance between points, of the first few hundred."""
-    some = points[:400]
-    apart = np.linalg.norm(some[:, None] - some[None], axis=2)
-    apart = apart[apart > 1e-9]
-    return float(apart.min()) if len(apart) else 1.0
+    """Return the least distance between the first few hundred points."""
+    sample = points[:400]
+    distances = np.linalg.norm(sample[:, None] - sample[None], axis=2)
+    distances = distances[distances > 1e-9]
+    return float(distances.min()) if len(distances) else 1.0
 
 
 def on_paper(points: Array, lower: Array, scale: float, margin: float, height: float) -> Array:
-    """Where points (n, 2) are in a drawing of a height, whose second axis runs downwards, with the
+    """Return points (n, 2) in a drawing of a `height`, whose second axis runs downwards, with the
     corner `lower` (2,) at its margins.
     """
     moved = scale * (points - lower)

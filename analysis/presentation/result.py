@@ -1,4 +1,4 @@
-"""Results that show themselves: as text, as plain data, as a data frame, and in a notebook."""
+"""Results that show themselves as text, plain data, data frames and in notebooks."""
 
 from __future__ import annotations
 
@@ -20,14 +20,12 @@ if TYPE_CHECKING:
     from ballplate.simulator.readings.observed_readings import ObservedReadings
     from matplotlib.figure import Figure
 
-# Of a table in a notebook.
+# Rows of a table in a notebook.
 MOST_ROWS_SHOWN = 60
 
 
 class Result:
-    """A result with a label and a title. Numbers in data and frames are in metres, radians and
-    ratios.
-    """
+    """A result with a label and a title; data and frames are in metres, radians and ratios."""
 
     if TYPE_CHECKING:
 
@@ -46,13 +44,11 @@ class Result:
         raise NotImplementedError
 
     def data(self) -> dict[str, Any]:
-        """The content of `to_dict`, of any objects; what is undetermined may be NaN."""
+        """The content of `to_dict`, of any objects; NaN if undetermined."""
         raise NotImplementedError
 
     def to_dict(self) -> dict[str, Any]:
-        """The result as plain data, as the command's --json prints it; what is undetermined is
-        None.
-        """
+        """The result as plain data, as the command's --json prints it; None if undetermined."""
         return dict(as_data(self.data()))
 
     @property
@@ -67,37 +63,37 @@ class Result:
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """What a user of the result has to know."""
+        """Warnings for users of the result."""
         return ()
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """What is to be said beside tables: remarks, warnings, why it is not as expected."""
+        """Notes below tables: remarks, warnings, reasons for an unexpected result."""
         return tuple(f"warning: {warning}" for warning in self.warnings)
 
     def rows(self) -> list[dict[str, Any]]:
         """The rows of its main table in metres, radians and ratios, by the names of the columns;
-        units have a column of their own.
+        units have a separate column.
         """
-        found = self.columns()
-        if found is None:
+        columns = self.columns()
+        if columns is None:
             raise NotImplementedError
-        return table_rows(*found)
+        return table_rows(*columns)
 
     def columns(self) -> tuple[Columns, Sequence[Any]] | None:
-        """The columns of its main table, see `presentation.table_columns`, and the items that are
-        its rows; None where `rows` has them.
+        """The columns of its main table, see `presentation.table_columns`, and the items of its
+        rows; None if `rows` has them.
         """
         return None
 
     def _shown_rows(self) -> list[dict[str, Any]]:
-        """The rows in the units that people read."""
-        found = self.columns()
-        return self.rows() if found is None else table_rows(*found, in_units=True)
+        """The rows in the units of text."""
+        columns = self.columns()
+        return self.rows() if columns is None else table_rows(*columns, in_units=True)
 
     def to_frame(self) -> pandas.DataFrame:
-        """Its main table as a data frame in the units that its headings or its column "unit" name;
-        what is undetermined is NaN.
+        """Its main table as a data frame in the units of its headings or its column "unit"; NaN if
+        undetermined.
         """
         import pandas
 
@@ -116,10 +112,8 @@ class Result:
         return self._written(as_html)
 
     def to_csv(self, path: str | Path | None = None) -> str:
-        """Its main table as CSV with a line of headings, in metres, radians and ratios with all
-        digits; what is undetermined is empty.
-
-        With a path the text is written as well.
+        """Return its main table as CSV with a line of headings, in metres, radians and ratios with
+        all digits, and write it to the path, if given; empty cells are undetermined.
 
         :raises OSError: the file cannot be written.
         """
@@ -141,8 +135,8 @@ class Result:
         return self._written(as_html, MOST_ROWS_SHOWN)
 
     def _written(self, form: Callable[[str, Sequence[Table]], str], most: int | None = None) -> str:
-        """Title and main table in a form, with four digits, `most` rows of it and how many more
-        there are; without any row, the result in a few words.
+        """Title and up to `most` rows of the main table, with four digits and the number of omitted
+        rows; without rows, the headline.
         """
         every, title = self._shown_rows(), self.heading
         rows = every[:most]
@@ -150,12 +144,12 @@ class Result:
             return form("; ".join([f"{title}: {self.headline()}", *self.notes]), [])
         names = list(rows[0])
         are_text = [all(isinstance(row[name], str) for row in rows) for name in names]
-        left = are_text.index(False) if False in are_text else len(names)
+        stubs = are_text.index(False) if False in are_text else len(names)
         texts = [tuple(_shown(row[name]) for name in names) for row in rows]
         block = Block(
-            "", tuple(Row(row[:left], tuple(Entry(text) for text in row[left:])) for row in texts)
+            "", tuple(Row(row[:stubs], tuple(Entry(text) for text in row[stubs:])) for row in texts)
         )
-        heads = tuple(names[:left]), tuple(names[left:])
+        heads = tuple(names[:stubs]), tuple(names[stubs:])
         left_out = len(every) - len(rows)
         more = (f"and {left_out} more rows, which to_frame() has",) if left_out else ()
         notes = (*more, *self.notes)
@@ -163,7 +157,7 @@ class Result:
 
 
 class FitResult(Result):
-    """The result of an estimator, with remarks on the readings."""
+    """The result of an estimator, with notes on the readings."""
 
     if TYPE_CHECKING:
 
@@ -172,37 +166,35 @@ class FitResult(Result):
 
     @property
     def converged(self) -> bool:
-        """Whether there is an estimate."""
+        """Whether an estimate exists."""
         return True
 
     @property
     def cautions(self) -> tuple[str, ...]:
-        """What a user of the estimate has to know."""
+        """Warnings about the estimate."""
         return ()
 
     @property
     def complaint(self) -> str:
-        """Why the estimate is unusable or leaves parameters undetermined; empty where all is
-        well.
-        """
+        """Reason why the estimate is unusable or parameters are undetermined; may be empty."""
         return ""
 
     @property
     def remarks(self) -> tuple[str, ...]:
-        """How far the readings are those that were planned, in words."""
+        """Notes on differences between readings and plan."""
         return self.observed.remarks
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """What of the readings is unlikely to be meant, and the cautions."""
+        """Doubts about the readings, and the cautions."""
         return (*self.observed.doubts, *self.cautions)
 
     @property
     def notes(self) -> tuple[str, ...]:
         return (*self.remarks, *super().notes, *filter(None, [self.complaint]))
 
-    def said(self) -> dict[str, Any]:
-        """What is to be said beside the figures, as plain data."""
+    def notes_data(self) -> dict[str, Any]:
+        """Notes, warnings and failure reason as plain data."""
         return {
             "planned_but_not_read": list(self.observed.missing),
             "read_but_not_planned": list(self.observed.unplanned),
@@ -211,17 +203,16 @@ class FitResult(Result):
         }
 
     def plot(self, path: str | Path | None = None) -> Figure:
-        """The residuals as magnified vectors where the balls were read.
-
-        With a path, which ends in .svg, .png or .pdf, the picture is written as well.
+        """Draw the residuals as magnified vectors at the balls, and write the picture to the path,
+        if given: a name in .svg, .png or .pdf.
 
         :raises ImportError: matplotlib is missing.
-        :raises ValueError: the path ends in something else, or there are no residuals to draw.
+        :raises ValueError: another suffix, or no residuals.
         """
         raise ValueError("residuals are drawn by the full estimator and reversal only")
 
     def report(self, path: str | Path) -> None:
-        """Write the result as a page, a file of HTML that needs no other.
+        """Write the result as a self-contained page of HTML.
 
         :raises ValueError: it is not of the full estimator.
         :raises OSError: the file cannot be written.
@@ -235,7 +226,6 @@ class FitResult(Result):
 
 
 def _shown(value: Any) -> str:
-    """A value in a table that is shown."""
     if value is None:
         return ""
     if isinstance(value, float):

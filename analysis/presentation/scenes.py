@@ -1,4 +1,4 @@
-"""A design as it stands in the machine, seen from the front and above: outlines, balls, styli."""
+"""A design seen from the front and above: outlines, balls, styli."""
 
 from __future__ import annotations
 
@@ -13,19 +13,19 @@ from numpy.typing import NDArray
 # The eye: turned about z, then raised, in degrees.
 TURN, RISE = -35.0, 24.0
 
-# Balls of a position that are drawn; of more, every so many.
+# Balls drawn of a position; of more, every second, third, …
 MOST_BALLS = 200
 
-# Positions that are told by their names, and letters of these; otherwise by their numbers.
+# Positions and their letters that fit as names into a drawing; otherwise they are numbered.
 MOST_NAMES, LETTERS = 8, 24
 
 
 @dataclass(frozen=True, eq=False)
 class DrawnPosition:
-    """A position on the paper: outline (k, 2), balls that are read (m, 2), styli (n, 2, 2) from tip
-    to reference point.
+    """A projected position: outline (k, 2), read balls (m, 2), styli (n, 2, 2) from tip to
+    reference point.
 
-    `number` counts from 1 in the order of the file; `depth` is larger for what stands further back.
+    `number` counts from 1 in the order of the file; `depth` increases away from the eye.
     """
 
     number: int
@@ -41,10 +41,9 @@ class DrawnPosition:
 
 @dataclass(frozen=True, eq=False)
 class Box:
-    """A volume on the paper, in metres: its edges (k, 2, 2), hidden ones marked.
+    """A projected volume, in metres: its edges (k, 2, 2), hidden ones marked.
 
-    `axes` are the axes' names with the ends (2, 2) of the edges that they are written along, and
-    the co-ordinates there.
+    `axes` are names with the ends (2, 2) of their edges and the co-ordinates there.
     """
 
     edges: Array
@@ -53,14 +52,14 @@ class Box:
 
     @property
     def size(self) -> float:
-        """The larger side of what is drawn."""
+        """The larger side of the projected volume."""
         return float(np.ptp(self.edges, axis=(0, 1)).max())
 
 
 @dataclass(frozen=True, eq=False)
 class Scene:
-    """A design on the paper, in metres: the volume, positions, rear first, and the probes' tips
-    about the reference point.
+    """A projected design, in metres: the volume, positions, rear first, and the probes' tips about
+    the reference point.
     """
 
     box: Box
@@ -73,26 +72,24 @@ class Scene:
 
 
 def names_fit(names: Sequence[str]) -> bool:
-    """Whether positions are told by their names in a drawing, which has room for few and short
-    ones.
-    """
+    """Return whether positions are few and their names short enough to label a drawing."""
     return len(names) <= MOST_NAMES and all(len(name) <= LETTERS for name in names)
 
 
 def scene(design: Design) -> Scene:
-    """The scene of a design; one in two dimensions is seen from above."""
+    """Return the scene of a design; one in two dimensions is seen from above."""
     view, towards = projection(design.dimension)
     volume = design.machine.volume
-    where = locations(design, nominal_state(design), design.readings)
+    points = locations(design, nominal_state(design), design.readings)
     places = []
     for k, name in enumerate(design.positions.names):
-        mine = np.flatnonzero(design.readings.position == k)
-        if not len(mine):
+        of_position = np.flatnonzero(design.readings.position == k)
+        if not len(of_position):
             continue
-        balls = where[mine]
-        _, first = np.unique(design.readings.ball[mine], return_index=True)
-        kept = first[:: -(-len(first) // MOST_BALLS)]
-        used = np.unique(design.readings.probe[mine])
+        balls = points[of_position]
+        _, first = np.unique(design.readings.ball[of_position], return_index=True)
+        drawn = first[:: -(-len(first) // MOST_BALLS)]
+        used = np.unique(design.readings.probe[of_position])
         # All styli at the ball nearest to the middle, where they hide least.
         middle = balls[np.linalg.norm(balls - balls.mean(axis=0), axis=1).argmin()]
         styli = np.stack(
@@ -105,7 +102,7 @@ def scene(design: Design) -> Scene:
                 design.artefacts.names[design.positions.artefact[k]],
                 tuple(design.probes.names[probe] for probe in used),
                 hull(balls @ view.T),
-                balls[kept] @ view.T,
+                balls[drawn] @ view.T,
                 styli @ view.T,
                 float(balls.mean(axis=0) @ towards) if design.dimension == 3 else 0.0,
                 len(first),
@@ -120,14 +117,14 @@ def scene(design: Design) -> Scene:
 
 
 def box(lower: Array, upper: Array) -> Box:
-    """The volume between two corners (d,) on the paper."""
+    """Return the projected volume between two corners (d,)."""
     view, away = projection(len(lower))
     edges, hidden = box_edges(lower, upper, away)
     return Box(edges @ view.T, hidden, _axes(lower, upper, view))
 
 
 def projection(dimension: int) -> tuple[Array, Array]:
-    """Projection (2, d) on the paper, and the direction (d,) away from the eye."""
+    """Return the projection (2, d), and the direction (d,) away from the eye."""
     if dimension == 2:
         return np.eye(2), np.zeros(2)
     turn, rise = np.radians([TURN, RISE])
@@ -138,54 +135,54 @@ def projection(dimension: int) -> tuple[Array, Array]:
 
 
 def box_edges(lower: Array, upper: Array, away: Array) -> tuple[Array, NDArray[np.bool_]]:
-    """Edges of the volume, and which are behind it."""
+    """Return edges of the volume, and which are behind it."""
     d = len(lower)
     corners = np.array(np.meshgrid(*zip(lower, upper, strict=True), indexing="ij")).reshape(d, -1).T
     edges = [
-        (one, other)
-        for k, one in enumerate(corners)
-        for other in corners[k + 1 :]
-        if (one != other).sum() == 1
+        (start, end)
+        for k, start in enumerate(corners)
+        for end in corners[k + 1 :]
+        if (start != end).sum() == 1
     ]
     if d == 2:
         return np.array(edges), np.zeros(len(edges), bool)
     rear = corners[(corners @ away).argmax()]
-    hidden = [bool((one == rear).all() or (other == rear).all()) for one, other in edges]
+    hidden = [bool((start == rear).all() or (end == rear).all()) for start, end in edges]
     return np.array(edges), np.array(hidden)
 
 
 def _axes(lower: Array, upper: Array, view: Array) -> tuple[tuple[str, Array, float, float], ...]:
-    """Axes along the edges that stand outermost on the paper: x and y below, z on the left."""
+    """Return axes along the outermost edges of the drawing: x and y below, z on the left."""
     starts = [lower.copy() for _ in lower]
     if len(lower) == 3:
         # The vertical edge at the left, the lower one at the right.
-        left = min(
+        corner_of_z = min(
             ([x, y] for x in (lower[0], upper[0]) for y in (lower[1], upper[1])),
             key=lambda corner: float((view @ [*corner, lower[2]])[0]),
         )
-        starts[2][:2] = left
+        starts[2][:2] = corner_of_z
         front = min((lower[1], upper[1]), key=lambda y: float((view @ [lower[0], y, lower[2]])[1]))
         starts[0][1] = front
         side = min((lower[0], upper[0]), key=lambda x: float((view @ [x, lower[1], lower[2]])[1]))
         starts[1][0] = side
-    found = []
+    axes = []
     for k, start in enumerate(starts):
         end = start.copy()
         start[k], end[k] = lower[k], upper[k]
-        found.append(
+        axes.append(
             ("xyz"[k], np.stack([view @ start, view @ end]), float(lower[k]), float(upper[k]))
         )
-    return tuple(found)
+    return tuple(axes)
 
 
 def hull(points: Array) -> Array:
-    """Corners of the convex hull of points (n, 2) counter-clockwise; the ends, where all of them
-    stand on a line.
+    """Return the corners of the convex hull of points (n, 2) counter-clockwise; of collinear
+    points, the ends.
 
     >>> hull(np.array([[0.0, 0.0], [1.0, 1.0], [0.5, 0.5]])).tolist()
     [[0.0, 0.0], [1.0, 1.0]]
     """
-    # Takes long to load, which checking a file must not.
+    # Imported late: it loads slowly, and `check` must start fast.
     from scipy.spatial import ConvexHull, QhullError
 
     ordered = np.unique(points, axis=0)

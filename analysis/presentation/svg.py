@@ -1,6 +1,4 @@
-"""Drawings as SVG that stands inside a page: the same bytes each time, in the page's own
-colours.
-"""
+"""Reproducible SVG drawings for pages, in the page's colours."""
 
 from __future__ import annotations
 
@@ -22,10 +20,10 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-# Stand-ins that the page's colours replace, so that drawings follow its light and dark schemes.
+# Placeholders that the page's colours replace, so that drawings follow its light and dark schemes.
 INK, MUTED, PAPER = "#010203", "#808182", "#fdfcfb"
 SERIES = ("#0a72b1", "#d55e01", "#019e74", "#cc79a8", "#e69f02", "#57b4e8")
-# Lines are told apart by these as well, so that nothing depends on colour.
+# Redundant to colour, for readers who cannot distinguish colours.
 DASHES = ("-", "--", ":", "-.", (0, (5, 1, 1, 1, 1, 1)), (0, (8, 3)))
 MARKERS = ("o", "s", "^", "D", "v", "P")
 
@@ -67,8 +65,7 @@ SETTINGS: Any = {
 
 
 def round_number(value: float) -> float:
-    """The largest of 1, 2, 5, 10, … and of 0.5, 0.2, 0.1, … that is not larger than a positive
-    value.
+    """Return the largest of …, 0.1, 0.2, 0.5, 1, 2, 5, 10, … up to a positive value.
 
     >>> round_number(730.0), round_number(0.0021), round_number(1e6)
     (500.0, 0.002, 1000000.0)
@@ -79,8 +76,8 @@ def round_number(value: float) -> float:
 
 @contextmanager
 def drawing(height: float, width: float = WIDTH) -> Iterator[Figure]:
-    """A figure of a size in points. Its parts are placed by hand, which takes half the time of a
-    layout found.
+    """Yield a figure of a size in points, for axes placed by hand, which takes half the time of an
+    automatic layout.
 
     :raises ImportError: matplotlib is missing; the text has the command that installs it.
     """
@@ -105,13 +102,13 @@ def drawing(height: float, width: float = WIDTH) -> Iterator[Figure]:
 
 
 def placed_axes(figure: Figure, left: float, bottom: float, width: float, height: float) -> Axes:
-    """Axes at a place in points."""
+    """Return axes at a location in points."""
     w, h = 72.0 * figure.get_size_inches()
     return figure.add_axes((left / w, bottom / h, width / w, height / h))
 
 
 def blank_axes(figure: Figure) -> Axes:
-    """Axes of the whole figure, with equal scales and without frame, ticks and background."""
+    """Return axes of the whole figure, with equal scales, no frame, ticks and background."""
     axes = figure.add_axes((0.0, 0.0, 1.0, 1.0))
     axes.set_axis_off()
     axes.set_aspect("equal")
@@ -119,24 +116,24 @@ def blank_axes(figure: Figure) -> Axes:
 
 
 def sticks(axes: Axes, starts: Array, tips: Array, **style: Any) -> None:
-    """Lines from starts to tips (m, 2), each with a marker where it starts."""
+    """Draw lines from starts to tips (m, 2), each with a marker at its start."""
     ends = np.stack([starts, tips, np.full_like(starts, np.nan)], axis=1)
     axes.plot(*ends.reshape(-1, 2).T, markevery=3, **style)
 
 
 def scale_bar(axes: Axes, length: float, height: float, text: str) -> None:
-    """A bar of a length along x at the left of axes, in a height as a share of theirs, and what it
-    means.
+    """Draw a bar of a length along x at the left of axes, with its meaning; its height is a share
+    of theirs.
     """
-    left, right = axes.get_xlim()
-    x = left + 0.05 * (right - left)
+    lower, upper = axes.get_xlim()
+    x = lower + 0.05 * (upper - lower)
     style: Any = {"transform": axes.get_xaxis_transform(), "clip_on": False}
     axes.plot([x, x + length], [height, height], color=INK, linewidth=2.5, **style)
-    axes.text(x + length + 0.02 * (right - left), height, text, va="center", **style)
+    axes.text(x + length + 0.02 * (upper - lower), height, text, va="center", **style)
 
 
 def legend_above(axes: Axes, columns: int, left: float = 0.0, bottom: float = 1.0) -> None:
-    """A legend in a few columns above axes, where it covers nothing."""
+    """Draw a legend in columns above axes."""
     axes.legend(
         loc="lower left",
         bbox_to_anchor=(left, bottom),
@@ -150,7 +147,7 @@ def legend_above(axes: Axes, columns: int, left: float = 0.0, bottom: float = 1.
 
 
 def common_legend(figure: Figure, axes: Axes, **more: Any) -> None:
-    """A legend of the figure for what its axes hold."""
+    """Draw a legend of the figure for the contents of some axes."""
     handles, labels = axes.get_legend_handles_labels()
     figure.legend(handles, labels, **more)
 
@@ -159,14 +156,12 @@ PICTURES = (".svg", ".png", ".pdf")
 
 
 def save(figure: Figure, path: str | Path | None, words: str) -> Figure:
-    """Write the figure to a file of its own, of the kind its name ends in, with words for those who
-    do not see it.
+    """Write the figure to a file in the format of its suffix, with alternative text, and return it
+    with the text as its label; without a path nothing is written.
 
-    The figure is given back, with the words as its label; without a path nothing is written.
+    The background is white and text is outlines; the same figure gives the same bytes.
 
-    It has a white ground and needs no fonts of the reader's; the same figure gives the same bytes.
-
-    :raises ValueError: the name ends in none of `PICTURES`.
+    :raises ValueError: the suffix is not in `PICTURES`.
     :raises OSError: the file cannot be written.
     """
     import matplotlib
@@ -187,7 +182,7 @@ def save(figure: Figure, path: str | Path | None, words: str) -> Figure:
     else:
         metadata = {"Title": words, "Software": None}
     with matplotlib.rc_context({"svg.fonttype": "path"}):
-        # Not to the file itself: where a disk is full, errors of the compression hide that of the
+        # Into memory first: if a disk is full, errors of the compression would hide that of the
         # file.
         whole = io.BytesIO()
         figure.savefig(whole, format=kind[1:], facecolor="white", dpi=200, metadata=metadata)
@@ -200,16 +195,16 @@ WIDE = 20.0
 
 
 def scaled_axis(axes: Axes, values: Array, axis: str) -> None:
-    """A logarithmic axis for values that are far apart, otherwise one that starts at zero."""
-    known = values[np.isfinite(values)]
-    if not len(known):
+    """Make an axis logarithmic for values of a wide range; otherwise start it at zero."""
+    numbers = values[np.isfinite(values)]
+    if not len(numbers):
         return
-    if known.min() > 0.0 and known.max() > WIDE * known.min():
+    if numbers.min() > 0.0 and numbers.max() > WIDE * numbers.min():
         from matplotlib.ticker import NullLocator
 
         (axes.set_xscale if axis == "x" else axes.set_yscale)("log")
         along = axes.xaxis if axis == "x" else axes.yaxis
         along.set_major_formatter("{x:g}")
         along.set_minor_locator(NullLocator())
-    elif known.min() >= 0.0:
+    elif numbers.min() >= 0.0:
         (axes.set_xlim if axis == "x" else axes.set_ylim)(0.0, None)

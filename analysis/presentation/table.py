@@ -1,4 +1,4 @@
-"""A table before any of the forms that it is written in."""
+"""A table, independent of its written forms."""
 
 from __future__ import annotations
 
@@ -7,9 +7,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Entry:
-    """A place in a table; `value` is the figure of the cell as it is stored, None where a text
-    stands alone.
-    """
+    """A cell of a table; `value` is its stored number, None for a text."""
 
     text: str
     value: float | None = None
@@ -19,7 +17,7 @@ class Entry:
 
 @dataclass(frozen=True)
 class Row:
-    """A row: what it is about, then its entries."""
+    """A row: its headings, then its entries."""
 
     headings: tuple[str, ...]
     entries: tuple[Entry, ...]
@@ -27,7 +25,7 @@ class Row:
 
 @dataclass(frozen=True)
 class Block:
-    """Rows that belong together; `title` is empty where a table has no blocks."""
+    """A group of rows; `title` is empty in a table without blocks."""
 
     title: str
     rows: tuple[Row, ...]
@@ -37,8 +35,8 @@ class Block:
 class Table:
     """A table.
 
-    `headings` stand above what rows are about, `columns` above the entries, `spanner` above all of
-    these, and `block` says what the blocks' titles are values of.
+    `headings` are above row headings, `columns` above entries, `spanner` above all columns; titles
+    of blocks are values of `block`.
     """
 
     name: str

@@ -1,11 +1,11 @@
 """Columns of a table, each stated once for text, frames and data.
 
-Columns are a mapping from headings, with a unit where text has one, to values; pairs of these where
-headings are alike. Values are an attribute of the items that a table has as rows (or an entry, or
-an attribute of an attribute, with a dot), a function of an item, or a list or an array. Numbers are
-in metres, radians and ratios; text has them in the unit of the heading or, without one, in that of
-the column "unit". A pair gives values and how text shows them: with so many significant digits, to
-the third digit of standard uncertainties, or by a function.
+Columns map headings, with a unit if text has one, to values; equal headings need pairs instead.
+Values are an attribute of the table's items (or an entry, or a dotted path of attributes), a
+function of an item, or a list or array. Numbers are in metres, radians and ratios; text has them in
+the unit of the heading or, without one, of the column "unit". A pair gives values and their form in
+text: a number of significant digits, standard uncertainties that determine the digits, or a
+function.
 """
 
 from __future__ import annotations
@@ -30,12 +30,12 @@ Columns = Mapping[str, Any] | Sequence[tuple[str, Any]]
 def table_lines(
     columns: Columns, items: Sequence[Any] = (), without: str | None = None, unknown: str = "-"
 ) -> list[str]:
-    """A table as aligned lines of text, numbers to the right, `without` one of its columns.
+    """Return a table as aligned lines of text, numbers to the right, `without` one of its columns.
 
-    `unknown` stands for what is undetermined.
+    `unknown` replaces NaN.
     """
     texts, right = [], []
-    for heading, _, values, form, factors in _read(columns, items):
+    for heading, _, values, form, factors in _columns_read(columns, items):
         if heading != without:
             is_one = callable(form) or isinstance(form, int)
             forms = repeat(form) if is_one else _values(form, items)
@@ -47,35 +47,38 @@ def table_lines(
 def by_axis(
     heading: str, values: Array, form: Any = 4, letters: Sequence[str] = "xyz"
 ) -> dict[str, Any]:
-    """A column for each axis of vectors (n, d), whose letter `heading` has in braces."""
+    """Return a column for each axis of vectors (n, d), whose letter replaces `heading`'s braces."""
     forms = form.T if hasattr(form, "T") else repeat(form)
-    # There are three letters and any number of forms.
+    # Three letters, any number of forms.
     columns = zip(letters, values.T, forms, strict=False)
-    return {heading.format(axis): (own, of_own) for axis, own, of_own in columns}
+    return {
+        heading.format(axis): (values_along, form_along)
+        for axis, values_along, form_along in columns
+    }
 
 
 def table_rows(
     columns: Columns, items: Sequence[Any] = (), in_units: bool = False
 ) -> list[dict[str, Any]]:
-    """A table as a mapping for each row: in metres, radians and ratios, without units in the names,
-    or in the units of the headings and of the column "unit".
+    """Return a table as one mapping per row: in metres, radians and ratios, without units in the
+    names, or in the units of the headings and of the column "unit".
     """
     used = {}
-    for heading, name, values, form, factors in _read(columns, items):
+    for heading, name, values, form, factors in _columns_read(columns, items):
         if not in_units:
             used[name] = values
         elif form is unit_of:
             used[name] = list(map(unit_of, values))
         elif name != "unit":  # A list of units is that of rows in metres.
             cells = zip(values, factors, strict=False)
-            used[heading] = [one * by if isinstance(one, float) else one for one, by in cells]
+            used[heading] = [cell * by if isinstance(cell, float) else cell for cell, by in cells]
     return [dict(zip(used, row, strict=True)) for row in zip(*used.values(), strict=True)]
 
 
-def _read(
+def _columns_read(
     columns: Columns, items: Sequence[Any]
 ) -> Iterator[tuple[str, str, list[Any], Any, Iterable[float]]]:
-    """Headings of columns, also without units, values, forms, and what takes values to units."""
+    """Yield headings of columns, names without units, values, forms, and factors to units."""
     of_rows: Iterable[float] = repeat(1.0)
     has_units = isinstance(dict(columns).get("unit"), str)
     if has_units:
@@ -107,7 +110,6 @@ def _values(source: Any, items: Sequence[Any]) -> list[Any]:
 
 
 def _text(value: Any, form: Any, factor: float, unknown: str) -> str:
-    """A value, by a function, with so many digits, or to those of a standard uncertainty."""
     if value is None:
         return ""
     if callable(form):

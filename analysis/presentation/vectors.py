@@ -1,6 +1,4 @@
-"""Residuals of a plate's readings in two dimensions, as magnified vectors where the balls were
-read.
-"""
+"""Residuals in two dimensions as magnified vectors at the balls."""
 
 from __future__ import annotations
 
@@ -28,19 +26,19 @@ from .svg import (
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-# Of the drawing's extent, the longest vector takes this part at most.
+# Length of the longest vector as a share of the drawing's extent.
 LONGEST = 0.2
 MARGIN, LINE, MARKER = 56.0, 15.0, 3.5
 TITLE = 52
-# More names would lie on one another.
+# More names would overlap.
 MOST_NAMES = 60
 
 
 @dataclass(frozen=True, eq=False)
 class Vectors:
-    """What is drawn alike: `residuals` (m, 2) of readings at `places` (m, 2), both in metres.
+    """Vectors of one colour: `residuals` (m, 2) of readings at `places` (m, 2), both in metres.
 
-    `names` (m,) are those of the balls; empty where there are none to be drawn.
+    `names` (m,) are those of the balls, or empty.
     """
 
     label: str
@@ -50,7 +48,7 @@ class Vectors:
 
 
 def magnification(groups: tuple[Vectors, ...], extent: float) -> float:
-    """The largest of 1, 2, 5, 10, ... with which the longest vector takes no more than its part of
+    """Return the largest of 1, 2, 5, 10, ... for which the longest vector stays within its share of
     `extent` metres.
 
     >>> one = Vectors("", np.zeros((1, 2)), np.array([[3e-7, 4e-7]]))
@@ -68,16 +66,15 @@ def draw_vectors(
     title: str,
     path: str | Path | None = None,
     edges: Array | None = None,
-    what: str = "residuals",
+    subject: str = "residuals",
 ) -> Figure:
-    """Residuals, or `what` they are, as a picture of vectors, each from the place that was read,
-    with a bar of known length below.
+    """Draw residuals, or another `subject`, as vectors from their points, with a scale bar below,
+    and write the picture to the path, if given.
 
-    It is written to the path, if there is one. With `edges` (k, 2, 2) the paper shows space, and
-    they are those of the volume.
+    `edges` (k, 2, 2) are those of the volume if the drawing is a projection of space.
 
     :raises ImportError: matplotlib is missing.
-    :raises ValueError: the name ends in none of the kinds of pictures.
+    :raises ValueError: the suffix is of no picture format.
     :raises OSError: the file cannot be written.
     """
     places = np.concatenate([g.places for g in groups])
@@ -113,7 +110,7 @@ def draw_vectors(
                 1e3 * group.places,
                 1e3 * (group.places + times * group.residuals),
                 color=SERIES[k % len(SERIES)],
-                # Where colours begin again, other markers go with them.
+                # Each repetition of the colours has other markers.
                 marker=MARKERS[(k + k // len(SERIES)) % len(MARKERS)],
                 markersize=MARKER,
                 label=group.label,
@@ -129,28 +126,27 @@ def draw_vectors(
                 color=MUTED,
                 fontsize=7.0,
             )
-        # One, two or five of some unit, as long in the drawing as such a residual is.
+        # A bar of 1, 2 or 5 units, drawn at the scale of the residuals.
         length = round_number(_longest(groups) or 1e-6)
-        told = f"{1e6 * length:g} µm, magnified {times:,.0f} times"
-        scale_bar(axes, 1e3 * length * times, -42.0 / height, told)
+        bar_text = f"{1e6 * length:g} µm, magnified {times:,.0f} times"
+        scale_bar(axes, 1e3 * length * times, -42.0 / height, bar_text)
         if any(group.label for group in groups):
             axes.legend(loc="upper left", bbox_to_anchor=(0.0, -48.0 / height), borderaxespad=0.0)
-        return save(figure, path, f"{title}: {what} as vectors, magnified {times:g} times")
+        return save(figure, path, f"{title}: {subject} as vectors, magnified {times:g} times")
 
 
 def _named(groups: tuple[Vectors, ...]) -> list[tuple[str, Array, Array]]:
-    """Each ball's name once for each group, its place and the direction (2,) away from its
+    """Return each ball's name once per group, its point and the direction (2,) away from its
     vector.
     """
-    found: dict[tuple[int, str], tuple[str, Array, Array]] = {}
+    labels: dict[tuple[int, str], tuple[str, Array, Array]] = {}
     for k, group in enumerate(groups):
         for name, place, residual in zip(group.names, group.places, group.residuals, strict=False):
             length = float(np.hypot(*residual))
             away = -residual / length if length > 0.0 else np.array([0.0, 1.0])
-            found.setdefault((k, name), (name, place, away))
-    return list(found.values()) if len(found) <= MOST_NAMES else []
+            labels.setdefault((k, name), (name, place, away))
+    return list(labels.values()) if len(labels) <= MOST_NAMES else []
 
 
 def _longest(groups: tuple[Vectors, ...]) -> float:
-    """The longest residual."""
     return max(float(np.hypot(*g.residuals.T).max(initial=0.0)) for g in groups)

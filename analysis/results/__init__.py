@@ -1,4 +1,4 @@
-"""Results that show themselves, and how they are written."""
+"""Results of check, run and fit, with their tables."""
 
 from __future__ import annotations
 

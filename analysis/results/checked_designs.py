@@ -1,9 +1,8 @@
-"""The work of the commands without a terminal: check, prediction and fit of a design."""
+"""Check and prediction of a design."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 from ballplate.rank.verdicts import verdict
 from ballplate.results.influences import influence_uncertainties
@@ -17,14 +16,11 @@ from ballplate.uncertainty.scale import scale_of
 from ballplate.uncertainty.summaries import Quantity, tasks_of, uncertainties
 from ballplate.uncertainty.tasks import TaskUncertainty
 
-if TYPE_CHECKING:
-    pass
-
 
 @dataclass(frozen=True)
 class PlannedUncertainty:
-    """Uncertainties alone, for searches that judge many designs: rank deficiency and quantities,
-    the measuring tasks among them.
+    """Rank deficiency and quantities, with measuring tasks, for searches that judge many
+    designs.
     """
 
     deficiency: int
@@ -38,21 +34,21 @@ class PlannedUncertainty:
 def check(
     experiment: Experiment, design: Design | None = None, with_scale: bool = False
 ) -> Prediction:
-    """Judge the rank of an experiment's design, or of what came of it, at zero machine error."""
+    """Judge the rank of an experiment's design, or of another, at zero machine error."""
     return _predict(experiment, design or lay_out(experiment), False, with_scale)
 
 
 def predict(experiment: Experiment, with_scale: bool = False) -> Prediction:
-    """Rank verdict and U1 to U6 of an experiment's design at zero machine error."""
+    """Return rank verdict and U1 to U6 of an experiment's design at zero machine error."""
     return _predict(experiment, lay_out(experiment), True, with_scale)
 
 
 @single_threaded
 def planned_uncertainty(experiment: Experiment) -> PlannedUncertainty:
-    """What `predict` finds, less the explanation of the rank, which takes most of its time."""
+    """Return the uncertainties of `predict` without explaining the rank, which takes longest."""
     at = linearise(lay_out(experiment))
-    found = uncertainties(at, target=experiment.target_uncertainty)
-    return PlannedUncertainty(at.deficiency, found)
+    quantities = uncertainties(at, target=experiment.target_uncertainty)
+    return PlannedUncertainty(at.deficiency, quantities)
 
 
 @single_threaded

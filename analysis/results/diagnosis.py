@@ -1,7 +1,4 @@
-"""What the residuals of a fit show, as far as they were searched for gross errors.
-
-The search is an extension's; a fit without it tells only how large its residuals are.
-"""
+"""Diagnosis of a fit's residuals by the extension that searches for gross errors."""
 
 from __future__ import annotations
 
@@ -17,10 +14,10 @@ from ballplate.simulator.maps.fit_verdict import LackOfFit
 
 
 class Suspicion(Protocol):
-    """What is suspected; false where nothing is.
+    """Observations flagged as gross errors; false if there are none.
 
-    It `names_causes` if it is more than that nothing explains the residuals. `marks` tell where the
-    readings stand.
+    It `names_causes` unless it states only that no gross error explains the residuals. `marks` are
+    the locations of readings.
     """
 
     @property
@@ -41,25 +38,25 @@ class Suspicion(Protocol):
 def diagnosed(
     at: Linearisation, x: Array, freedom: int, sigma_is_estimated: bool
 ) -> tuple[Suspicion | None, str]:
-    """What is suspected of the observations behind a fit, None without the extension that searches
-    for it, and why there was no search, empty where there was one.
+    """Return flagged observations, None without the extension, and the reason why there was no
+    search, or an empty text.
     """
     try:
         search = service("diagnosed")
     except MissingExtensionError as error:
         return None, f"gross errors were not looked for ({error})"
-    found: tuple[Suspicion, str] = search(at, x, freedom, sigma_is_estimated)
-    return found
+    diagnosis: tuple[Suspicion, str] = search(at, x, freedom, sigma_is_estimated)
+    return diagnosis
 
 
 def lack_of_fit(
     squares: float, freedom: int, diagnosis: Suspicion | None, untested: str
 ) -> LackOfFit:
-    """The lack of fit of a sum of squares; residuals that are `untested` may have a pattern."""
+    """Return the lack of fit of a sum of squares; `untested` residuals may have a pattern."""
     count = len(diagnosis.suspects) if diagnosis else 0
     return LackOfFit(squares, freedom, count, bool(diagnosis or untested))
 
 
 def has_exact_values(design: Design) -> bool:
-    """Whether any value of a design is stated as exact."""
-    return any(one.is_exact.any() for one in design.observations)
+    """Return whether any value of a design is stated as exact."""
+    return any(kind.is_exact.any() for kind in design.observations)

@@ -15,18 +15,18 @@ from ..presentation.formatting import as_data
 
 # Points of a curve.
 POINTS = 21
-# Lines of a function that are told; of more the last, which are inside the volume.
+# Lines reported of a function; of more, the last, which are inside the volume.
 MOST_LINES = 3
 
 
 @dataclass(frozen=True, eq=False)
 class EstimatedCurve:
-    """An error function along a line: `values` (m,) and their `standard_uncertainties` (m,) in
-    `unit`, NaN where undetermined.
+    """An error function along a line: `values` (m,) and `standard_uncertainties` (m,) in `unit`,
+    NaN if undetermined.
 
-    An error is where the tip is less where the scales say: the correction to be added to a reading.
-    `positions` (m,) are co-ordinates along `axis` in metres or, where `position_unit` is 1, parts
-    of the line, which `along` names. What is the same everywhere has one value.
+    The value is the correction to be added to a reading: actual less indicated position.
+    `positions` (m,) are co-ordinates along `axis` in metres or, if `position_unit` is 1, shares of
+    the line that `along` names. A constant has one value.
     """
 
     name: str
@@ -40,14 +40,14 @@ class EstimatedCurve:
     standard_uncertainties: Array
 
     def to_dict(self) -> dict[str, Any]:
-        """As plain data in metres, radians and ratios; what is undetermined is None."""
-        found: dict[str, Any] = as_data(self)
-        return found
+        """Return the curve as plain data in metres, radians and ratios; None if undetermined."""
+        data: dict[str, Any] = as_data(self)
+        return data
 
 
 @single_threaded
 def estimated_curves(at: Linearisation, sigma: float = 1.0) -> tuple[EstimatedCurve, ...]:
-    """The curves of all error functions, none of a model that offers no lines; `sigma` multiplies
+    """Return the curves of all error functions, none of a model without lines; `sigma` multiplies
     all stated uncertainties.
     """
     model = at.design.model
@@ -55,19 +55,19 @@ def estimated_curves(at: Linearisation, sigma: float = 1.0) -> tuple[EstimatedCu
         return ()
     parameters = model.parameters
     t = np.linspace(0.0, 1.0, POINTS)
-    found = []
-    for name in dict.fromkeys(one.function for one in parameters):
-        members = [k for k, one in enumerate(parameters) if one.function == name]
+    curves = []
+    for name in dict.fromkeys(parameter.function for parameter in parameters):
+        members = [k for k, parameter in enumerate(parameters) if parameter.function == name]
         rows = np.zeros((len(t), len(at.layout)))
         lines = model.lines(name, t)
         # Those along the edges come first.
         for line in lines if len(lines) <= MOST_LINES else lines[-MOST_LINES:]:
             rows[:, at.layout.model.start + np.array(members)] = line.basis
             values, u = line.basis @ at.state.a[members], sigma * at.of_shared(rows)
-            kept = slice(None) if np.ptp(line.basis, axis=0).any() else slice(1)
-            axis, unit, places = _places(at, name, t)
+            chosen = slice(None) if np.ptp(line.basis, axis=0).any() else slice(1)
+            axis, unit, positions = _positions(at, name, t)
             first = parameters[members[0]]
-            found.append(
+            curves.append(
                 EstimatedCurve(
                     name,
                     first.meaning,
@@ -75,16 +75,18 @@ def estimated_curves(at: Linearisation, sigma: float = 1.0) -> tuple[EstimatedCu
                     first.unit,
                     axis,
                     unit,
-                    places[kept],
-                    np.where(np.isnan(u), np.nan, values)[kept],
-                    u[kept],
+                    positions[chosen],
+                    np.where(np.isnan(u), np.nan, values)[chosen],
+                    u[chosen],
                 )
             )
-    return tuple(found)
+    return tuple(curves)
 
 
-def _places(at: Linearisation, name: str, t: Array) -> tuple[str, Unit, Array]:
-    """Axis, unit and places (m,) of the points of a function that depends on one axis only."""
+def _positions(at: Linearisation, name: str, t: Array) -> tuple[str, Unit, Array]:
+    """Return axis, unit and co-ordinates (m,) of a function's points; shares of the line unless it
+    depends on one axis.
+    """
     error = AXIS_ERRORS.get(name)
     volume = at.design.machine.volume
     if error is None or error.axis >= len(volume.lower):

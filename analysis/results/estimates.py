@@ -1,6 +1,4 @@
-"""Estimates of a fit as functions of its parameters: names, values, uncertainties and
-covariances.
-"""
+"""Estimates of a fit as functions of its parameters, with uncertainties and covariances."""
 
 from __future__ import annotations
 
@@ -28,7 +26,7 @@ from ..uncertainty.kernel_quantities import task_distances
 ParameterKind = Literal["machine", "origin", "rotation", "offset", "length", "influence", "ball"]
 FunctionKind = Literal[ParameterKind, "task"]
 
-# What may be asked for in place of a kind of its own.
+# Names that `choose` accepts for kinds.
 KINDS: dict[str, tuple[FunctionKind, ...]] = {
     "pose": ("origin", "rotation"),
     **{kind: (kind,) for kind in (*get_args(ParameterKind), "task")},
@@ -37,11 +35,10 @@ KINDS: dict[str, tuple[FunctionKind, ...]] = {
 
 @dataclass(frozen=True)
 class ParameterEstimate:
-    """One estimated parameter; the standard uncertainty is NaN, and so the value, where it is
-    undetermined.
+    """An estimated parameter; value and standard uncertainty are NaN if it is undetermined.
 
-    `kind` says what it is of: the machine, origin or rotation of a pose, a probe's offset, a
-    standard's length, an influence quantity, a ball.
+    `kind` is its object: the machine, origin or rotation of a pose, a probe's offset, a standard's
+    length, an influence quantity, a ball.
     """
 
     name: str
@@ -53,7 +50,7 @@ class ParameterEstimate:
 
 @dataclass(frozen=True)
 class Function:
-    """What a row of `EstimatedFunctions` is: its name, its kind and its unit."""
+    """One row of `EstimatedFunctions`: name, kind and unit."""
 
     name: str
     kind: FunctionKind
@@ -62,11 +59,11 @@ class Function:
 
 @dataclass(frozen=True, eq=False)
 class EstimatedFunctions:
-    """Functions (m,) of the parameters at a fit, with their `values` (m,) there.
+    """Functions (m,) of the parameters at a fit, with their `values` (m,).
 
-    `rows` (m, s) are their derivatives by the shared parameters, `drawn` (m, s) the same at the
-    design as drawn; those of a co-ordinate of a ball are zero, of which `ball` and `axis` (m,) are
-    the indices, -1 for all others.
+    `rows` (m, s) are derivatives by the shared parameters, `drawn` (m, s) the same at the nominal
+    design; rows of balls' co-ordinates are zero, and `ball` and `axis` (m,) their indices, -1 for
+    all other functions.
     """
 
     at: Linearisation
@@ -79,11 +76,11 @@ class EstimatedFunctions:
 
     @property
     def labels(self) -> list[str]:
-        """Names, with the kind in front where a model or a file gives the same name to two."""
+        """Names, preceded by the kind if a model or a file uses a name twice."""
         return labels(self.functions)
 
     def uncertainties(self) -> Array:
-        """Standard deviations (m,) in units of that of a unit-weight observation; NaN where
+        """Return standard deviations (m,) in units of that of a unit-weight observation; NaN if
         undetermined.
         """
         result = self.at.of_shared(self.rows, self.drawn)
@@ -92,55 +89,60 @@ class EstimatedFunctions:
             result[of_balls] = self.at.of_balls()[self.ball[of_balls], self.axis[of_balls]]
         return result
 
-    def choose(self, asked: Sequence[str]) -> EstimatedFunctions:
-        """Those of some kinds, or with some names, in the order asked for; all where nothing is
-        asked for.
+    def choose(self, wanted: Sequence[str]) -> EstimatedFunctions:
+        """Return the functions of kinds or names, in this order; all if `wanted` is empty.
 
-        :raises ValueError: there is no such kind and no such name.
+        :raises ValueError: an unknown kind or name.
         """
-        found: dict[int, None] = {}
-        names = self.labels
-        for k, words in enumerate(asked):
-            ensure_type(
-                str, "the name of an estimate, or a kind of them", **{f"chosen[{k}]": words}
-            )
-            chosen = [i for i, one in enumerate(self.functions) if one.kind in KINDS.get(words, ())]
-            if words not in KINDS:
-                told = [(one.name, f"{one.kind}: {one.name}") for one in self.functions]
-                chosen = [i for i, both in enumerate(told) if words in both]
-                if not chosen:
-                    raise ValueError(f'no estimate "{words}"; {hint(words, [*KINDS, *names])}')
-            found |= dict.fromkeys(chosen)
-        if not asked:
+        if not wanted:
             return self
-        some = np.array(list(found), np.int64)
+        chosen: dict[int, None] = {}
+        names = self.labels
+        for k, name in enumerate(wanted):
+            ensure_type(str, "the name of an estimate, or a kind of them", **{f"chosen[{k}]": name})
+            kinds = KINDS.get(name)
+            matches = [
+                i
+                for i, function in enumerate(self.functions)
+                if (
+                    name in (function.name, f"{function.kind}: {function.name}")
+                    if kinds is None
+                    else function.kind in kinds
+                )
+            ]
+            if not matches and kinds is None:
+                raise ValueError(f'no estimate "{name}"; {hint(name, [*KINDS, *names])}')
+            chosen |= dict.fromkeys(matches)
+        rows = np.array(list(chosen), np.int64)
         return EstimatedFunctions(
             self.at,
-            tuple(self.functions[i] for i in found),
-            self.values[some],
-            self.rows[some],
-            self.drawn[some],
-            self.ball[some],
-            self.axis[some],
+            tuple(self.functions[i] for i in chosen),
+            self.values[rows],
+            self.rows[rows],
+            self.drawn[rows],
+            self.ball[rows],
+            self.axis[rows],
         )
 
     @single_threaded
     def covariance(self) -> Array:
-        """Covariance (m, m) in units of the variance of a unit-weight observation.
+        """Return the covariance (m, m) in units of the variance of a unit-weight observation.
 
-        Rows and columns of what is undetermined are NaN.
+        Rows and columns of undetermined functions are NaN.
         """
         at, common = self.at, self.rows @ self.at.shared
         of_balls = np.flatnonzero(self.ball >= 0)
         if len(of_balls):
             ball, axis = self.ball[of_balls], self.axis[of_balls]
-            kept = at.balls.common.shape[2] - common.shape[1]
-            common = np.concatenate([common, np.zeros((len(common), kept))], axis=1)
+            ball_columns = at.balls.common.shape[2] - common.shape[1]
+            common = np.concatenate([common, np.zeros((len(common), ball_columns))], axis=1)
             common[of_balls] = at.balls.common[ball, axis]
         result = common @ common.T
         if len(of_balls):
-            own = at.balls.own[ball, axis]
-            result[np.ix_(of_balls, of_balls)] += np.where(ball[:, None] == ball, own @ own.T, 0.0)
+            ball_root = at.balls.own[ball, axis]
+            result[np.ix_(of_balls, of_balls)] += np.where(
+                ball[:, None] == ball, ball_root @ ball_root.T, 0.0
+            )
         is_open = np.isnan(self.uncertainties())
         result[is_open] = np.nan
         result[:, is_open] = np.nan
@@ -148,27 +150,30 @@ class EstimatedFunctions:
 
 
 def labels(functions: Sequence[Function | ParameterEstimate]) -> list[str]:
-    """Names, with the kind in front where a model or a file gives the same name to two.
+    """Return names, preceded by the kind if a model or a file uses a name twice.
 
     >>> kinds = [("EXX", "machine"), ("a", "machine"), ("a", "task")]
     >>> labels([Function(name, kind, "m") for name, kind in kinds])
     ['EXX', 'machine: a', 'task: a']
     """
-    times = Counter(one.name for one in functions)
-    return [one.name if times[one.name] == 1 else f"{one.kind}: {one.name}" for one in functions]
+    times = Counter(function.name for function in functions)
+    return [
+        function.name if times[function.name] == 1 else f"{function.kind}: {function.name}"
+        for function in functions
+    ]
 
 
-# In one piece: names, values and derivatives of each kind of parameter are added side by side.
+# In one function, since the order of its additions is that of results.
 @single_threaded
 def estimated_functions(at: Linearisation, monomials: bool) -> EstimatedFunctions:
-    """All that a fit estimates: the machine, poses, offsets, lengths of standards and balls;
-    measuring tasks last.
+    """Return all estimates of a fit: the machine, poses, offsets, lengths of standards, influence
+    quantities and balls; measuring tasks last.
 
     With `monomials` the machine's parameters are the coefficients of t, t^2, ... on [0, 1] instead
     of those of the stable basis.
     """
     design, layout, state = at.design, at.layout, at.state
-    own, size = np.eye(len(layout)), len(layout)
+    identity, size = np.eye(len(layout)), len(layout)
     functions: list[Function] = []
     values: list[Array] = []
     rows: list[Array] = []
@@ -181,7 +186,7 @@ def estimated_functions(at: Linearisation, monomials: bool) -> EstimatedFunction
         derivative: Array,
     ) -> None:
         functions.extend(
-            Function(*one) for one in zip(names, [kind] * len(names), units, strict=True)
+            Function(name, kind, unit) for name, unit in zip(names, units, strict=True)
         )
         values.append(np.atleast_1d(value))
         rows.append(derivative.reshape(len(names), size))
@@ -190,7 +195,13 @@ def estimated_functions(at: Linearisation, monomials: bool) -> EstimatedFunction
     if monomials:
         reported = design.model.reported()
         matrix = reported.matrix
-        add("machine", reported.names, reported.units, matrix @ state.a, matrix @ own[layout.model])
+        add(
+            "machine",
+            reported.names,
+            reported.units,
+            matrix @ state.a,
+            matrix @ identity[layout.model],
+        )
     else:
         machine = design.model.parameters
         add(
@@ -198,7 +209,7 @@ def estimated_functions(at: Linearisation, monomials: bool) -> EstimatedFunction
             [p.name for p in machine],
             [p.unit for p in machine],
             state.a,
-            own[layout.model],
+            identity[layout.model],
         )
 
     turned = vector_from_rotation(state.rotations @ design.positions.rotations.transpose(0, 2, 1))
@@ -212,19 +223,22 @@ def estimated_functions(at: Linearisation, monomials: bool) -> EstimatedFunction
             [name],
             [unit],
             poses[k, j],
-            own[layout.pose_columns[k, j]],
+            identity[layout.pose_columns[k, j]],
         )
 
     estimated = layout.offset_columns >= 0
     columns = layout.offset_columns[estimated]
     names = [parameters[column].name for column in columns]
-    add("offset", names, ["m"] * len(names), state.probes[estimated], own[columns])
+    add("offset", names, ["m"] * len(names), state.probes[estimated], identity[columns])
 
     names = list(design.unknown_lengths.names)
-    add("length", names, ["m"] * len(names), state.lengths, own[layout.lengths])
+    add("length", names, ["m"] * len(names), state.lengths, identity[layout.lengths])
     disturbing = design.influence_parameters
-    names, units = [one.name for one in disturbing], [one.unit for one in disturbing]
-    add("influence", names, units, state.influences, own[layout.influences])
+    names, units = (
+        [parameter.name for parameter in disturbing],
+        [parameter.unit for parameter in disturbing],
+    )
+    add("influence", names, units, state.influences, identity[layout.influences])
 
     d, balls = design.dimension, design.plate_balls
     names = [f"{design.ball_label(ball)}: {letter}" for ball in balls for letter in AXIS_NAMES[:d]]
@@ -237,15 +251,15 @@ def estimated_functions(at: Linearisation, monomials: bool) -> EstimatedFunction
     if count:
         distances = task_distances(design)
         ends = distances.places.at(design, state).reshape(count, 2, d)
-        found = linear_functions(at, distances)
+        derivatives = linear_functions(at, distances)
         add(
             "task",
             design.tasks.names,
             ["m"] * count,
             np.linalg.norm(ends[:, 0] - ends[:, 1], axis=1),
-            found.shared,
+            derivatives.shared,
         )
-        drawn.append(found.shared if found.drawn is None else found.drawn.shared)
+        drawn.append(derivatives.shared if derivatives.drawn is None else derivatives.drawn.shared)
     none = np.full(count, -1)
     return EstimatedFunctions(
         at,
@@ -261,14 +275,14 @@ def estimated_functions(at: Linearisation, monomials: bool) -> EstimatedFunction
 def parameter_estimates(
     functions: EstimatedFunctions, sigma: float
 ) -> tuple[ParameterEstimate, ...]:
-    """The estimates among functions, whose stated uncertainties `sigma` multiplies."""
+    """Return the estimates among functions; `sigma` multiplies stated uncertainties."""
     uncertainties = functions.uncertainties()
     values = np.where(np.isnan(uncertainties), np.nan, functions.values).tolist()
-    told = zip(functions.functions, values, (sigma * uncertainties).tolist(), strict=True)
+    estimates = zip(functions.functions, values, (sigma * uncertainties).tolist(), strict=True)
     return tuple(
-        ParameterEstimate(one.name, value, uncertainty, one.unit, one.kind)
-        for one, value, uncertainty in told
-        if one.kind != "task"
+        ParameterEstimate(function.name, value, uncertainty, function.unit, function.kind)
+        for function, value, uncertainty in estimates
+        if function.kind != "task"
     )
 
 
@@ -283,37 +297,33 @@ ESTIMATE_COLUMNS: dict[str, Any] = {
 
 @dataclass(frozen=True, eq=False, repr=False)
 class CorrectedPoints:
-    """Scale readings corrected for the estimated errors of the machine: `points` (n, d) in metres.
+    """Scale readings corrected for the machine's estimated errors: `points` (n, d) in metres.
 
-    `root` (n, d, r) is a square root of their joint covariance, in metres; NaN where a co-ordinate
-    is undetermined. It is that of the correction: the noise of the reading that is corrected is not
-    in it.
+    `root` (n, d, r) is a square root of their joint covariance, in metres; NaN if undetermined. It
+    is that of the correction, without the noise of the corrected reading.
     """
 
     points: Array
     root: Array
 
     def __repr__(self) -> str:
-        """One line: points and covariances are long."""
         count = len(self.points)
         return f"<{type(self).__name__} of {number_of(count, 'scale reading')}>"
 
     @property
     def standard_uncertainties(self) -> Array:
-        """Of each co-ordinate (n, d), in metres."""
+        """Standard uncertainties of co-ordinates (n, d), in metres."""
         return np.linalg.norm(self.root, axis=2)
 
     @property
     def covariance(self) -> Array:
-        """Of all co-ordinates together (n d, n d), those of a point side by side, in square
-        metres.
-        """
+        """Joint covariance of all co-ordinates (n d, n d), point by point, in square metres."""
         flat = self.root.reshape(-1, self.root.shape[2])
         return flat @ flat.T
 
     @property
     def blocks(self) -> Array:
-        """Of each point by itself (n, d, d), in square metres: the diagonal blocks of
+        """Covariance of each point (n, d, d), in square metres: the diagonal blocks of
         `covariance`.
         """
         return self.root @ self.root.transpose(0, 2, 1)
@@ -321,7 +331,9 @@ class CorrectedPoints:
 
 @single_threaded
 def correct(at: Linearisation, points: Array, probes: Integers, sigma: float) -> CorrectedPoints:
-    """Corrected points for scale readings `points` (n, d) in metres with probes of indices (n,)."""
+    """Return corrected points for scale readings `points` (n, d) in metres with probes of indices
+    (n,).
+    """
     rows = correction_rows(at.design, at.layout, at.state, points, probes)
     drawn = (
         rows

@@ -1,4 +1,4 @@
-"""What extensions answer of a prediction or a fit, as far as the kernel knows it."""
+"""Protocols of extensions' results that the kernel uses."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ class SpaceView(Protocol):
 
 
 class AskedResult(Protocol):
-    """A result that is told as lines of text and as plain data."""
+    """A result that prints as lines of text and as plain data."""
 
     def lines(self) -> list[str]: ...
 
@@ -27,7 +27,7 @@ class AskedResult(Protocol):
 
 
 class GroupVariances(AskedResult, Protocol):
-    """How uncertain `groups` of observations are."""
+    """Estimated variances of `groups` of observations."""
 
     @property
     def groups(self) -> Sequence[Any]: ...
@@ -36,9 +36,7 @@ class GroupVariances(AskedResult, Protocol):
 
 
 class IssuedCertificate(AskedResult, Protocol):
-    """A plate's co-ordinates in its own axes, by their `datum`; `texts` are files by their names
-    that a path asks for.
-    """
+    """A plate's co-ordinates in its own axes, by their `datum`; `texts` are files by name."""
 
     @property
     def datum(self) -> str: ...
@@ -47,15 +45,15 @@ class IssuedCertificate(AskedResult, Protocol):
 
 
 def shown_in_space(result: object) -> SpaceView:
-    """The view of a prediction or a fit.
+    """Return the view of a prediction or a fit.
 
     :raises MissingExtensionError: the extension that draws it is not installed.
     """
-    found: SpaceView = function("view")(result)
-    return found
+    view: SpaceView = function("view")(result)
+    return view
 
 
 def picture_in_space(result: object) -> str:
-    """The same as a notebook has it; empty without the extension that draws it."""
+    """Return the view as HTML for a notebook; empty without the extension that draws it."""
     view = optional_function("view")
     return "" if view is None else str(view(result)._repr_html_())

@@ -1,4 +1,4 @@
-"""The estimate from readings."""
+"""Result of a fit to readings."""
 
 from __future__ import annotations
 
@@ -82,32 +82,29 @@ REWEIGHTED = (
     " degrees of freedom that are not larger than stated)"
 )
 
-# Steps of an iteration below this, in metres and radians, are told as rounding.
+# Steps of an iteration below this, in metres and radians, are reported as rounding.
 LEAST_STEP = 1e-10
 
-# Of the table of estimates in a notebook, so that what is below it is seen, too.
+# Rows of the table of estimates in a notebook, so that the view below stays visible.
 ROWS_BESIDE_VIEW = 12
 
-# The largest residuals that the text names.
+# Largest residuals in the text.
 SHOWN_RESIDUALS = 3
 
 
 @dataclass(frozen=True, repr=False)
 class Fit(FitResult):
-    """An estimate from readings; without quantities and estimates, and the design judged as drawn,
-    if it has failed.
+    """An estimate from readings; a failed one has no quantities and estimates, and the verdict of
+    the nominal design.
 
-    `observed` has the design and its readings. `sigma` multiplies all stated uncertainties:
-    estimated from the residuals as the root of S^2 over the degrees of freedom, or 1 where the file
-    says that they are given. `adjustments` are those of a three-dimensional metric. `diagnosis` is
-    what the residuals make suspect, which nothing else here heeds, or `untested` says why there is
-    none. `estimated` is
-    everything that was estimated as functions of the parameters, without `sigma`.
-    `variance_components` are those asked for; where `is_reweighted`, everything else is as if their
-    estimates had been stated, except a lack of fit `before_reweighting` that is beyond the limit.
-    `experiment` is that which was fitted, from which a page of the fit names its assumptions.
-    `campaigns` are the sigmas of maps that are prior knowledge; where these are separate,
-    `degrees_of_freedom` are the fewest of them.
+    `observed` has the design and its readings. `sigma` multiplies all stated uncertainties: the
+    root of S^2 over the degrees of freedom, or 1 if the file takes uncertainties as given.
+    `adjustments` are those of a three-dimensional metric. `diagnosis` flags gross errors, which
+    stay in the fit, or `untested` states why there is none. `estimated` has all estimates as
+    functions of the parameters, without `sigma`. `variance_components` are optional; if
+    `is_reweighted`, all other results are as if their estimates had been stated, except a lack of
+    fit `before_reweighting` that is beyond the limit. `experiment` was fitted. `campaigns` are the
+    sigmas of prior maps; if these are separate, `degrees_of_freedom` are the fewest of them.
     """
 
     label: str
@@ -135,12 +132,12 @@ class Fit(FitResult):
 
     @property
     def design(self) -> Design:
-        """The design as it was read."""
+        """The design of the readings."""
         return self.observed.design
 
     @property
     def tasks(self) -> tuple[TaskUncertainty, ...]:
-        """The measuring tasks one by one."""
+        """The measuring tasks."""
         return tasks_of(self.quantities)
 
     def headline(self) -> str:
@@ -155,9 +152,9 @@ class Fit(FitResult):
         lengths = self.quantities.get("U6")
         verdict = verdict_lines(self.verdict, True, lengths, self.unread)
         lines = [self.heading, *verdict]
-        how = "estimated from the residuals" if self.sigma_is_estimated else "as given"
+        origin = "estimated from the residuals" if self.sigma_is_estimated else "as given"
         if self.is_reweighted:
-            how = "those of groups as estimated below"
+            origin = "those of groups as estimated below"
         summary = (
             f"{self.solution.status} after {len(record) - 1} iterations; S^2 ="
             f" {self.sum_of_squares:.6g}"
@@ -167,7 +164,7 @@ class Fit(FitResult):
                 f" with {freedom_words(self.sum_freedom)}; sigma = {self.sigma:.4g} times"
                 " the stated "
             )
-            summary += f"uncertainties ({how})"
+            summary += f"uncertainties ({origin})"
         maps = map_lines(self.experiment)
         lines += [summary, *(maps if self.campaigns is None else self.campaigns.lines())]
         lines += ["", *iteration_lines(record, _step)]
@@ -181,8 +178,10 @@ class Fit(FitResult):
             lines += [REWEIGHTED] if self.is_reweighted else []
         lines += ["", *uncertainty_table(self.quantities, self.lack_of_fit.caveat), ""]
         lines += [*task_table(self.tasks, self.lack_of_fit.caveat), ""] if self.tasks else []
-        shown = [one for one in self.estimates if one.kind not in ("origin", "ball")]
-        lines += table_lines(ESTIMATE_COLUMNS, shown, "kind")
+        printed = [
+            estimate for estimate in self.estimates if estimate.kind not in ("origin", "ball")
+        ]
+        lines += table_lines(ESTIMATE_COLUMNS, printed, "kind")
         lines.append(
             "(origins of positions and co-ordinates of balls are among the estimates of --json)"
         )
@@ -206,20 +205,20 @@ class Fit(FitResult):
             "sum_of_squares": self.sum_of_squares,
             **given(campaigns=self.campaigns and self.campaigns.to_dict()),
             "iterations": [
-                picked(one, "step", "sum_of_squares") for one in self.solution.iterations
+                picked(item, "step", "sum_of_squares") for item in self.solution.iterations
             ],
             "quantities": quantities_data(self.quantities),
             **given(tasks=task_data(self.tasks)),
             "largest_residuals": [
                 {
-                    **picked(one, "position", "ball", "probe", "axis", "value"),
+                    **picked(item, "position", "ball", "probe", "axis", "value"),
                     "unit": "m",
-                    "standard_uncertainties": self._standardised(one),
+                    "standard_uncertainties": self._standardised(item),
                 }
-                for one in self.largest
+                for item in self.largest
             ],
             **given(
-                error_functions=[one.to_dict() for one in curves],
+                error_functions=[item.to_dict() for item in curves],
                 residuals=self._residual_groups(),
                 suspected=self.diagnosis and self.diagnosis.data(self.observed.marks),
             ),
@@ -232,23 +231,23 @@ class Fit(FitResult):
                 }
             ),
             "estimates": {
-                name: picked(one, "value", "standard_uncertainty", "unit")
-                for name, one in estimates
+                name: picked(item, "value", "standard_uncertainty", "unit")
+                for name, item in estimates
             },
             **given(
                 plates={plate.artefact: plate_data(plate) for plate in self.plates},
                 adjustments=adjustment_data(self.adjustments),
                 bootstrap=self.bootstrap and self.bootstrap.to_dict(),
             ),
-            **self.said(),
+            **self.notes_data(),
         }
 
     def columns(self) -> tuple[Columns, Sequence[Any]]:
-        """One row for each parameter."""
+        """One row per parameter."""
         return ESTIMATE_COLUMNS, self.estimates
 
     def __getitem__(self, name: str) -> ParameterEstimate:
-        """The estimate of a parameter: its value, standard uncertainty and unit.
+        """The estimate of a parameter: value, standard uncertainty and unit.
 
         :raises KeyError: the fit has no parameter of that name.
 
@@ -261,7 +260,7 @@ class Fit(FitResult):
 
     @property
     def sum_of_squares(self) -> float:
-        """S^2 that sigma comes from, those of maps that have the same sigma included."""
+        """S^2 that sigma is computed from, with those of maps of the same sigma."""
         if self.campaigns is None or not self.converged:
             return self.solution.factor.sum_of_squares
         return self.campaigns.sum_of_squares
@@ -277,8 +276,7 @@ class Fit(FitResult):
 
     @property
     def functions(self) -> EstimatedFunctions:
-        """Everything estimated and the measuring tasks, as functions of the parameters; without
-        sigma.
+        """All estimates and the measuring tasks, as functions of the parameters; without sigma.
 
         :raises ValueError: the estimate has not converged.
         """
@@ -288,8 +286,8 @@ class Fit(FitResult):
 
     @property
     def error_functions(self) -> tuple[EstimatedCurve, ...]:
-        """Curves of the error functions with their standard uncertainties; none of a model that
-        offers no lines.
+        """Curves of the error functions with their standard uncertainties; none of a model without
+        lines.
 
         :raises ValueError: the estimate has not converged.
 
@@ -301,23 +299,23 @@ class Fit(FitResult):
         return estimated_curves(self.functions.at, self.sigma)
 
     def report(self, path: str | Path) -> None:
-        """Write the page of the fit, a file of HTML that needs no other.
+        """Write the page of the fit, a self-contained file of HTML.
 
         :raises OSError: the file cannot be written.
         """
         write_file(path, self.page().encode("utf-8", "replace"))
 
     def page(self) -> str:
-        """The page of the fit as text: verdict, curves, residuals, reliability, plate, what was
-        assumed.
+        """The page of the fit as text: verdict, curves, residuals, reliability, plate,
+        assumptions.
 
-        :raises ValueError: the fit does not know its experiment.
+        :raises ValueError: the fit has no experiment.
         """
         return str(function("page")(self))
 
     def view(self) -> SpaceView:
-        """The fit in space: positions, residuals, ellipsoids of points and balls, and undetermined
-        or weak directions, which move; of a fit that has failed the positions alone.
+        """The fit in space: positions, residuals, ellipsoids of points and balls, and moving
+        undetermined or weak directions; of a failed fit only the positions.
         """
         return shown_in_space(self)
 
@@ -325,14 +323,13 @@ class Fit(FitResult):
         return self._written(as_html, ROWS_BESIDE_VIEW) + picture_in_space(self)
 
     def covariance(self, *chosen: str) -> pandas.DataFrame:
-        """Covariance of estimates and measuring tasks, in products of their units; NaN where one is
+        """Covariance of estimates and measuring tasks, in products of their units; NaN if
         undetermined.
 
         Each of `chosen` is a name or a kind: machine, pose (or origin, rotation), offset, length,
-        ball, task; without any it is that of everything. The uncertainties are multiplied by
-        `sigma`, as everywhere in a fit.
+        ball, task; without any, all are chosen. `sigma` multiplies the uncertainties.
 
-        :raises ValueError: there is no such name, or the estimate has not converged.
+        :raises ValueError: an unknown name, or the estimate has not converged.
 
         >>> import ballplate as bp
         >>> fit = bp.fit(bp.quickstart(), bp.simulate(bp.quickstart()))
@@ -341,28 +338,29 @@ class Fit(FitResult):
         """
         import pandas
 
-        found = self.functions.choose(chosen)
-        return pandas.DataFrame(self.sigma**2 * found.covariance(), found.labels, found.labels)
+        functions = self.functions.choose(chosen)
+        return pandas.DataFrame(
+            self.sigma**2 * functions.covariance(), functions.labels, functions.labels
+        )
 
     def correlation(self, *chosen: str) -> pandas.DataFrame:
-        """Correlation coefficients of what `covariance` gives; NaN also beside what has no
-        uncertainty.
+        """Correlation coefficients of the functions of `covariance`; NaN without uncertainty.
 
-        :raises ValueError: there is no such name, or the estimate has not converged.
+        :raises ValueError: an unknown name, or the estimate has not converged.
         """
-        found = self.covariance(*chosen)
-        spread = np.sqrt(np.diagonal(found))
+        covariance = self.covariance(*chosen)
+        spread = np.sqrt(np.diagonal(covariance))
         with np.errstate(invalid="ignore", divide="ignore"):
-            return found / np.outer(spread, spread)
+            return covariance / np.outer(spread, spread)
 
     def components(self, by: Grouping = "axis") -> GroupVariances:
-        """How uncertain groups of observations are against what is stated of them, by restricted
-        maximum likelihood; of a fit that is reweighted, against what has been estimated.
+        """Variances of groups of observations relative to stated ones, by restricted maximum
+        likelihood; of a reweighted fit, relative to those estimated.
 
         `by` is axis, probe, position, artefact or calibration.
 
-        :raises ValueError: another grouping, an estimate that has not converged, or more groups
-            than there is memory for.
+        :raises ValueError: another grouping, an estimate that has not converged, or too many groups
+            for the memory.
 
         >>> import ballplate as bp
         >>> fit = bp.fit(bp.quickstart(), bp.simulate(bp.quickstart()))
@@ -371,21 +369,21 @@ class Fit(FitResult):
         """
         ensure_one_of(GROUPINGS, by=by)
         at = self.functions.at
-        found: GroupVariances = service("variance_components")(
+        variances: GroupVariances = service("variance_components")(
             self.label, self.title, at, self.observed.x, by
         )
-        return found
+        return variances
 
     def with_trials(
         self, trials: int, seed: int, workers: int = 1, report: Report = unreported
     ) -> Fit:
-        """The fit with its estimates over data sets of its own parameters, each fitted again, as
-        `bootstrap`.
+        """The fit with standard deviations of its estimates over simulated data sets, each fitted
+        again, as `bootstrap`.
 
-        :raises ValueError: an estimate that has not converged, or errors so large that there are
-            no readings of them.
+        :raises ValueError: an estimate that has not converged, or errors too large for readings to
+            exist.
         """
-        found = service("bootstrap")(
+        bootstrap = service("bootstrap")(
             self.label,
             self.title,
             self.functions,
@@ -396,15 +394,15 @@ class Fit(FitResult):
             workers,
             report,
         )
-        return replace(self, bootstrap=found)
+        return replace(self, bootstrap=bootstrap)
 
     def correct(self, points: Array, probe: str | Sequence[str] | None = None) -> CorrectedPoints:
         """Scale readings (n, d) in metres, corrected for the estimated errors, with their joint
         covariance.
 
-        `probe` is the name of one, or of one for each point; without any it is that of the
-        evaluation points. Of points outside the volume the correction is extrapolated; those
-        farther outside than the volume is large are refused, since they are in another unit.
+        `probe` is one name, or one for each point; by default the probe of the evaluation points.
+        Corrections outside the volume are extrapolated; points farther outside than the volume's
+        size are refused, since their unit is wrong.
 
         :raises ValueError: points of another shape or far outside the volume, an unknown probe, or
             an estimate that has not converged.
@@ -415,14 +413,14 @@ class Fit(FitResult):
         (6, 6)
         """
         design, names = self.design, self.design.probes.names
-        given = ensure_points(points, design.machine.volume)
-        asked = names[design.evaluation.probe] if probe is None else probe
-        probes = probe_places(asked, names, len(given))
-        return correct(self.functions.at, given, probes, self.sigma)
+        checked = ensure_points(points, design.machine.volume)
+        probe = names[design.evaluation.probe] if probe is None else probe
+        probes = probe_places(probe, names, len(checked))
+        return correct(self.functions.at, checked, probes, self.sigma)
 
     def to_map(self, date: str | None = None) -> FittedMap:
-        """What the fit found of the machine, with its covariance, to be kept in a file and used;
-        `date` is the day of the campaign, such as "2026-11-22".
+        """The error map of the fit with its covariance, to be saved and applied; `date` is the day
+        of the campaign, such as "2026-11-22".
 
         :raises ValueError: the estimate has not converged, or the date is no day.
 
@@ -446,8 +444,8 @@ class Fit(FitResult):
         is "all"; by default corners of the plate. The coverage factor is by default that of the
         experiment, or 2. `about` has texts about date, country, laboratory and so on.
 
-        :raises ExperimentError: nothing calibrated determines the plate's lengths.
-        :raises ValueError: the fit has not converged; wrong balls, plate, factor or keys.
+        :raises ExperimentError: no calibrated value determines the plate's lengths.
+        :raises ValueError: the fit has not converged; unknown balls, plate, factor or keys.
 
         >>> import ballplate as bp
         >>> fit = bp.fit(bp.quickstart(), bp.simulate(bp.quickstart()))
@@ -458,13 +456,14 @@ class Fit(FitResult):
         ensure_type(Iterable, 'names of balls, or "all"', datum=names)
         if coverage_factor is not None:
             ensure_positive("a coverage factor above 0", coverage_factor=coverage_factor)
-        asked = plate, tuple(names), coverage_factor, about
-        found: IssuedCertificate = service("plate_certificate")(self, *asked)
-        return found
+        certificate: IssuedCertificate = service("plate_certificate")(
+            self, plate, tuple(names), coverage_factor, about
+        )
+        return certificate
 
     def residual_vectors(self) -> tuple[Vectors, ...]:
-        """Residuals of a fit that has converged, for each position; in three dimensions as they are
-        seen from the front and above.
+        """Residuals of a converged fit, by position; in three dimensions projected, seen from the
+        front and above.
         """
         design = self.design
         view, _ = projection(design.dimension)
@@ -473,23 +472,23 @@ class Fit(FitResult):
         return tuple(
             Vectors(
                 design.positions.names[k],
-                places[mine] @ view.T,
-                residuals[mine] @ view.T,
-                tuple(design.balls.names[ball] for ball in readings.ball[mine]),
+                places[of_position] @ view.T,
+                residuals[of_position] @ view.T,
+                tuple(design.balls.names[ball] for ball in readings.ball[of_position]),
             )
             for k in np.unique(readings.position)
-            for mine in [readings.position == k]
+            for of_position in [readings.position == k]
         )
 
     def plot(self, path: str | Path | None = None) -> Figure:
         design, vectors = self.design, self.residual_vectors() if self.converged else ()
         if not vectors:
-            why = (
+            reason = (
                 "no ball of a plate was read"
                 if self.converged
                 else f"the estimate has {self.solution.status}"
             )
-            raise ValueError(f"there are no residuals to draw: {why}")
+            raise ValueError(f"there are no residuals to draw: {reason}")
         if design.dimension == 2:
             return draw_vectors(vectors, self.title, path)
         view, towards = projection(3)
@@ -499,30 +498,32 @@ class Fit(FitResult):
 
     @property
     def cautions(self) -> tuple[str, ...]:
-        """What is to be said of residuals that are too large, of sigma where it comes from few
-        degrees of freedom, and of what was not tested.
+        """Warnings about too large residuals, a sigma of few degrees of freedom, and missing
+        tests.
         """
-        found = []
+        warnings = []
         twice = counted_twice(self.experiment, self.observed)
         if twice:
-            found.append(
+            warnings.append(
                 "the map that is prior knowledge comes from readings that are fitted here too"
                 f" ({listing(twice)}): they count twice, and uncertainties are too small; leave the"
                 " prior out, or these readings"
             )
         if self.too_large:
-            cure = (
+            advice = (
                 "no single gross error explains that: try a richer error model or larger"
                 " uncertainties, and consider drifts"
             )
             if has_exact_values(self.design):
-                cure += "; several values that are stated as exact may be wrong, too"
+                advice += "; several values that are stated as exact may be wrong, too"
             if self.diagnosis and self.diagnosis.names_causes:
-                cure = "see what is suspected"
+                advice = "see what is suspected"
             times = self.lack_of_fit.times
-            found.append(f"S^2 is {times:.3g} times what the stated uncertainties explain; {cure}")
+            warnings.append(
+                f"S^2 is {times:.3g} times what the stated uncertainties explain; {advice}"
+            )
         if self.without_scatter:
-            found.append(
+            warnings.append(
                 "sigma is zero but for rounding, since the readings agree exactly with the model,"
                 " as computed ones do, or a few rounded ones by chance: the uncertainties here are"
                 " zero, too, and neither they nor what is within a target can be relied on; --sigma"
@@ -530,19 +531,19 @@ class Fit(FitResult):
             )
         if self.sigma_is_estimated:
             remedy = "--sigma given takes the uncertainties as stated"
-            found.append(few_degrees_of_freedom(self.degrees_of_freedom, "sigma", remedy))
+            warnings.append(few_degrees_of_freedom(self.degrees_of_freedom, "sigma", remedy))
         if self.untested and self.diagnosis is None:
-            found.append(self.untested)
+            warnings.append(self.untested)
         elif self.untested:
-            found.append(
+            warnings.append(
                 f"{self.untested}: fit the means of repeated readings, with u as a column, to have"
                 " them tested"
             )
-        return tuple(filter(None, found))
+        return tuple(filter(None, warnings))
 
     @property
     def unread(self) -> tuple[str, ...]:
-        """Names of positions that have no reading."""
+        """Names of positions without readings."""
         read = set(self.design.readings.position.tolist())
         return tuple(name for k, name in enumerate(self.design.positions.names) if k not in read)
 
@@ -551,7 +552,7 @@ class Fit(FitResult):
         if self.converged:
             rank = self.verdict.complaint
             if rank and self.unread:
-                # The file need not expect what is no fault of the plan.
+                # The deficiency comes of missing readings: the plan need not expect it.
                 rank = f"{rank_words(self.verdict)}; {not_read(self.unread)}"
             return "; ".join(filter(None, [rank, self.lack_of_fit.complaint]))
         exact = ", and for wrong values among those that are stated as exact"
@@ -568,7 +569,7 @@ class Fit(FitResult):
 
     @property
     def lack_of_fit(self) -> LackOfFit:
-        """S^2 against its degrees of freedom; what is beyond the limit stays so when variances are
+        """S^2 against its degrees of freedom; one beyond the limit stays so when variances are
         estimated from the same residuals.
         """
         before = self.before_reweighting
@@ -578,22 +579,21 @@ class Fit(FitResult):
 
     @property
     def without_scatter(self) -> bool:
-        """Whether sigma is estimated from residuals that are zero but for rounding."""
+        """Whether sigma is estimated from residuals that are rounding errors."""
         return self.sigma_is_estimated and self.sigma < LEAST_SIGMA
 
     def _residual_groups(self) -> dict[str, list[dict[str, Any]]]:
-        """Residuals by group as plain data; none without results."""
+        """Residuals by group as plain data; empty without results."""
         if not self.converged or not len(self.design.plate_readings):
             return {}
         sigma = float("nan") if self.without_scatter else self.sigma
         return residual_groups(self.design, self.solution, self.observed.x, sigma)
 
-    def _standardised(self, one: Residual) -> float:
-        """A residual in its standard uncertainties; NaN where there is nothing but rounding."""
-        return float("nan") if self.without_scatter else one.standardised / self.sigma
+    def _standardised(self, residual: Residual) -> float:
+        """A residual in its standard uncertainties; NaN without noise."""
+        return float("nan") if self.without_scatter else residual.standardised / self.sigma
 
     def _residual_table(self) -> list[str]:
-        """The largest residuals as lines of text."""
         columns = {
             "largest residuals": "position",
             "ball": "ball",
@@ -606,5 +606,4 @@ class Fit(FitResult):
 
 
 def _step(step: float) -> str:
-    """The length of an iteration's step, in metres and radians; a last one may be mere rounding."""
     return f"{step:.1e}" if not step < LEAST_STEP else f"below {LEAST_STEP:.0e}"

@@ -1,4 +1,4 @@
-"""The fit of a design to readings, without a terminal."""
+"""Fit of a design to readings."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ from .residuals import largest_residuals
 from .sigmas_by_campaign import CampaignSigmas, campaign_sigmas
 
 
-# In one piece: an estimate is judged step by step, each from those before it.
+# In one function, since each step of judging an estimate needs those before.
 @single_threaded
 def fit(
     experiment: Experiment,
@@ -44,10 +44,9 @@ def fit(
 ) -> Fit:
     """Estimate machine errors, balls and poses from readings.
 
-    `sigma` overrides what the file says; with `monomials` the machine's parameters are reported as
-    the coefficients of t, t^2, ... on [0, 1] instead of in the stable basis. With `components` the
-    variances of such groups of observations are estimated as well; with `reweight` they take the
-    place of those stated, and sigma is 1.
+    `sigma` overrides the file's; with `monomials` the machine's parameters are the coefficients of
+    t, t^2, ... on [0, 1] instead of those of the stable basis. `components` adds variances of
+    groups of observations; with `reweight` these replace the stated ones, and sigma is 1.
 
     :raises ExperimentError: variance components take more memory than there is.
     """
@@ -63,21 +62,21 @@ def fit(
             *names, observed, solution, judged, 1.0, False, 0, {}, (), (), experiment=experiment
         )
     at = linearised_fit(design, solution)
-    own = at.degrees_of_freedom
+    own_freedom = at.degrees_of_freedom
     scale, estimated, freedom = _sigma(at, campaigns, is_estimated)
-    diagnosis, untested = diagnosed(at, observed.x, own, estimated)
-    found = None
+    diagnosis, untested = diagnosed(at, observed.x, own_freedom, estimated)
+    variances = None
     if components is not None:
-        found = _variance_components(experiment, at, observed.x, components)
-    if found is not None and reweight:
-        observed = replace(observed, design=found.reweighted(design))
-        anew = fit(experiment, observed, "given", monomials)
+        variances = _variance_components(experiment, at, observed.x, components)
+    if variances is not None and reweight:
+        observed = replace(observed, design=variances.reweighted(design))
+        reweighted = fit(experiment, observed, "given", monomials)
         squares = solution.factor.sum_of_squares
         return replace(
-            anew,
-            variance_components=found,
+            reweighted,
+            variance_components=variances,
             is_reweighted=True,
-            before_reweighting=lack_of_fit(squares, own, diagnosis, untested),
+            before_reweighting=lack_of_fit(squares, own_freedom, diagnosis, untested),
         )
     judged = verdict(at, experiment.expected_rank_deficiency, experiment.target_uncertainty)
     functions = estimated_functions(at, monomials)
@@ -98,7 +97,7 @@ def fit(
         diagnosis,
         untested,
         functions,
-        found,
+        variances,
         experiment=experiment,
         campaigns=campaigns,
     )
@@ -107,7 +106,7 @@ def fit(
 def _sigma(
     at: Linearisation, campaigns: CampaignSigmas | None, is_estimated: bool
 ) -> tuple[float, bool, int]:
-    """Sigma, whether it is estimated, and the degrees of freedom of uncertainties."""
+    """Return sigma, whether it is estimated, and the degrees of freedom of uncertainties."""
     squares, freedom = at.factor.sum_of_squares, at.degrees_of_freedom
     if campaigns is not None:
         squares, freedom = campaigns.sum_of_squares, campaigns.freedom
@@ -135,5 +134,5 @@ def _adjustments(at: Linearisation, sigma: float, freedom: float) -> tuple[Adjus
     square = [f.error for f in chain.functions if isinstance(f.error, SquarenessError)]
     if not square:
         return ()
-    own = [chain.slices[error.name].start for error in square]
-    return adjustments(at.state.a[own], spread[own], null[own], freedom, square)
+    columns = [chain.slices[error.name].start for error in square]
+    return adjustments(at.state.a[columns], spread[columns], null[columns], freedom, square)

@@ -1,4 +1,4 @@
-"""Names of the ways in which observations are grouped for variance components."""
+"""Groupings of observations for variance components."""
 
 from __future__ import annotations
 

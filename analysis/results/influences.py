@@ -1,4 +1,4 @@
-"""How well influence quantities will be known, beside what is stated of them."""
+"""Predicted uncertainties of influence quantities, with stated ones."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ from ballplate.simulator.machines.protocol import Unit
 
 from ..presentation.table_columns import table_lines
 
-# Lines of a table; displacements of single readings may be thousands.
+# Rows of a table; displacements of single readings may be thousands.
 MOST_LINES = 30
 
 
 @dataclass(frozen=True)
 class InfluenceUncertainty:
-    """The standard uncertainty of a parameter of an influence quantity, in its `unit`: as `stated`,
-    infinite where it is unknown, and as `predicted` with the readings, NaN where undetermined.
+    """The standard uncertainty of a parameter of an influence quantity, in its `unit`: `stated`,
+    infinite if unknown, and `predicted` with the readings, NaN if undetermined.
     """
 
     name: str
@@ -29,20 +29,20 @@ class InfluenceUncertainty:
 
 
 def influence_uncertainties(at: Linearisation) -> tuple[InfluenceUncertainty, ...]:
-    """Those of all parameters of influence quantities that are no constants."""
+    """Return the uncertainties of all estimated parameters of influence quantities."""
     parameters = at.design.influence_parameters
     rows = np.eye(len(at.layout))[at.layout.influences]
     predicted = at.of_shared(rows, rows).tolist() if parameters else []
     return tuple(
-        InfluenceUncertainty(one.name, one.unit, one.uncertainty, u)
-        for one, u in zip(parameters, predicted, strict=True)
+        InfluenceUncertainty(parameter.name, parameter.unit, parameter.uncertainty, u)
+        for parameter, u in zip(parameters, predicted, strict=True)
     )
 
 
 COLUMNS: dict[str, Any] = {
     "influence quantity": "name",
     "stated uncertainty": (
-        lambda one: one.stated if np.isfinite(one.stated) else "unknown",
+        lambda row: row.stated if np.isfinite(row.stated) else "unknown",
         3,
     ),
     "with the readings": ("predicted", 3),
@@ -50,20 +50,20 @@ COLUMNS: dict[str, Any] = {
 }
 
 
-def influence_table(found: Sequence[InfluenceUncertainty]) -> list[str]:
-    """Lines of text, the first of them where there are many."""
-    left = len(found) - MOST_LINES
-    more = [f"({left} more are in --json)"] if left > 0 else []
-    return [*table_lines(COLUMNS, found[:MOST_LINES]), *more]
+def influence_table(influences: Sequence[InfluenceUncertainty]) -> list[str]:
+    """Return up to `MOST_LINES` rows as lines of text."""
+    omitted = len(influences) - MOST_LINES
+    more = [f"({omitted} more are in --json)"] if omitted > 0 else []
+    return [*table_lines(COLUMNS, influences[:MOST_LINES]), *more]
 
 
-def influence_data(found: Sequence[InfluenceUncertainty]) -> dict[str, Any]:
-    """The same as plain data, by name."""
+def influence_data(influences: Sequence[InfluenceUncertainty]) -> dict[str, Any]:
+    """Return uncertainties of influence quantities as plain data, by name."""
     return {
-        one.name: {
-            "stated_standard_uncertainty": one.stated,
-            "standard_uncertainty": one.predicted,
-            "unit": one.unit,
+        influence.name: {
+            "stated_standard_uncertainty": influence.stated,
+            "standard_uncertainty": influence.predicted,
+            "unit": influence.unit,
         }
-        for one in found
+        for influence in influences
     }

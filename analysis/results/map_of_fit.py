@@ -1,4 +1,4 @@
-"""The map that a fit leaves behind."""
+"""Error map of a fit."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ if TYPE_CHECKING:
 
     from .estimates import EstimatedFunctions
 
-# What expanded uncertainties have where the experiment does not say.
+# Coverage factor of experiments that state none.
 COVERAGE_FACTOR = 2.0
 
 _AXES_FIXED = (
@@ -57,7 +57,7 @@ FRAMES = {
 
 
 class MappedFit(Protocol):
-    """What a map is made of: a fit of an experiment, see `Fit`."""
+    """The attributes of a fit that a map needs, see `Fit`."""
 
     @property
     def label(self) -> str: ...
@@ -83,8 +83,7 @@ class MappedFit(Protocol):
 
 @single_threaded
 def map_of(fit: MappedFit, date: str | None = None) -> FittedMap:
-    """The machine's errors, the estimated offsets of probes and their joint covariance, of a fit
-    that has converged.
+    """Return the machine's errors and estimated probe offsets with their joint covariance.
 
     :raises ValueError: the estimate has not converged, or the `date` names no day.
     """
@@ -97,8 +96,8 @@ def map_of(fit: MappedFit, date: str | None = None) -> FittedMap:
     columns = np.concatenate([np.arange(len(layout))[layout.model], offsets])
     root = fit.sigma * at.shared[columns]
     scale = layout.scale[columns]
-    stated = written(experiment.tree, "error_model")
-    settings = {} if stated is None else to_python(stated)
+    model_node = written(experiment.tree, "error_model")
+    settings = {} if model_node is None else to_python(model_node)
     factor = written(experiment.tree, "coverage_factor")
     return FittedMap(
         title=experiment.title,
@@ -118,105 +117,111 @@ def map_of(fit: MappedFit, date: str | None = None) -> FittedMap:
         coverage_factor=COVERAGE_FACTOR if factor is None else experiment.coverage_factor,
         frame=FRAMES[experiment.error_model.kind],
         temperatures=_temperatures(fit.observed, experiment),
-        left_out=tuple(_left_out(one) for one in fit.estimates if one.kind == "influence"),
+        left_out=tuple(
+            _left_out(estimate) for estimate in fit.estimates if estimate.kind == "influence"
+        ),
         data=data_of(fit.observed, experiment),
         lack_of_fit=fit.lack_of_fit,
         experiment=fit.label,
         program=f"ballplate {version('ballplate')}",
         date=date,
-        # Of separate sigmas that of these readings, with the fewest degrees of freedom of all.
+        # From separate sigmas, that of these readings with the fewest degrees of freedom.
         sum_of_squares=(
             fit.sigma**2 * fit.degrees_of_freedom if fit.sigma_is_estimated else fit.sum_of_squares
         ),
     )
 
 
-def _left_out(one: ParameterEstimate) -> LeftOut:
-    is_known = bool(np.isfinite(one.standard_uncertainty))
-    value, uncertainty = (one.value, one.standard_uncertainty) if is_known else (None, None)
-    return LeftOut(one.name, one.kind, one.unit, value, uncertainty)
+def _left_out(estimate: ParameterEstimate) -> LeftOut:
+    is_known = bool(np.isfinite(estimate.standard_uncertainty))
+    value, uncertainty = (
+        (estimate.value, estimate.standard_uncertainty) if is_known else (None, None)
+    )
+    return LeftOut(estimate.name, estimate.kind, estimate.unit, value, uncertainty)
 
 
 def data_of(observed: ObservedReadings, experiment: Experiment | None = None) -> MapData:
-    """What the readings say, however they were written, with those of maps that the experiment has
-    as prior knowledge.
-    """
-    own = position_fingerprints(observed).values()
-    earlier = (one for known in maps_known(experiment) for one in known.positions)
-    positions = tuple(sorted({*own, *earlier}))
+    """Return fingerprints of the readings, and of those of the experiment's prior maps."""
+    fingerprints = position_fingerprints(observed).values()
+    earlier = (digest for data in maps_known(experiment) for digest in data.positions)
+    positions = tuple(sorted({*fingerprints, *earlier}))
     return MapData(len(observed.design.readings), fingerprint(observed), positions)
 
 
 def maps_known(experiment: Experiment | None) -> set[MapData]:
-    """The readings of maps that are prior knowledge in an experiment."""
+    """Return the readings' data of prior maps."""
     priors = () if experiment is None else experiment.priors
-    return {one.data for one in priors if one.data is not None}
+    return {prior.data for prior in priors if prior.data is not None}
 
 
 def counted_twice(experiment: Experiment | None, observed: ObservedReadings) -> tuple[str, ...]:
-    """Positions whose readings are fitted, and known by a map that is prior knowledge as well."""
-    known = maps_known(experiment)
-    if not known:
+    """Return positions whose readings are both fitted and in a prior map."""
+    prior_data = maps_known(experiment)
+    if not prior_data:
         return ()
     prints = position_fingerprints(observed)
-    if any(one.sha256 == fingerprint(observed) for one in known):
+    if any(data.sha256 == fingerprint(observed) for data in prior_data):
         return tuple(prints)
-    every = {digest for one in known for digest in one.positions}
-    return tuple(name for name, digest in prints.items() if digest in every)
+    prior_digests = {digest for data in prior_data for digest in data.positions}
+    return tuple(name for name, digest in prints.items() if digest in prior_digests)
 
 
 def _temperatures(observed: ObservedReadings, experiment: Experiment) -> dict[str, float] | None:
-    """The reference temperature, and the mean ones of scales and artefacts over readings that have
-    them, or else over positions, where they are stated.
+    """Return the reference temperature and mean ones of scales and artefacts, over readings if they
+    have them, otherwise over positions.
     """
-    stated = [one for one in experiment.influences if isinstance(one, TemperaturesSettings)]
+    stated = [
+        settings for settings in experiment.influences if isinstance(settings, TemperaturesSettings)
+    ]
     if not stated:
         return None
-    found = {"reference": stated[0].reference}
-    beside = observed.design.readings.beside or {}
+    temperatures = {"reference": stated[0].reference}
+    columns_read = observed.design.readings.beside or {}
     for word, columns in (
         ("scales", (*AXIS_COLUMNS, SCALES_COLUMN)),
         ("artefact", (ARTEFACT_COLUMN,)),
     ):
-        values = [one[np.isfinite(one)] for name, one in beside.items() if name in columns]
+        values = [
+            column[np.isfinite(column)] for name, column in columns_read.items() if name in columns
+        ]
         if not sum(map(len, values)):
             values = [
                 np.atleast_1d(value)
-                for one in stated
-                for value in _by_position(one, word, observed.design.positions.names)
+                for settings in stated
+                for value in _by_position(settings, word, observed.design.positions.names)
             ]
         if values:
-            found[word] = float(np.concatenate(values).mean())
-    return found
+            temperatures[word] = float(np.concatenate(values).mean())
+    return temperatures
 
 
-def _by_position(stated: TemperaturesSettings, word: str, positions: Sequence[str]) -> list[Any]:
-    """Temperatures of scales or artefacts in each position, none where none are stated."""
-    measured = stated.scale_temperature if word == "scales" else stated.artefact_temperature
+def _by_position(settings: TemperaturesSettings, word: str, positions: Sequence[str]) -> list[Any]:
+    """Return stated temperatures of scales or artefacts in each position."""
+    measured = settings.scale_temperature if word == "scales" else settings.artefact_temperature
     if measured is None:
         return []
-    own = stated.positions or {}
-    of_positions = [getattr(own.get(name), word, None) for name in positions]
-    return [measured.value if one is None else one for one in of_positions]
+    by_name = settings.positions or {}
+    temperatures = [getattr(by_name.get(name), word, None) for name in positions]
+    return [measured.value if value is None else value for value in temperatures]
 
 
 def left_out_words(fitted: FittedMap) -> str:
-    """Which estimates of the fit a map does not apply, and what its conversion has changed."""
+    """Return estimates of the fit that a map does not apply, and effects of its conversion."""
     residual = fitted.conversion_residual
-    words = []
+    sentences = []
     if residual is not None:
-        told = (
+        effect = (
             f"corrected points differ by up to {number(1e6 * residual, 3)} µm from those of the map"
             " before, which U does not contain"
             if residual
             else "coefficients that the model before did not have are as it implies, and were not"
             " estimated from readings"
         )
-        words.append(f"the map was converted from another error model: {told}")
-    campaign = [one.name for one in fitted.left_out if one.kind != CONVERSION]
+        sentences.append(f"the map was converted from another error model: {effect}")
+    campaign = [estimate.name for estimate in fitted.left_out if estimate.kind != CONVERSION]
     if campaign:
-        words.append(_of_campaign(campaign))
-    return "; ".join(words)
+        sentences.append(_of_campaign(campaign))
+    return "; ".join(sentences)
 
 
 def _of_campaign(estimated: Sequence[str]) -> str:

@@ -1,4 +1,4 @@
-"""The predicted uncertainties of a design."""
+"""Predicted uncertainties of a design."""
 
 from __future__ import annotations
 
@@ -46,8 +46,8 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Advice:
-    """What a check was asked for besides the rank: which goals are `missed`, and goals and
-    suggested changes as `lines` of text and as plain `data`.
+    """Further results of a check: goals that are `missed`, and goals and suggested changes as
+    `lines` of text and as plain `data`.
     """
 
     missed: tuple[str, ...]
@@ -57,13 +57,12 @@ class Advice:
 
 @dataclass(frozen=True, repr=False)
 class Prediction(Result):
-    """Predicted uncertainties of a design: the verdict on its rank, and U1 to U6 and tasks if they
-    were asked for.
+    """Predicted uncertainties of a design: the verdict on its rank and, optionally, U1 to U6 and
+    tasks.
 
-    `lengths` is U6 in any case, None without evaluation points, and `scale` what carries scale, if
-    that was asked for and is determined. `monte_carlo` has replicates, and `advice` what a check
-    was asked for besides the rank, if they were asked for. `influences` go with the quantities.
-    `experiment` is that which was judged.
+    `lengths` is U6 in any case, None without evaluation points, and `scale` the sources of scale,
+    if wanted and determined. `monte_carlo` has replicates, `advice` further results of a check.
+    `influences` belong to the quantities. `experiment` was judged.
     """
 
     label: str
@@ -80,7 +79,7 @@ class Prediction(Result):
 
     @property
     def tasks(self) -> tuple[TaskUncertainty, ...]:
-        """The measuring tasks one by one."""
+        """The measuring tasks."""
         return tasks_of(self.quantities)
 
     def headline(self) -> str:
@@ -97,9 +96,9 @@ class Prediction(Result):
         return [*lines, "", *trials_lines(self.monte_carlo)]
 
     def table_lines(self) -> list[str]:
-        """The same without replicates: title, verdict and table."""
-        rank, *others = verdict_lines(self.verdict, with_values=True, lengths=self.lengths)
-        lines = [self.heading, rank, *scale_warnings(self.scale), *others]
+        """Title, verdict and table, without replicates."""
+        rank, *further = verdict_lines(self.verdict, with_values=True, lengths=self.lengths)
+        lines = [self.heading, rank, *scale_warnings(self.scale), *further]
         lines += [] if self.quantities else target_lines(self.lengths)
         lines += [*map_lines(self.experiment), *scale_lines(self.scale)]
         lines += ["", *uncertainty_table(self.quantities)] if self.quantities else []
@@ -107,7 +106,7 @@ class Prediction(Result):
         return lines + ["", *task_table(self.tasks)] if self.tasks else lines
 
     def data(self) -> dict[str, Any]:
-        found = {
+        data = {
             **self.named,
             **verdict_data(self.verdict),
             "sigma": 1.0,
@@ -121,10 +120,10 @@ class Prediction(Result):
             **({} if self.advice is None else self.advice.data),
         }
         if self.monte_carlo is None:
-            return found
+            return data
         from ..montecarlo.comparison_tables import trials_data
 
-        return found | {"monte_carlo": trials_data(self.monte_carlo)}
+        return data | {"monte_carlo": trials_data(self.monte_carlo)}
 
     def __getitem__(self, symbol: str) -> Quantity:
         """A quantity by its symbol: its average and maximum, and their unit.
@@ -138,12 +137,11 @@ class Prediction(Result):
         return by_label(self.quantities, symbol)
 
     def plot(self, path: str | Path | None = None) -> Figure:
-        """The positions in the volume, by their names or, where there are many, by their numbers.
-
-        With a path, which ends in .svg, .png or .pdf, the picture is written as well.
+        """Draw the positions in the volume, labelled by names or, if there are many, by numbers,
+        and write the picture to the path, if given: a name in .svg, .png or .pdf.
 
         :raises ImportError: matplotlib is missing.
-        :raises ValueError: the path ends in something else.
+        :raises ValueError: another suffix.
         """
         from ..presentation.pictures import draw_design
 
@@ -151,8 +149,8 @@ class Prediction(Result):
         return draw_design(self.design, f"{self.title}: positions {names} in the volume", path)
 
     def view(self) -> SpaceView:
-        """The design in space: positions, ellipsoids of points and balls, and undetermined or weak
-        directions, which move.
+        """The design in space: positions, ellipsoids of points and balls, and moving undetermined
+        or weak directions.
         """
         return shown_in_space(self)
 
@@ -160,21 +158,19 @@ class Prediction(Result):
         return super()._repr_html_() + picture_in_space(self)
 
     def columns(self) -> tuple[Columns, Sequence[Any]]:
-        """One row for each of U1 to U6; where these were not asked for, one with the rank and
-        U6.
-        """
+        """One row for each of U1 to U6; without these, one with the rank and U6."""
         if self.quantities:
             symbols = {"symbol": list(self.quantities)}
             return {**symbols, **QUANTITY_COLUMNS}, list(self.quantities.values())
         columns = {
-            "rank": lambda one: rank_words(one.verdict),
+            "rank": lambda prediction: rank_words(prediction.verdict),
             "parameters": "verdict.parameters",
             "observations": "verdict.observations",
             "rank deficiency": "verdict.deficiency",
             "as expected": "verdict.as_expected",
-            "weakly determined": lambda one: len(one.verdict.weak),
-            "U6 average, µm": lambda one: one.lengths.average if one.lengths else math.nan,
-            "U6 maximum, µm": lambda one: one.lengths.maximum if one.lengths else math.nan,
+            "weakly determined": [len(self.verdict.weak)],
+            "U6 average, µm": [self.lengths.average if self.lengths else math.nan],
+            "U6 maximum, µm": [self.lengths.maximum if self.lengths else math.nan],
             "unit": ["m"],
         }
         return columns, [self]
@@ -184,9 +180,9 @@ Named = TypeVar("Named")
 
 
 def by_label(items: Mapping[str, Named], name: str) -> Named:
-    """The item of a name.
+    """Return the item of a name.
 
-    :raises KeyError: there is none.
+    :raises KeyError: an unknown name.
     """
     if name not in items:
         raise KeyError(f"no {name!r}; {hint(str(name), items)}")
@@ -194,12 +190,12 @@ def by_label(items: Mapping[str, Named], name: str) -> Named:
 
 
 def rank_words(judged: Verdict) -> str:
-    """The rank in two words."""
+    """Return the rank as text."""
     return f"rank deficiency {judged.deficiency}" if judged.deficiency else "full rank"
 
 
 def length_headline(quantities: Mapping[str, Quantity]) -> list[str]:
-    """U6 in a few words; none where it was not asked for or is undetermined."""
+    """Return U6 as text; empty if it is undetermined or was not computed."""
     lengths = quantities.get("U6")
     if lengths is None or np.isnan(lengths.average):
         return []

@@ -15,16 +15,16 @@ from ballplate.simulator.estimation.gauss_newton import Solution
 from ballplate.simulator.geometry.motions import AXIS_NAMES
 from ballplate.simulator.machines.protocol import Array, Integers
 
-# Residuals that a fit names.
+# Residuals that a fit reports.
 LARGEST = 10
 
 
 @dataclass(frozen=True)
 class Residual:
-    """What a reading of a plate differs by from the estimate along one axis, in metres and in its
+    """The difference of a plate's reading from the estimate along one axis, in metres and in its
     uncertainties.
 
-    Of a length standard the length, as `axis`, is too long by so much; its uncertainty includes the
+    Of a length standard, the excess of a length, named by `axis`; its uncertainty includes the
     certificate's.
     """
 
@@ -39,9 +39,7 @@ class Residual:
 def reading_residuals(
     design: Design, solution: Solution, x: Array
 ) -> tuple[Readings, Array, Array]:
-    """Readings of plates, with what each differs by from the estimate, (m, d) metres and in
-    standard uncertainties.
-    """
+    """Return readings of plates, with residuals (m, d) in metres and in standard uncertainties."""
     chosen = design.plate_readings
     readings = design.readings.select(chosen)
     standardised = reading_blocks(design, solution.state, readings, x[chosen]).residual
@@ -49,41 +47,41 @@ def reading_residuals(
 
 
 def largest_residuals(design: Design, solution: Solution, x: Array) -> tuple[Residual, ...]:
-    """The largest residuals of readings and of lengths, largest first."""
+    """Return the largest residuals of readings and of lengths, largest first."""
     chosen = design.plate_readings
     _, apart, residual = reading_residuals(design, solution, x)
     off, uncertainty = length_deviations(design, solution.state, x)
     standardised = np.concatenate([residual.ravel(), off / uncertainty])
     value = np.concatenate([apart.ravel(), off])
-    found = []
-    for place in np.argsort(-comparable(np.abs(standardised)), kind="stable")[:LARGEST].tolist():
-        i, axis = divmod(place, design.dimension)
-        k = place - residual.size
+    residuals = []
+    for index in np.argsort(-comparable(np.abs(standardised)), kind="stable")[:LARGEST].tolist():
+        i, axis = divmod(index, design.dimension)
+        k = index - residual.size
         reading = int(chosen[i] if k < 0 else design.of(Lengths).first[k])
         ball, words = design.ball_label(design.readings.ball[reading]), "xyz"[axis]
         if k >= 0:
             words, second = "radius", design.of(Lengths).second[k]
             if second >= 0:
-                other = design.balls.names[design.readings.ball[second]]
-                ball, words = f"{ball}-{other}", "length"
-        found.append(
+                second_ball = design.balls.names[design.readings.ball[second]]
+                ball, words = f"{ball}-{second_ball}", "length"
+        residuals.append(
             Residual(
                 design.positions.names[design.readings.position[reading]],
                 ball,
                 design.probes.names[design.readings.probe[reading]],
                 words,
-                float(value[place]),
-                float(standardised[place]),
+                float(value[index]),
+                float(standardised[index]),
             )
         )
-    return tuple(found)
+    return tuple(residuals)
 
 
 def residual_groups(
     design: Design, solution: Solution, x: Array, sigma: float
 ) -> dict[str, list[dict[str, Any]]]:
-    """Root mean squares of the readings' residuals by position, by probe and by axis, as plain
-    data in metres and in standard uncertainties, which `sigma` multiplies.
+    """Return root mean squares of the readings' residuals by position, probe and axis, as plain
+    data in metres and in standard uncertainties times `sigma`.
     """
     readings, values, standardised = reading_residuals(design, solution, x)
     is_read = measured(design, readings)
@@ -93,17 +91,17 @@ def residual_groups(
         ("probe", readings.probe[:, None] + 0 * axis, design.probes.names),
         ("axis", axis, AXIS_NAMES),
     )
-    found = {}
+    groups_data = {}
     for word, of_group, names in groups:
-        found[f"by_{word}"] = [
+        groups_data[f"by_{word}"] = [
             {
                 "name": names[k],
-                "count": int(own.sum()),
-                "root_mean_square": float(np.sqrt((values[own] ** 2).mean())),
-                "standardised": float(np.sqrt((standardised[own] ** 2).mean())) / sigma,
+                "count": int(members.sum()),
+                "root_mean_square": float(np.sqrt((values[members] ** 2).mean())),
+                "standardised": float(np.sqrt((standardised[members] ** 2).mean())) / sigma,
             }
             for k in np.unique(of_group).tolist()
-            for own in [(of_group == k) & is_read]
-            if own.any()
+            for members in [(of_group == k) & is_read]
+            if members.any()
         ]
-    return found
+    return groups_data

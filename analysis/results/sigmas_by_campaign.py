@@ -1,4 +1,4 @@
-"""One sigma for the readings and the maps that are prior knowledge, or one for each campaign."""
+"""Common or separate sigmas of the readings and of prior maps."""
 
 from __future__ import annotations
 
@@ -35,11 +35,11 @@ NOT_STATED = "the map is older and does not state its sum of squares"
 
 @dataclass(frozen=True)
 class ScaledMap:
-    """A map that is prior knowledge, with the sigma of its `campaign` and how that compares with
-    the one of the readings alone: the two-sided `p_value`, NaN where there is no test.
+    """A prior map with the sigma of its `campaign`, compared with that of the readings by a
+    two-sided `p_value`, NaN without a test.
 
-    `is_common` where it takes part in the common sigma; otherwise its information is scaled with
-    its own. `reason` says why there is no test.
+    `is_common` maps contribute to the common sigma; others are scaled with their own. `reason`
+    states why there is no test.
     """
 
     campaign: EarlierCampaign
@@ -50,7 +50,7 @@ class ScaledMap:
     @property
     def words(self) -> str:
         campaign = self.campaign
-        own = f"{number(campaign.estimate)} ({freedom_words(campaign.degrees_of_freedom)})"
+        sigma = f"{number(campaign.estimate)} ({freedom_words(campaign.degrees_of_freedom)})"
         result = "is scaled with that"
         if self.is_common:
             result = (
@@ -61,16 +61,16 @@ class ScaledMap:
             verb = "agree" if self.is_common else "differ"
             test = f"they {verb}, p = {number(self.p_value, 2)} against a level of {LEVEL:g}"
         lack = "" if campaign.is_stated else f"; {NOT_STATED}"
-        return f"sigma of {campaign.file}: {own}; {test}: the map {result}{lack}"
+        return f"sigma of {campaign.file}: {sigma}; {test}: the map {result}{lack}"
 
 
 @dataclass(frozen=True, eq=False)
 class CampaignSigmas:
-    """The estimate with maps as prior knowledge, `observed` with these weighted as it was, and
-    where `sigma` comes from: `sum_of_squares` with `freedom`.
+    """The estimate with prior maps, `observed` as weighted in it, and the `sum_of_squares` and
+    `freedom` of sigma.
 
-    `own` is sigma of the readings without any map, with `own_freedom`. `degrees_of_freedom` are the
-    fewest of all sigmas that uncertainties rest on, and `ratios` those of maps to that of readings.
+    `own` is sigma of the readings without maps, with `own_freedom`. `degrees_of_freedom` are the
+    fewest of all sigmas in uncertainties, and `ratios` those of maps to that of readings.
     """
 
     observed: ObservedReadings
@@ -86,9 +86,10 @@ class CampaignSigmas:
     def lines(self) -> list[str]:
         """The sigmas and the choice as lines of text."""
         if not self.own_freedom:
-            return [one.words for one in self.maps]
-        own = f"{number(self.own)} ({freedom_words(self.own_freedom)})"
-        return [f"sigma of the readings without maps: {own}", *(one.words for one in self.maps)]
+            return [scaled.words for scaled in self.maps]
+        sigma = f"{number(self.own)} ({freedom_words(self.own_freedom)})"
+        words = (scaled.words for scaled in self.maps)
+        return [f"sigma of the readings without maps: {sigma}", *words]
 
     def to_dict(self) -> dict[str, Any]:
         return {
@@ -107,11 +108,11 @@ class CampaignSigmas:
 
 
 def campaign_sigmas(experiment: Experiment, observed: ObservedReadings) -> CampaignSigmas | None:
-    """The estimate with one sigma for readings and maps, or with separate ones where an F-test says
-    that they differ; None without any map.
+    """Return the estimate with one sigma for readings and maps, or with separate ones if an F-test
+    finds a difference; None without maps.
 
-    With a common sigma a map is what its campaign's readings are: rows at their stated
-    uncertainties, its S^2 and its degrees of freedom.
+    With a common sigma a map replaces its campaign's readings: rows at their stated uncertainties,
+    its S^2 and its degrees of freedom.
     """
     campaigns = experiment.earlier_campaigns
     if not campaigns:
@@ -120,22 +121,24 @@ def campaign_sigmas(experiment: Experiment, observed: ObservedReadings) -> Campa
     ratios = dict.fromkeys(campaigns, 1.0)
     joint = weighted(design, experiment, ratios)
     solution = estimate(joint, x)
-    own, own_freedom = _without_maps(joint, experiment, x, solution)
-    maps = tuple(compared(one, own, own_freedom) for one in campaigns)
-    pooled = [one.campaign for one in maps if one.is_common]
-    squares = sum(one.sum_of_squares or 0.0 for one in pooled)
-    freedom = sum(one.degrees_of_freedom for one in pooled)
-    separate = [one.campaign for one in maps if not one.is_common]
+    own_sigma, own_freedom = _without_maps(joint, experiment, x, solution)
+    maps = tuple(compared(campaign, own_sigma, own_freedom) for campaign in campaigns)
+    pooled = [campaign.campaign for campaign in maps if campaign.is_common]
+    squares = sum(campaign.sum_of_squares or 0.0 for campaign in pooled)
+    freedom = sum(campaign.degrees_of_freedom for campaign in pooled)
+    separate = [campaign.campaign for campaign in maps if not campaign.is_common]
     if separate:
-        squares, freedom = squares + own_freedom * own**2, freedom + own_freedom
+        squares, freedom = squares + own_freedom * own_sigma**2, freedom + own_freedom
         sigma = math.sqrt(squares / freedom) if freedom else 1.0
-        ratios |= {one: one.estimate / sigma for one in separate}
+        ratios |= {campaign: campaign.estimate / sigma for campaign in separate}
         joint = weighted(design, experiment, ratios)
         solution = estimate(joint, x)
     elif solution.status == "converged":
         squares += solution.factor.sum_of_squares
         freedom += linearised_fit(joint, solution).degrees_of_freedom
-    limits = (one.degrees_of_freedom for one in separate if one.sum_of_squares is not None)
+    limits = (
+        campaign.degrees_of_freedom for campaign in separate if campaign.sum_of_squares is not None
+    )
     fewest = min([freedom, *limits])
     return CampaignSigmas(
         replace(observed, design=joint),
@@ -143,7 +146,7 @@ def campaign_sigmas(experiment: Experiment, observed: ObservedReadings) -> Campa
         squares,
         freedom,
         fewest,
-        own,
+        own_sigma,
         own_freedom,
         maps,
         ratios,
@@ -153,16 +156,16 @@ def campaign_sigmas(experiment: Experiment, observed: ObservedReadings) -> Campa
 def weighted(
     design: Design, experiment: Experiment, sigmas: Mapping[EarlierCampaign, float]
 ) -> Design:
-    """The design of an experiment with each map weighted as if sigma of its campaign were that."""
+    """Return an experiment's design with maps weighted by their campaigns' `sigmas`."""
     priors = design.of(Priors)
     uncertainty = priors.uncertainty.copy()
-    known = with_sigmas(experiment, sigmas).priors
-    uncertainty[: len(known)] = [prior.standard_uncertainty for prior in known]
+    scaled_priors = with_sigmas(experiment, sigmas).priors
+    uncertainty[: len(scaled_priors)] = [prior.standard_uncertainty for prior in scaled_priors]
     return design.observed(replace(priors, uncertainty=uncertainty))
 
 
 def with_sigmas(experiment: Experiment, sigmas: Mapping[EarlierCampaign, float]) -> Experiment:
-    """The experiment with each map weighted as if sigma of its campaign were that."""
+    """Return an experiment with maps weighted by their campaigns' `sigmas`."""
     priors = (
         prior
         if prior.share is None
@@ -177,33 +180,36 @@ def with_sigmas(experiment: Experiment, sigmas: Mapping[EarlierCampaign, float])
 def _without_maps(
     design: Design, experiment: Experiment, x: Array, solution: Solution
 ) -> tuple[float, int]:
-    """Sigma of the readings, and what is known beside them, without any map, and its degrees of
-    freedom; found from the estimate with the maps.
+    """Return sigma and degrees of freedom of the readings without maps, iterated from the estimate
+    with maps.
     """
     if solution.status != "converged":
         return math.nan, 0
     priors = design.of(Priors)
-    kept = np.ones(len(priors), bool)
-    kept[: len(experiment.priors)] = [one.share is None for one in experiment.priors]
-    alone = design.observed(priors.select(kept))
-    drawn = as_drawn(alone)
-    found = gauss_newton(alone, x, solution.state, held=drawn)
-    freedom = alone.observation_count - alone.parameter_count + drawn.deficiency
-    if found.status != "converged" or freedom <= 0:
+    is_chosen = np.ones(len(priors), bool)
+    is_chosen[: len(experiment.priors)] = [prior.share is None for prior in experiment.priors]
+    without = design.observed(priors.select(is_chosen))
+    drawn = as_drawn(without)
+    fit = gauss_newton(without, x, solution.state, held=drawn)
+    freedom = without.observation_count - without.parameter_count + drawn.deficiency
+    if fit.status != "converged" or freedom <= 0:
         return math.nan, 0
-    return math.sqrt(found.factor.sum_of_squares / freedom), freedom
+    return math.sqrt(fit.factor.sum_of_squares / freedom), freedom
 
 
-def compared(campaign: EarlierCampaign, own: float, own_freedom: int) -> ScaledMap:
-    """A map against the readings alone, by an F-test of both sigmas."""
+def compared(campaign: EarlierCampaign, own_sigma: float, own_freedom: int) -> ScaledMap:
+    """Return a map compared with the readings by an F-test of both sigmas."""
     from scipy.special import fdtr, fdtrc
 
     if campaign.sum_of_squares is None:
         return ScaledMap(campaign, math.nan, False, "its residuals are unknown")
     if not campaign.degrees_of_freedom or not own_freedom:
         return ScaledMap(campaign, math.nan, True, "no test for want of degrees of freedom")
-    if own < LEAST_SIGMA:
+    if own_sigma < LEAST_SIGMA:
         return ScaledMap(campaign, math.nan, True, "no test, as the readings have no scatter")
-    freedoms, ratio = (campaign.degrees_of_freedom, own_freedom), (campaign.estimate / own) ** 2
+    freedoms, ratio = (
+        (campaign.degrees_of_freedom, own_freedom),
+        (campaign.estimate / own_sigma) ** 2,
+    )
     p = 2.0 * float(min(fdtr(*freedoms, ratio), fdtrc(*freedoms, ratio)))
     return ScaledMap(campaign, p, p >= LEVEL)

@@ -31,10 +31,10 @@ if TYPE_CHECKING:
     from ballplate.simulator.estimation.gauss_newton import Iteration
     from ballplate.simulator.experiment.model import Experiment
 
-# Of sums of squares.
+# Format of sums of squares.
 FIVE = "{:.5e}".format
 
-# Balls of a plate that a table has room for.
+# Balls of a plate in a table.
 MOST_BALLS = 100
 
 
@@ -55,16 +55,16 @@ QUANTITY_COLUMNS: dict[str, Any] = {
 
 
 def uncertainty_table(quantities: dict[str, Quantity], caveat: str = "") -> list[str]:
-    """U1 to U6 as lines of text; a `caveat` is added to what is said of the target."""
-    shown = {symbol: one for symbol, one in quantities.items() if ", " not in one.unit}
+    """Return U1 to U6 as lines of text; a `caveat` follows shares within the target."""
+    shown = {symbol: row for symbol, row in quantities.items() if ", " not in row.unit}
     names = [symbol.partition(" ")[0] for symbol in shown]
     firsts = ["" if name in names[:k] else name for k, name in enumerate(names)]
     columns = {"": firsts, **QUANTITY_COLUMNS, "count": _counted}
     lines = table_lines(columns, list(shown.values()), "undetermined")
-    places = list(
-        dict.fromkeys(place for quantity in quantities.values() for place in quantity.places)
+    locations = list(
+        dict.fromkeys(location for quantity in quantities.values() for location in quantity.places)
     )
-    lines += [f"({', '.join(places)})"] if places else []
+    lines += [f"({', '.join(locations)})"] if locations else []
     for quantity in quantities.values():
         if quantity.parameters:
             each = (
@@ -74,16 +74,17 @@ def uncertainty_table(quantities: dict[str, Quantity], caveat: str = "") -> list
             unit = shown_unit(quantity.unit)
             lines.append(f"({quantity.description}, {unit}: {', '.join(each)})")
         if quantity.within_target is not None:
-            by = uncertainty_words(quantity.coverage_factor)
+            uncertainty = uncertainty_words(quantity.coverage_factor)
+            share = percent(quantity.within_target)
             lines.append(
-                f"within the target uncertainty ({by}): {percent(quantity.within_target)} of"
+                f"within the target uncertainty ({uncertainty}): {share} of"
                 f" {quantity.symbol}{caveat}"
             )
     return lines
 
 
 def task_table(tasks: Sequence[TaskUncertainty], caveat: str = "") -> list[str]:
-    """Measuring tasks as lines of text; a `caveat` is added to what is said of the target."""
+    """Return measuring tasks as lines of text; a `caveat` follows the target's uncertainty."""
     columns = {
         "task": "name",
         "length, mm": ("length", 6),
@@ -93,10 +94,10 @@ def task_table(tasks: Sequence[TaskUncertainty], caveat: str = "") -> list[str]:
         "within target": _judged,
     }
     with_target = any(task.target is not None for task in tasks)
-    by = next(
+    uncertainty = next(
         (uncertainty_words(task.coverage_factor) for task in tasks if task.target is not None), ""
     )
-    note = [f"(the target is compared with the {by}{caveat})"] if with_target else []
+    note = [f"(the target is compared with the {uncertainty}{caveat})"] if with_target else []
     return [*table_lines(columns, tasks), *note]
 
 
@@ -107,7 +108,7 @@ def _judged(task: TaskUncertainty) -> str:
 
 
 def task_data(tasks: Sequence[TaskUncertainty]) -> dict[str, Any]:
-    """Measuring tasks as plain data in metres."""
+    """Return measuring tasks as plain data in metres."""
     return {
         task.name: {
             **picked(task, "length", "standard_uncertainty", "expanded_uncertainty"),
@@ -127,14 +128,15 @@ def verdict_lines(
     lengths: Quantity | None = None,
     unread: Collection[str] = (),
 ) -> list[str]:
-    """A verdict on rank as lines of text; `lengths`, U6, is what all directions together make of
-    them, and `unread` names positions that were not read, whose poses are told in one line.
+    """Return a verdict on rank as lines of text.
+
+    `lengths`, U6, quantifies all directions together; poses of `unread` positions share one line.
     """
     lines = []
     rank = f"rank deficiency {judged.deficiency}" if judged.deficiency else "full rank"
     if judged.expected is not None or not judged.as_expected:
-        wanted = judged.expected or 0
-        rank += ", as expected" if judged.as_expected else f", expected {wanted or 'full rank'}"
+        expected = judged.expected or "full rank"
+        rank += ", as expected" if judged.as_expected else f", expected {expected}"
         rank += " (the file does not say otherwise)" if judged.expected is None else ""
     lines.append(f"{rank}; {judged.parameters} parameters, {judged.observations} observations")
     values = judged.singular_values
@@ -146,19 +148,19 @@ def verdict_lines(
             text = f"singular values {largest:.3g} to {smallest:.3g}{_border(judged)}"
         lines.append(text + ", in standard deviations per micrometre")
     for title, directions in (("undetermined", judged.null), ("weakly determined", judged.weak)):
-        told = [
+        listed = [
             (k, direction)
             for k, direction in enumerate(directions, start=1)
             if not direction.is_pose_of(unread)
         ]
-        if len(told) < len(directions):
-            count = len(directions) - len(told)
+        if len(listed) < len(directions):
+            count = len(directions) - len(listed)
             poses = f"{number_of(count, 'direction')} of poses"
             lines.append(f"{title}: {not_read(unread)}, which leaves {poses} open")
-        for k, direction in told[:20]:
+        for k, direction in listed[:20]:
             lines.append(f"{title} {k}: {direction}")
-        if len(told) > 20:
-            lines.append(f"{title}: {len(told) - 20} directions more")
+        if len(listed) > 20:
+            lines.append(f"{title}: {len(listed) - 20} directions more")
     if judged.weak and lengths is not None:
         lines.append(f"all directions together: {_lengths_words(lengths)}")
     lines += [f"reason: {reason}" for reason in judged.reasons]
@@ -166,25 +168,26 @@ def verdict_lines(
 
 
 def iteration_lines(record: Sequence[Iteration], shown: Callable[[float], str] = FIVE) -> list[str]:
-    """The record of iterations as lines of text, with steps as `shown`."""
+    """Return the record of iterations as lines of text, with steps as `shown`."""
     columns = {
         "iteration": range(len(record)),
-        "step": ([None, *(one.step for one in record[1:])], shown),
+        "step": ([None, *(iteration.step for iteration in record[1:])], shown),
         "S^2": ("sum_of_squares", FIVE),
     }
     return table_lines(columns, record)
 
 
 def map_lines(experiment: Experiment | None) -> list[str]:
-    """How maps that are prior knowledge are scaled where no sigma is estimated, as lines of
-    text.
-    """
+    """Return how prior maps are scaled without an estimated sigma, as lines of text."""
     campaigns = () if experiment is None else experiment.earlier_campaigns
-    return [f"prior {one.file} scaled with its sigma, {number(one.sigma)}" for one in campaigns]
+    return [
+        f"prior {campaign.file} scaled with its sigma, {number(campaign.sigma)}"
+        for campaign in campaigns
+    ]
 
 
 def not_read(unread: Collection[str]) -> str:
-    """A sentence that names positions without readings.
+    """Return a sentence that names positions without readings.
 
     >>> not_read(["P3"]), not_read(["P3", "P4"])
     ('P3 was not read', 'P3, P4 were not read')
@@ -195,7 +198,7 @@ def not_read(unread: Collection[str]) -> str:
 def _lengths_words(lengths: Quantity) -> str:
     if math.isnan(lengths.average):
         return "all are undetermined"
-    # Beside a share that is of an expanded uncertainty, it has to be said what this is.
+    # A share of an expanded uncertainty precedes this: name the standard one.
     symbol = "U6" if lengths.coverage_factor == 1.0 else "standard uncertainty U6"
     words = (
         f"{symbol} {number(1e6 * lengths.average)} µm on average,"
@@ -210,39 +213,41 @@ def _lengths_words(lengths: Quantity) -> str:
 
 
 def target_lines(lengths: Quantity | None) -> list[str]:
-    """The share of lengths within the target uncertainty, with U6, as a line of text; none where
-    nothing is compared.
+    """Return the share of lengths within the target uncertainty, with U6, as a line of text; empty
+    without a target.
     """
     if lengths is None or lengths.within_target is None:
         return []
-    by, share = uncertainty_words(lengths.coverage_factor), percent(lengths.within_target)
+    uncertainty, share = uncertainty_words(lengths.coverage_factor), percent(lengths.within_target)
     return [
-        f"within the target uncertainty ({by}): {share} of {lengths.count} lengths;"
+        f"within the target uncertainty ({uncertainty}): {share} of {lengths.count} lengths;"
         f" {_lengths_words(lengths)}"
     ]
 
 
 def scale_lines(scale: Scale | None) -> list[str]:
-    """What carries scale as a line of text; nothing where it is undetermined."""
+    """Return the sources of scale as a line of text; empty if scale is undetermined."""
     if scale is None:
         return []
-    if all(one.without is None for one in scale.carriers):
-        # How well the other parameters are known says nothing of how right the scales are.
-        return [f"scale comes from {' and '.join(one.words for one in scale.carriers)}"]
-    told = []
-    for one in scale.carriers:
-        if one.without is None:
-            told.append(one.words)
+    if all(carrier.without is None for carrier in scale.carriers):
+        # The uncertainty of other parameters is no measure of the scales' error.
+        return [f"scale comes from {' and '.join(carrier.words for carrier in scale.carriers)}"]
+    sources = []
+    for carrier in scale.carriers:
+        if carrier.without is None:
+            sources.append(carrier.words)
             continue
         without = (
-            "undetermined" if math.isinf(one.without) else f"{number(1e6 * one.without, 3)} ppm"
+            "undetermined"
+            if math.isinf(carrier.without)
+            else f"{number(1e6 * carrier.without, 3)} ppm"
         )
-        told.append(f"{one.words} ({without} without)")
-    return [f"scale known to {number(1e6 * scale.uncertainty, 3)} ppm from {' and '.join(told)}"]
+        sources.append(f"{carrier.words} ({without} without)")
+    return [f"scale known to {number(1e6 * scale.uncertainty, 3)} ppm from {' and '.join(sources)}"]
 
 
 def scale_warnings(scale: Scale | None) -> list[str]:
-    """A warning where scale rests on offsets that are held exact, else nothing."""
+    """Return a warning if scale rests on probe offsets taken as exact."""
     if scale is None or not scale.rests_on_offsets:
         return []
     warning = "warning: the scale rests on probe offsets that are held exact"
@@ -260,13 +265,17 @@ def scale_warnings(scale: Scale | None) -> list[str]:
 
 
 def scale_data(scale: Scale | None) -> dict[str, Any] | None:
-    """What carries scale as plain data, relative standard uncertainties, and U6 in metres."""
+    """Return the sources of scale as plain data, relative standard uncertainties, and U6 in
+    metres.
+    """
     if scale is None:
         return None
     loose = scale.loosened
     return {
         "standard_uncertainty": scale.uncertainty,
-        "carried_by": [{"text": one.words, "without": one.without} for one in scale.carriers],
+        "carried_by": [
+            {"text": carrier.words, "without": carrier.without} for carrier in scale.carriers
+        ],
         "rests_on_exact_offsets": scale.rests_on_offsets,
         "with_uncertain_offsets": loose
         and {
@@ -278,9 +287,7 @@ def scale_data(scale: Scale | None) -> dict[str, Any] | None:
 
 
 def _border(judged: Verdict) -> str:
-    """What singular values come after those that count; what they are is not told where they are
-    rounding.
-    """
+    """Return the singular values that follow those that count; rounding errors stay unnamed."""
     if not judged.deficiency:
         return ""
     if judged.gap >= GREAT:
@@ -290,9 +297,7 @@ def _border(judged: Verdict) -> str:
 
 
 def plate_table(plate: PlateCoordinates, named: bool = False, most: int = MOST_BALLS) -> list[str]:
-    """A plate's co-ordinates in its own axes as lines of text, for the first balls of a large
-    one.
-    """
+    """Return a plate's co-ordinates in its own axes as lines of text, for at most `most` balls."""
     title = "co-ordinates of the balls in the plate's own axes"
     lines = [f"{plate.artefact + ': ' if named else ''}{title} ({plate.words})"]
     (x, y), (u, v) = plate.coordinates[:most].T, plate.standard_uncertainties[:most].T
@@ -303,14 +308,14 @@ def plate_table(plate: PlateCoordinates, named: bool = False, most: int = MOST_B
         "standard uncertainty of x, µm": (u, 3),
         "of y, µm": (v, 3),
     }
-    left = len(plate.names) - most
-    more = [f"({left} balls more in --json)"] if left > 0 else []
+    omitted = len(plate.names) - most
+    more = [f"({omitted} balls more in --json)"] if omitted > 0 else []
     return [*lines, *table_lines(columns), *more]
 
 
 def _turned(name: str) -> Callable[[Adjustment], float]:
-    """A figure of an adjustment in the unit that mechanics read."""
-    return lambda one: float(getattr(one, name) / (ARCSECOND if one.unit == "rad" else 1e-6))
+    # Mechanics read arcseconds and µm/m.
+    return lambda row: float(getattr(row, name) / (ARCSECOND if row.unit == "rad" else 1e-6))
 
 
 ADJUSTMENT_COLUMNS: dict[str, Any] = {
@@ -318,13 +323,13 @@ ADJUSTMENT_COLUMNS: dict[str, Any] = {
     "is off by": _turned("value"),
     "standard uncertainty": _turned("standard_uncertainty"),
     "expanded, 95 %": _turned("expanded_uncertainty"),
-    "unit": lambda one: "arcsec" if one.unit == "rad" else "µm/m",
+    "unit": lambda row: "arcsec" if row.unit == "rad" else "µm/m",
     "what to do": "words",
 }
 
 
 def adjustment_lines(adjustments: Sequence[Adjustment]) -> list[str]:
-    """Adjustments as a table of text."""
+    """Return adjustments as a table of text."""
     return [
         *table_lines(ADJUSTMENT_COLUMNS, adjustments),
         "(errors of scales: true length less reading; errors of angles: excess over 90 deg)",
@@ -332,13 +337,13 @@ def adjustment_lines(adjustments: Sequence[Adjustment]) -> list[str]:
 
 
 def adjustment_data(adjustments: Sequence[Adjustment]) -> dict[str, Any]:
-    """Adjustments as plain data."""
+    """Return adjustments as plain data."""
     names = "what", "value", "standard_uncertainty", "expanded_uncertainty", "unit", "words"
     return by_name(adjustments, *names)
 
 
 def plate_data(plate: PlateCoordinates) -> dict[str, Any]:
-    """A plate's co-ordinates in its own axes as plain data in metres."""
+    """Return a plate's co-ordinates in its own axes as plain data in metres."""
     axes = plate.axes
     return {
         "axes": {"origin": plate.names[axes.origin], "xy"[axes.axis]: plate.names[axes.ball]},
@@ -347,9 +352,9 @@ def plate_data(plate: PlateCoordinates) -> dict[str, Any]:
 
 
 def coordinates_data(names: Sequence[str], values: Array, u: Array | None = None) -> dict[str, Any]:
-    """Co-ordinates (n, 2) by balls and axes, with their standard uncertainties."""
+    """Return co-ordinates (n, 2) by balls and axes, with their standard uncertainties."""
     keys = ("value",) if u is None else ("value", "standard_uncertainty")
-    rows = np.stack([one for one in (values, u) if one is not None], axis=2)
+    rows = np.stack([array for array in (values, u) if array is not None], axis=2)
     return {
         name: {
             axis: {**dict(zip(keys, cell, strict=True)), "unit": "m"}

@@ -236,7 +236,7 @@ class ComparedModels(FitResult):
             "lengths": {**picked(self.lengths, "maximum", "average", "undetermined"), "unit": "m"},
             "compared_with": self.recommended,
             "rungs": self.rows(),
-            **self.said(),
+            **self.notes_data(),
         }
 
     def rows(self) -> list[dict[str, Any]]:

@@ -143,7 +143,7 @@ class Validation(FitResult):
             **picked(self, "sigma_is_given"),
             "left_out": [_data(one) for one in self.left_out],
             "failed": [f"{one.kind} {one.name}" for one in self.failed],
-            **self.said(),
+            **self.notes_data(),
         }
 
     def columns(self) -> tuple[Columns, Sequence[Any]]:
