@@ -1,4 +1,4 @@
-"""Estimators beside the full one: of distances, by reversal, by length equations."""
+"""Alternative estimators: of distances, by reversal, by length equations."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
-"""The alternative estimators of NPL Report CISE 15/98, section 3.4, at work: a fit, and a
-comparison as in section 6.2.7.
+"""Alternative estimators of NPL Report CISE 15/98, section 3.4: a fit, and a comparison as in
+section 6.2.7.
 """
 
 from __future__ import annotations
@@ -49,16 +49,14 @@ from .truth_errors import TruthErrors, truth_errors
 
 QUANTILES = (0.0, 0.05, 0.25, 0.5, 0.75, 0.95, 1.0)
 
-# Derivatives, terms times parameters, of an alternative estimator, which takes some 70 bytes for
-# each, and more for few parameters.
+# Limit of derivatives (terms times parameters), some 70 bytes each, more for few parameters.
 MOST_DERIVATIVES = 15_000_000
 
-# Pairs of points of a comparison, and those of them that are followed through all data sets.
+# Pairs of points of a comparison, and pairs followed through all data sets.
 MOST_POINTS = 100_000
 MOST_SAME_PAIRS = 200
 
-# Differences of a tenth of a micrometre are compared: what the last iteration leaves is a millionth
-# of that.
+# Differences of a tenth of a micrometre are compared: the last iteration leaves a millionth of it.
 COMPARISON_TOLERANCE = GaussNewtonSettings(smallest_step=1e-8)
 
 
@@ -80,7 +78,7 @@ class AlternativeFit(FitResult):
 
     @property
     def lengths(self) -> int:
-        """Number of lengths of standards that it uses."""
+        """Number of lengths of standards used."""
         return len(self.observed.design.of(Lengths))
 
     @property
@@ -107,11 +105,11 @@ class AlternativeFit(FitResult):
             if self.solution.deficiency
             else "full rank"
         )
-        used = _used(self.pairs, self.lengths)
+        data = _used(self.pairs, self.lengths)
         lines = [
             self.heading,
             (
-                f"estimator {self.solution.estimator}: {used}, {self.solution.observations} terms;"
+                f"estimator {self.solution.estimator}: {data}, {self.solution.observations} terms;"
                 f" {rank}"
             ),
             (
@@ -125,7 +123,7 @@ class AlternativeFit(FitResult):
         return [*lines, *iteration_lines(record), "", *table_lines(columns, self.estimates)]
 
     def data(self) -> dict[str, Any]:
-        """The fit as plain data in metres and radians; what is undetermined is None."""
+        """The fit as plain data in metres and radians; None if undetermined."""
         return {
             **self.named,
             **picked(self, "pairs", "lengths"),
@@ -137,21 +135,20 @@ class AlternativeFit(FitResult):
         }
 
     def columns(self) -> tuple[Columns, Sequence[Any]]:
-        """One row for each of the machine's parameters."""
+        """One row per parameter of the machine."""
         return ESTIMATE_COLUMNS, self.estimates
 
 
 @dataclass(frozen=True, repr=False)
 class EstimatorComparison(Result):
-    """How far an alternative estimator's corrected distances are from the full estimator's, over
+    """Differences of corrected distances between an alternative and the full estimator, over
     `trials` synthetic data sets.
 
     For each data set on which both converged: root mean square `rms` and largest absolute value
-    `maximum` (m,), in metres, of the differences at `points` random pairs of points. `failed` lists
-    the other data sets, from 0. `published` values, by "rms" and "maximum", are placed among them.
-    `of_truth` has, by the names of both estimators, what the distances between the same pairs of
-    points in all data sets miss the true machine's by; nothing where the design leaves distances
-    undetermined.
+    `maximum` (m,), in metres, at `points` random pairs of points. `failed` lists the other data
+    sets, from 0. `published` values, by "rms" and "maximum", are located in these distributions.
+    `of_truth` has, by estimator, errors of distances between the same pairs of points in all data
+    sets; it is empty if distances are undetermined.
     """
 
     label: str
@@ -176,7 +173,7 @@ class EstimatorComparison(Result):
         )
 
     def lines(self) -> list[str]:
-        """A comparison as lines of text: quantiles, and where published values stand in them."""
+        """The comparison as lines of text: quantiles, with published values."""
         published = self.published
         across = ", across probes" if self.across_probes else ""
         used = f" ({_used(self.pairs, self.lengths)}{across})"
@@ -202,12 +199,12 @@ class EstimatorComparison(Result):
         columns: dict[str, Any] = {"": ["root mean square", "largest"]}
         columns |= dict(zip(quantiles, 1e6 * values, strict=True))
         if any(value is not None for value in published.values()):
-            known = [published.get(key) for key in spreads]
+            published_values = [published.get(key) for key in spreads]
             below = [
-                None if value is None else share_below(one, value)
-                for value, one in zip(known, spreads.values(), strict=True)
+                None if value is None else share_below(errors, value)
+                for value, errors in zip(published_values, spreads.values(), strict=True)
             ]
-            columns["published"] = (known, lambda value: number(1e6 * value))
+            columns["published"] = (published_values, lambda value: number(1e6 * value))
             columns["below it"] = (below, lambda share: f"{100 * share:.0f} %")
         lines += table_lines(columns)
         if not self.of_truth:
@@ -218,12 +215,12 @@ class EstimatorComparison(Result):
             "by chance, µm": ("chance", 3),
             "scatter, µm": ("scatter", 3),
             "rms, µm": ("rms", 3),
-            "": lambda one: "<- biased" if one.is_biased else "",
+            "": lambda errors: "<- biased" if errors.is_biased else "",
         }
         return [*lines, "", *table_lines(columns, list(self.of_truth.values()))]
 
     def data(self) -> dict[str, Any]:
-        """A comparison as plain data in metres."""
+        """The comparison as plain data in metres."""
         data: dict[str, Any] = {
             **self.named,
             **picked(self, "estimator", "trials", "pairs", "lengths"),
@@ -242,37 +239,39 @@ class EstimatorComparison(Result):
                     "published": value,
                     "share_below_published": share_below(values, value),
                 }
-        against = {name: {**vars(one), "unit": "m"} for name, one in self.of_truth.items()}
-        return data | given(against_truth=against)
+        errors_data = {
+            name: {**vars(errors), "unit": "m"} for name, errors in self.of_truth.items()
+        }
+        return data | given(against_truth=errors_data)
 
     def columns(self) -> tuple[Columns, Sequence[Any]]:
-        """One row for each data set on which both estimators converged."""
-        kept = [k for k in range(self.trials) if k not in self.failed]
+        """One row per data set on which both estimators converged."""
+        converged = [k for k in range(self.trials) if k not in self.failed]
         columns = {
-            "data set": kept,
+            "data set": converged,
             "root mean square, µm": self.rms,
             "maximum, µm": self.maximum,
-            "unit": ["m"] * len(kept),
+            "unit": ["m"] * len(converged),
         }
         return columns, ()
 
 
 def ball_pairs(experiment: Experiment, name: str | None = None) -> Integers:
-    """Pairs (p, 2) of balls of all plates: of the named set or, without a name, `braced` where that
-    is defined.
+    """Return pairs (p, 2) of balls of all plates: of the named set, by default `braced` if
+    defined.
 
-    :raises ExperimentError: an artefact has no such set.
+    :raises ExperimentError: an artefact lacks the set.
     """
-    found, first = [np.zeros((0, 2), np.int64)], 0
+    pair_indices, first = [np.zeros((0, 2), np.int64)], 0
     for artefact, layout in experiment.layouts.items():
         if experiment.artefacts[artefact].role == "plate":
             chosen = name or ("braced" if "braced" in layout.pair_sets else "all")
             try:
-                found.append(pairs(layout, chosen) + first)
+                pair_indices.append(pairs(layout, chosen) + first)
             except ValueError as error:
                 raise refused(experiment.source, str(error), f"artefacts.{artefact}") from None
         first += len(layout.names)
-    return np.concatenate(found)
+    return np.concatenate(pair_indices)
 
 
 def count_terms(
@@ -282,8 +281,8 @@ def count_terms(
     name: str | None = None,
     across_probes: bool = False,
 ) -> int:
-    """Number of terms of an alternative estimator, but for certificates and priors, if every
-    position has all the balls.
+    """Return the number of terms of an alternative estimator, without certificates and priors, if
+    every position has all balls.
     """
     count = 0
     artefact_of = design.balls.artefact[design.readings.ball]
@@ -292,14 +291,16 @@ def count_terms(
             continue
         chosen = name or ("braced" if "braced" in layout.pair_sets else "all")
         balls = len(layout.names)
-        found = (
+        pair_count = (
             balls * (balls - 1) // 2 if chosen == "all" else len(layout.pair_sets.get(chosen, ()))
         )
-        own = artefact_of == k
-        read = np.stack([design.readings.position[own], design.readings.probe[own]], axis=1)
-        probes = np.unique(np.unique(read, axis=0)[:, 0], return_counts=True)[1]
+        of_artefact = artefact_of == k
+        combinations = np.stack(
+            [design.readings.position[of_artefact], design.readings.probe[of_artefact]], axis=1
+        )
+        probes = np.unique(np.unique(combinations, axis=0)[:, 0], return_counts=True)[1]
         times = int((probes**2 if across_probes else probes).sum())
-        count += found * (times * (times - 1) // 2 if estimator == "cresto" else times)
+        count += pair_count * (times * (times - 1) // 2 if estimator == "cresto" else times)
     return count
 
 
@@ -310,9 +311,9 @@ def _refuse_many_terms(
     name: str | None,
     across_probes: bool,
 ) -> None:
-    """Refuse what would take more memory than there is, before pairs are made.
+    """Refuse estimates that exceed the memory, before pairs are made.
 
-    :raises ExperimentError: there are more terms than possible.
+    :raises ExperimentError: too many terms.
     """
     count = count_terms(experiment, design, estimator, name, across_probes)
     most = MOST_DERIVATIVES // max(len(design.model.parameters), 1)
@@ -329,7 +330,7 @@ def _refuse_many_terms(
 
 
 def _refuse_unknown_places(experiment: Experiment, design: Design) -> None:
-    """Refuse what estimators of distances alone cannot follow.
+    """Refuse features that estimators of distances alone cannot use.
 
     :raises ExperimentError: a gauge, a length standard without a certificate, holes, a star, or
         correlated values.
@@ -349,24 +350,24 @@ def _refuse_unknown_places(experiment: Experiment, design: Design) -> None:
             raise refused(experiment.source, text, f"calibration[{k}]")
     gauges, unknown = len(design.gauge_positions), design.unknown_lengths.names
     if gauges or unknown:
-        what = "a Bryan gauge's pivot" if gauges else f"an unknown length ({unknown[0]})"
-        text = (
-            f"estimators of distances alone cannot follow {what}; use --estimator length-equations"
-        )
+        feature = "a Bryan gauge's pivot" if gauges else f"an unknown length ({unknown[0]})"
+        text = f"estimators of distances alone cannot follow {feature}"
+        text += "; use --estimator length-equations"
         raise refused(experiment.source, text, "artefacts")
 
 
 def _refuse_other_lengths(experiment: Experiment, design: Design) -> None:
-    """Refuse what length equations and the full estimator do not both estimate.
+    """Refuse designs for which length equations and the full estimator estimate different
+    errors.
 
     :raises ExperimentError: no lengths, another error model than three scales and squareness, or
-        errors left open.
+        undetermined errors.
     """
-    what, text = "artefacts", ""
+    key, text = "artefacts", ""
     if not len(design.of(Lengths)):
         text = "has no ball bar or Bryan gauge whose lengths are read; use another estimator"
     elif not has_all_errors(design):
-        what, text = (
+        key, text = (
             "error_model",
             "length equations have the errors of {kind: metric}, in three dimensions, only",
         )
@@ -376,7 +377,7 @@ def _refuse_other_lengths(experiment: Experiment, design: Design) -> None:
             " fixed; see ballplate check"
         )
     if text:
-        raise refused(experiment.source, text, what)
+        raise refused(experiment.source, text, key)
 
 
 def fit_alternative(
@@ -389,8 +390,7 @@ def fit_alternative(
 ) -> AlternativeFit:
     """Estimate machine errors from the distances of readings.
 
-    Parameters that the distances leave open have NaN; with `monomials` they are the coefficients of
-    t, t^2, ...
+    Undetermined parameters are NaN; with `monomials` they are the coefficients of t, t^2, ...
     """
     design = observed.design
     _refuse_unknown_places(experiment, design)
@@ -398,11 +398,8 @@ def fit_alternative(
     chosen = ball_pairs(experiment, pair_set)
     solution = alternative_estimate(design, observed.x, chosen, estimator, across_probes)
     parameters = design.model.parameters
-    names, units, matrix = (
-        [p.name for p in parameters],
-        [p.unit for p in parameters],
-        np.eye(len(parameters)),
-    )
+    names, units = [p.name for p in parameters], [p.unit for p in parameters]
+    matrix = np.eye(len(parameters))
     if monomials:
         reported = design.model.reported()
         names, units, matrix = list(reported.names), list(reported.units), reported.matrix
@@ -432,10 +429,10 @@ def compare_estimators(
 ) -> EstimatorComparison:
     """Compare an alternative with the full estimator on readings of the file's true machine.
 
-    Each data set has noise, a certificate and `points` random pairs of points in the volume of its
-    own, all drawn from `seed` (default: the file's) and its number, so that more data sets only add
-    to those before. Points are corrected with the probe of the file's evaluation. `report` is told
-    the number of data sets done.
+    Each data set has its own noise, certificate and `points` random pairs of points in the volume,
+    drawn from `seed` (default: the file's) and its number, so that more data sets extend fewer.
+    Points are corrected with the probe of the file's evaluation. `report` receives the number of
+    finished data sets.
     """
     design = lay_out(experiment)
     chosen = np.zeros((0, 2), np.int64)
@@ -453,21 +450,23 @@ def compare_estimators(
     for trial in range(trials):
         generator = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(trial,)))
         try:
-            both = _both_estimates(
+            solutions = _both_estimates(
                 experiment, design, on_truth, truth, chosen, estimator, across_probes, generator
             )
         except NoReadingError as error:
             raise too_large(experiment, error) from None
-        if both is None:
+        if solutions is None:
             failed.append(trial)
         else:
             ends = design.machine.volume.lower + design.machine.volume.size * generator.random(
                 (2, points, design.dimension)
             )
-            difference = _distances(design, both[1], ends) - _distances(design, both[0], ends)
+            difference = _distances(design, solutions[1], ends) - _distances(
+                design, solutions[0], ends
+            )
             rms.append(float(np.sqrt((difference**2).mean())))
             maximum.append(float(np.abs(difference).max()))
-            errors.append(np.stack([_distances(design, a, same) - true for a in both]))
+            errors.append(np.stack([_distances(design, a, same) - true for a in solutions]))
         report(ProgressStep(f"data sets of {experiment.label}", trial + 1, trials))
     return EstimatorComparison(
         experiment.label,
@@ -489,8 +488,8 @@ def compare_estimators(
 def _same_pairs(
     design: Design, on_truth: Design, truth: State, seed: int, points: int
 ) -> tuple[Array, Array]:
-    """Pairs of points (2, p, d) that are the same in all data sets, and the true machine's
-    distances (p,) between them.
+    """Return pairs of points (2, p, d) common to all data sets, and the true machine's distances
+    (p,).
     """
     generator = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(0, 0)))
     count = min(points, MOST_SAME_PAIRS)
@@ -502,15 +501,12 @@ def _same_pairs(
 def _of_truth(
     design: Design, estimator: ComparedEstimator, errors: list[Array]
 ) -> dict[str, TruthErrors]:
-    """What both estimators miss the truth by, from errors (2, p) of each data set."""
+    """Return the errors of both estimators, from errors (2, p) of each data set."""
     lengths = uncertainties(linearise(design), symbols=("U6",)).get("U6")
     if lengths is None or lengths.undetermined or len(errors) < 2:
         return {}
-    found: dict[str, TruthErrors] = {}
-    for name, own in zip(("full", estimator), np.stack(errors, axis=1), strict=True):
-        of_one = truth_errors(own)
-        found |= {} if of_one is None else {name: of_one}
-    return found
+    by_estimator = zip(("full", estimator), np.stack(errors, axis=1), strict=True)
+    return {name: truth_errors(own_errors) for name, own_errors in by_estimator}
 
 
 def _both_estimates(
@@ -523,8 +519,8 @@ def _both_estimates(
     across_probes: bool,
     generator: np.random.Generator,
 ) -> tuple[Array, Array] | None:
-    """Parameters by the full and by the other estimator from one data set; None where one did not
-    converge.
+    """Return parameters by the full and by the alternative estimator from one data set; None unless
+    both converged.
     """
     drawn = noisy_certificate(design, truth, generator, on_truth.model)
     observed = observe(drawn, *noisy_readings(on_truth, truth, generator))
@@ -556,19 +552,19 @@ def _both_estimates(
 
 
 def _distances(design: Design, a: Array, ends: Array) -> Array:
-    """Distances (m,) between corrected points of scale readings `ends` (2, m, d)."""
+    """Return distances (m,) between corrected points of scale readings `ends` (2, m, d)."""
     offsets = np.broadcast_to(design.probes.offsets[design.evaluation.probe], ends.shape[1:])
     corrected = [x + design.model.error(x, a, offsets) for x in ends]
     return np.asarray(np.sqrt(((corrected[0] - corrected[1]) ** 2).sum(axis=1)))
 
 
 def share_below(values: Array, published: float) -> float:
-    """Share of the values that are below a published one: where it stands in their distribution."""
+    """Return the share of the values that are below a published one."""
     return float((values < published).mean()) if len(values) else float("nan")
 
 
 def _used(pairs: int, lengths: int) -> str:
-    """What distances an estimator uses, in words.
+    """Return the distances that an estimator uses as text.
 
     >>> _used(0, 12), _used(1, 0)
     ('12 lengths of standards', '1 pairs of balls')

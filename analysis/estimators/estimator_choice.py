@@ -1,6 +1,6 @@
-"""The estimators by name, and the options of each.
+"""Estimators by name, and the options of each.
 
-What computes is loaded where it is used, so that the names are at hand at once.
+Computing modules are imported late, so that names load fast.
 """
 
 from __future__ import annotations
@@ -25,11 +25,11 @@ ESTIMATORS: tuple[EstimatorName, ...] = get_args(EstimatorName)
 OF_DISTANCES = ("distances", "cresto", "kruth")
 OF_LENGTHS = ("length-equations", "sphere-then-metric")
 COMPARED = (*OF_DISTANCES, *OF_LENGTHS, "reversal")
-"""Those that are compared with the full one."""
+"""Estimators that are compared with the full one."""
 DRAWN = ("full", "reversal")
-"""Those that draw their residuals."""
+"""Estimators that draw their residuals."""
 
-# Which estimators take what; everything else all of them do.
+# Options that only some estimators take.
 TAKE: dict[str, tuple[str, ...]] = {
     "scale": ("reversal",),
     "offsets": ("reversal",),
@@ -42,20 +42,20 @@ TAKE: dict[str, tuple[str, ...]] = {
 }
 
 
-def takers(estimator: str, given: Collection[str]) -> tuple[str, str] | None:
-    """The first of what is given that the estimator does not take, with those that do, in words.
+def takers(estimator: str, options: Collection[str]) -> tuple[str, str] | None:
+    """Return the first option that the estimator does not take, with the names of those that do.
 
     >>> takers("full", ["monomials", "pairs"])
     ('pairs', 'distances, cresto or kruth')
     """
     for name, estimators in TAKE.items():
-        if name in given and estimator not in estimators:
+        if name in options and estimator not in estimators:
             return name, " or ".join(filter(None, (", ".join(estimators[:-1]), estimators[-1])))
     return None
 
 
 def misused(components: str | None, reweight: bool, sigma: str | None) -> str:
-    """What is wrong with these together; otherwise empty.
+    """Return the fault of a combination of options, or an empty text.
 
     >>> misused(None, True, None)
     'reweight needs components, the groups of observations to be weighted anew'
@@ -80,7 +80,7 @@ def fit_readings(
     components: Grouping | None = None,
     reweight: bool = False,
 ) -> FitResult:
-    """What an estimator makes of an experiment's readings.
+    """Return the fit of an experiment's readings by an estimator.
 
     :raises ExperimentError: it cannot estimate this experiment.
     """

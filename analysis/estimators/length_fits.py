@@ -1,6 +1,4 @@
-"""The length equations of US 4,437,151 at work: a fit of readings of bars and gauges, without
-weights.
-"""
+"""Length equations of US 4,437,151: a fit of readings of bars and gauges, without weights."""
 
 from __future__ import annotations
 
@@ -41,10 +39,9 @@ class LengthFit(FitResult):
     """Length equations solved for an experiment's readings; `pivots` have the names of the gauges'
     positions.
 
-    `factors`, `pivots` and `lengths` are NaN where they are open. `spheres` are the radii of
-    spheres through each position's readings of a gauge, a length in scale readings that is told
-    even where no length is known. `reservations` tell what should be known beside the figures, and
-    `expected` is the rank deficiency that the file expects.
+    `factors`, `pivots` and `lengths` are NaN if undetermined. `spheres` are the radii, in scale
+    readings, of spheres through each position's readings of a gauge, also without any known length.
+    `reservations` are warnings, and `expected` is the file's expected rank deficiency.
     """
 
     label: str
@@ -86,15 +83,15 @@ class LengthFit(FitResult):
 
     def lines(self) -> list[str]:
         """Solved length equations as lines of text."""
-        found = self.solution
-        rank = f"rank deficiency {found.deficiency}" if found.deficiency else "full rank"
+        solution = self.solution
+        rank = f"rank deficiency {solution.deficiency}" if solution.deficiency else "full rank"
         lines = [
             self.heading,
             (
-                f"estimator {found.estimator}: {found.equations} equations, all of the same weight;"
-                f" {rank}; {freedom_words(found.degrees_of_freedom)}"
+                f"estimator {solution.estimator}: {solution.equations} equations, all of the same"
+                f" weight; {rank}; {freedom_words(solution.degrees_of_freedom)}"
             ),
-            f"{_status(self)} after {found.iterations} iterations",
+            f"{_status(self)} after {solution.iterations} iterations",
             "",
         ]
         columns = {
@@ -102,11 +99,11 @@ class LengthFit(FitResult):
             **{name: [1e6 * value] for name, value in zip(FACTORS, self.factors, strict=True)},
         }
         lines += [*table_lines(columns), "", *adjustment_lines(self.adjustments)]
-        where = [
+        centres = [
             f"{name} ({', '.join(_millimetres(c, 4) for c in centre)}) mm"
             for name, centre in self.pivots
         ]
-        lines += [f"pivots: {'; '.join(where)}, in scale readings"] if where else []
+        lines += [f"pivots: {'; '.join(centres)}, in scale readings"] if centres else []
         radii = [f"{name} {_millimetres(radius, 5)} mm" for name, radius in self.spheres]
         lines += (
             [f"radii of the spheres through the readings: {'; '.join(radii)}, in scale readings"]
@@ -116,13 +113,13 @@ class LengthFit(FitResult):
         return lines + [f"{name}: {_millimetres(value, 5)} mm" for name, value in self.lengths]
 
     def data(self) -> dict[str, Any]:
-        """Solved length equations as plain data in metres and radians; what is open is None."""
-        found = self.solution
+        """Solved length equations as plain data in metres and radians; None if undetermined."""
+        solution = self.solution
         return {
             **self.named,
-            **picked(found, "estimator", "equations", "degrees_of_freedom"),
+            **picked(solution, "estimator", "equations", "degrees_of_freedom"),
             "status": _status(self),
-            "rank_deficiency": found.deficiency,
+            "rank_deficiency": solution.deficiency,
             "factors": dict(zip(FACTORS, self.factors, strict=True)),
             "adjustments": adjustment_data(self.adjustments),
             "pivots": dict(self.pivots),
@@ -132,7 +129,7 @@ class LengthFit(FitResult):
         }
 
     def columns(self) -> tuple[Columns, Sequence[Any]]:
-        """One row for each adjustment of the machine."""
+        """One row per adjustment of the machine."""
         columns = {
             "adjustment": "what",
             "value": "value",
@@ -145,7 +142,7 @@ class LengthFit(FitResult):
 
 
 def has_all_errors(design: Design) -> bool:
-    """Whether the error model is the one that length equations have."""
+    """Return whether the error model is that of length equations."""
     return isinstance(design.model, SpatialMetricModel) and design.model.with_scales
 
 
@@ -155,8 +152,8 @@ def fit_lengths(
     estimator: LengthEstimator,
     sigma: Literal["estimated", "given"] | None = None,
 ) -> LengthFit:
-    """Solve the length equations of an experiment's readings; a `sigma` that is asked for is told
-    to have no effect.
+    """Solve the length equations of an experiment's readings; a warning states that `sigma` has no
+    effect.
 
     :raises ExperimentError: no bars and gauges, two dimensions, or readings that give no metric.
     """
@@ -200,25 +197,27 @@ def fit_lengths(
 def _refuse_other_artefacts(
     experiment: Experiment, design: Design, estimator: LengthEstimator
 ) -> None:
-    """Refuse an experiment that has no lengths in three dimensions."""
+    """Refuse an experiment without lengths in three dimensions."""
     if design.dimension == 3 and len(design.of(Lengths)):
         return
-    what, has = "artefacts", "has no ball bar or Bryan gauge whose lengths are read"
-    if design.dimension != 3:
-        what, has = "machine.volume", "has two dimensions"
-    text = f"{has}, but {estimator} needs lengths read in three dimensions; use another estimator"
     bars = [
-        name for name, one in experiment.artefacts.items() if isinstance(one, TwoSpheresSettings)
+        name
+        for name, settings in experiment.artefacts.items()
+        if isinstance(settings, TwoSpheresSettings)
     ]
     if bars and design.dimension == 3:
         text = f"is a plate, but {estimator} needs length standards; state role: length_standard"
         mark = experiment.place(("artefacts", bars[0]))
         raise mark.refused(text, f"artefacts.{bars[0]}")
-    raise refused(experiment.source, text, what)
+    key, fact = "artefacts", "has no ball bar or Bryan gauge whose lengths are read"
+    if design.dimension != 3:
+        key, fact = "machine.volume", "has two dimensions"
+    text = f"{fact}, but {estimator} needs lengths read in three dimensions; use another estimator"
+    raise refused(experiment.source, text, key)
 
 
 def _remarks(design: Design, estimator: LengthEstimator, solution: LengthSolution) -> list[str]:
-    """What should be known beside the figures."""
+    """Return warnings about the solution."""
     remarks = []
     if len(design.plate_readings):
         remarks.append(f"{estimator} ignores plates and calibrated co-ordinates")
@@ -247,15 +246,15 @@ def _remarks(design: Design, estimator: LengthEstimator, solution: LengthSolutio
         remarks.append(
             "there are no more equations than unknowns, so that no uncertainties can be estimated"
         )
-    instead = "the full estimator with --sigma given takes the uncertainties as stated"
-    doubt = few_degrees_of_freedom(solution.degrees_of_freedom, "the scatter", instead)
+    remedy = "the full estimator with --sigma given takes the uncertainties as stated"
+    doubt = few_degrees_of_freedom(solution.degrees_of_freedom, "the scatter", remedy)
     remarks += [doubt] if doubt else []
     return remarks
 
 
 def _spheres(design: Design, x: Array) -> Iterator[tuple[str, float]]:
-    """Positions of gauges with the radius (m) of the sphere through their readings x (m, d), where
-    they fix one.
+    """Yield positions of gauges with the radius (m) of the sphere that their readings x (m, d)
+    determine.
     """
     for k in design.gauge_positions:
         rows = design.readings.position == k

@@ -1,4 +1,4 @@
-"""A reversal and the full estimate beside it, as they show themselves."""
+"""Result of a reversal, with the full estimate of the same readings."""
 
 from __future__ import annotations
 
@@ -31,21 +31,20 @@ from ..results.text_blocks import MOST_BALLS, coordinates_data
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-# The first-order equations may change a result by this many of its standard uncertainties before a
-# warning is due.
+# Error of the first-order equations, in standard uncertainties of a result, that causes a warning.
 NOTICEABLE = 0.5
-# With more than this many they are of no use.
+# The same that makes the result unusable.
 USELESS = 5.0
 
-# Chance that offsets are missed although there are none.
-ERRS = 1e-3
+# Significance level of the test for offsets.
+SIGNIFICANCE_LEVEL = 1e-3
 
 
-def of_all_balls(values: Array, both: Integers, count: int) -> Array:
-    """Values (k, 2) of some balls among all (count, 2), NaN of the others."""
-    found = np.full((count, 2), np.nan)
-    found[both] = values
-    return found
+def of_all_balls(values: Array, balls: Integers, count: int) -> Array:
+    """Return values (k, 2) of `balls` among those of all (count, 2), NaN for the others."""
+    every = np.full((count, 2), np.nan)
+    every[balls] = values
+    return every
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -54,12 +53,12 @@ class ReversalFit(FitResult):
 
     `first` and `second` are positions, the second turned by about 90 degrees clockwise from the
     first; `places` (k, 2) are the readings in the first, of the balls that are read in `both` (k,),
-    which alone the reversal takes. `names` and `coordinates` (n, 2) are the balls by the reversal
-    in the plate's own `axes`, NaN of others. `full` is the estimate by multiple redundancy
-    with the same share of the scale difference, and `redundant` its alpha, beta, gamma (unless
-    `scale` is "none") and offsets as the reversal defines them, with standard uncertainties.
-    `without_offsets` is the chance of a ratio of sums of squares such as found if there were none;
-    NaN where they are parameters.
+    the only ones that the reversal uses. `names` and `coordinates` (n, 2) are the balls by the
+    reversal in the plate's own `axes`, NaN for others. `full` is the estimate by multiple
+    redundancy with the same share of the scale difference, and `redundant` its alpha, beta, gamma
+    (unless `scale` is "none") and offsets as the reversal defines them, with standard
+    uncertainties. `without_offsets` is the p-value of the hypothesis of no offsets; NaN if they are
+    parameters.
     """
 
     label: str
@@ -81,18 +80,17 @@ class ReversalFit(FitResult):
 
     @property
     def turn(self) -> float:
-        """The turn in radians that multiple redundancy finds, or the reversal where that finds
-        none.
+        """The turn in radians by multiple redundancy, or by the reversal if the former is
+        undetermined.
         """
-        betas = [
-            one.value for one in self.redundant if one.name == "beta" and np.isfinite(one.value)
-        ]
-        return np.pi / 2.0 + (betas[0] if betas else self.found.exact_beta)
+        estimates = {estimate.name: estimate.value for estimate in self.redundant}
+        beta = estimates.get("beta", np.nan)
+        return np.pi / 2.0 + (beta if np.isfinite(beta) else self.found.exact_beta)
 
     @property
     def distortion(self) -> float:
-        """Most that what is neglected changes a co-ordinate of a ball by, in metres, in the plate's
-        own axes.
+        """Largest error of a ball's co-ordinate by the first-order equations, in metres, in the
+        plate's own axes.
         """
         every = of_all_balls(self.found.exact_coordinates, self.both, len(self.names))
         exact, _ = in_plate_axes(every, self.axes)
@@ -104,13 +102,13 @@ class ReversalFit(FitResult):
         return tuple(self.names[ball] for ball in self.both)
 
     def residual_vectors(self) -> tuple[Vectors, ...]:
-        """Readings in the first position less what those in the second predict."""
+        """Readings in the first position less those that the second predicts."""
         label = f"{self.first}, less what {self.second} predicts"
         return (Vectors(label, self.places, self.found.residuals, self.names_of_both),)
 
     @property
     def observed(self) -> ObservedReadings:
-        """The readings of both."""
+        """The readings of both positions."""
         return self.full.observed
 
     @property
@@ -122,14 +120,14 @@ class ReversalFit(FitResult):
         return "; ".join(filter(None, [reason, self.full.lack_of_fit.complaint]))
 
     def headline(self) -> str:
-        values = (f"{one.name} {1e6 * one.value:.4g} {SHOWN[one.unit]}" for one in self.estimates)
+        values = (f"{p.name} {1e6 * p.value:.4g} {SHOWN[p.unit]}" for p in self.estimates)
         return f"reversal, {', '.join(values)}"
 
     def lines(self) -> list[str]:
-        """The reversal as lines of text: parameters and co-ordinates, those of multiple redundancy
-        beside them.
+        """The reversal as lines of text: parameters and co-ordinates, with those of multiple
+        redundancy.
         """
-        found, full = self.found, self.full
+        reversal, full = self.found, self.full
         turn = number(float(np.degrees(self.turn)), 8)
         count = "five parameters" if self.offsets else "three parameters, no offsets"
         scale = "none (fitted, but not applied)" if self.scale == "none" else self.scale
@@ -141,13 +139,13 @@ class ReversalFit(FitResult):
                 f' from "{self.first}"'
             ),
             (
-                f"sigma = {number(1e6 * found.sigma)} µm with {found.degrees_of_freedom} degrees of"
-                " freedom, of the difference of two readings; of a single one"
-                f" {number(1e6 * found.single)} µm"
+                f"sigma = {number(1e6 * reversal.sigma)} µm with {reversal.degrees_of_freedom} degrees"
+                " of freedom, of the difference of two readings; of a single one"
+                f" {number(1e6 * reversal.single)} µm"
             ),
             (
                 "what the first-order equations neglect changes no result by more than"
-                f" {number(found.bias, 2)} standard uncertainties"
+                f" {number(reversal.bias, 2)} standard uncertainties"
             ),
             (
                 f"multiple redundancy: {full.solution.status}; sigma = {number(full.sigma)} times"
@@ -162,24 +160,24 @@ class ReversalFit(FitResult):
         """The reversal as plain data in metres and radians; `multiple_redundancy` has the full
         fit.
         """
-        found = self.found
+        reversal = self.found
         return {
             **self.named,
             "estimator": "reversal",
             **picked(self, "scale", "offsets"),
             "positions": picked(self, "first", "second"),
-            "sigma": found.sigma if found.degrees_of_freedom > 0 else None,
-            "degrees_of_freedom": found.degrees_of_freedom,
-            "neglected_standard_uncertainties": found.bias,
+            "sigma": reversal.sigma if reversal.degrees_of_freedom > 0 else None,
+            "degrees_of_freedom": reversal.degrees_of_freedom,
+            "neglected_standard_uncertainties": reversal.bias,
             "neglected_coordinates": self.distortion,
-            "neglected_offset": float(np.abs(found.offset - found.exact_offset).max()),
+            "neglected_offset": float(np.abs(reversal.offset - reversal.exact_offset).max()),
             "estimates": by_name(self.estimates, *FIGURES),
             "axes": {
                 "origin": self.names[self.axes.origin],
                 "xy"[self.axes.axis]: self.names[self.axes.ball],
             },
             "balls": coordinates_data(self.names, self.coordinates),
-            "residuals": coordinates_data(self.names_of_both, found.residuals),
+            "residuals": coordinates_data(self.names_of_both, reversal.residuals),
             "multiple_redundancy": {
                 "relation": by_name(self.redundant, *FIGURES),
                 **self.full.to_dict(),
@@ -188,17 +186,15 @@ class ReversalFit(FitResult):
         }
 
     def columns(self) -> tuple[Columns, Sequence[Any]]:
-        """One row for each parameter, that of multiple redundancy beside it."""
-        redundant = {one.name: one for one in self.redundant}
-        others = [redundant.get(one.name) for one in self.estimates]
+        """One row per parameter, with that of multiple redundancy."""
+        redundant = {p.name: (p.value, p.standard_uncertainty) for p in self.redundant}
+        pairs = [redundant.get(p.name, (np.nan, np.nan)) for p in self.estimates]
         columns = {
             "parameter": "name",
             "reversal": "value",
             "standard uncertainty": "standard_uncertainty",
-            "multiple redundancy": [np.nan if one is None else one.value for one in others],
-            "its standard uncertainty": [
-                np.nan if one is None else one.standard_uncertainty for one in others
-            ],
+            "multiple redundancy": [value for value, _ in pairs],
+            "its standard uncertainty": [uncertainty for _, uncertainty in pairs],
             "unit": "unit",
         }
         return columns, self.estimates
@@ -207,14 +203,14 @@ class ReversalFit(FitResult):
         return draw_vectors(self.residual_vectors(), self.title, path)
 
     def _neglected(self) -> str:
-        """What the first-order equations change by what they neglect."""
+        """A sentence about the error of the first-order equations."""
         away = np.degrees(abs(self.turn - np.pi / 2.0))
-        told = f"{away:.4g} degrees" if away >= 1.0 else f"{3600.0 * away:.3g} arcsec"
+        difference = f"{away:.4g} degrees" if away >= 1.0 else f"{3600.0 * away:.3g} arcsec"
         offset = float(np.abs(self.found.offset - self.found.exact_offset).max())
         shift = f" and offsets by up to {_length(offset)}" if self.offsets else ""
         return (
-            f"the turn is {told} from 90 degrees, too far for equations of the first order: what"
-            " they neglect changes co-ordinates of balls by up to"
+            f"the turn is {difference} from 90 degrees, too far for equations of the first order:"
+            " what they neglect changes co-ordinates of balls by up to"
             f" {_length(self.distortion)}{shift}, and results by up to {number(self.found.bias, 2)}"
             " of their standard uncertainties; turn the plate closer to 90 degrees, or take the"
             " results of multiple redundancy"
@@ -222,21 +218,21 @@ class ReversalFit(FitResult):
 
     @property
     def cautions(self) -> tuple[str, ...]:
-        told = []
-        left = [name for name in self.names if name not in self.names_of_both]
-        if left:
-            told.append(
-                f"the reversal leaves out what is not read in both positions: {listing(left)}"
+        warnings = []
+        omitted = [name for name in self.names if name not in self.names_of_both]
+        if omitted:
+            warnings.append(
+                f"the reversal leaves out what is not read in both positions: {listing(omitted)}"
             )
         if NOTICEABLE < self.found.bias <= USELESS:
-            told.append(self._neglected())
-        if self.without_offsets < ERRS:
-            told.append(
+            warnings.append(self._neglected())
+        if self.without_offsets < SIGNIFICANCE_LEVEL:
+            warnings.append(
                 "the residuals are those of an offset between the positions; fit without"
                 " --no-offsets"
             )
         if self.full.converged and self.full.too_large:
-            told.append(
+            warnings.append(
                 "the residuals are larger than the stated repeatability explains; standard"
                 " uncertainties of multiple "
                 + (
@@ -245,30 +241,30 @@ class ReversalFit(FitResult):
                     else "redundancy are too small"
                 )
             )
-        return tuple(told)
+        return tuple(warnings)
 
 
 def _ball_lines(fit: ReversalFit) -> list[str]:
     plate = fit.full.plates[0] if fit.full.plates else None
-    nothing = np.full_like(fit.coordinates, np.nan)
-    others, us = (plate.coordinates, plate.standard_uncertainties) if plate else (nothing, nothing)
-    (x, y), (their_x, their_y), (u, v) = (
-        own[:MOST_BALLS].T for own in (fit.coordinates, others, us)
+    missing = np.full_like(fit.coordinates, np.nan)
+    full, us = (plate.coordinates, plate.standard_uncertainties) if plate else (missing, missing)
+    (x, y), (full_x, full_y), (u, v) = (
+        array[:MOST_BALLS].T for array in (fit.coordinates, full, us)
     )
     columns = [
         ("ball", list(fit.names[:MOST_BALLS])),
         ("x, mm", (x, u)),
         ("y, mm", (y, v)),
-        ("multiple redundancy: x, mm", (their_x, u)),
-        ("y, mm", (their_y, v)),
+        ("multiple redundancy: x, mm", (full_x, u)),
+        ("y, mm", (full_y, v)),
         ("standard uncertainty of x, µm", (u, 3)),
         ("of y, µm", (v, 3)),
     ]
-    left = len(fit.names) - MOST_BALLS
+    omitted = len(fit.names) - MOST_BALLS
     return [
         f"co-ordinates of the balls in the plate's own axes ({axes_words(fit.axes, fit.names)})",
         *table_lines(columns),
-        *([f"({left} balls more in --json)"] if left > 0 else []),
+        *([f"({omitted} balls more in --json)"] if omitted > 0 else []),
     ]
 
 

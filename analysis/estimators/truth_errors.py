@@ -1,4 +1,4 @@
-"""Bias and scatter of estimators against the true machine, over synthetic data sets."""
+"""Bias and standard deviation of estimators against the true machine, over synthetic data sets."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ class TruthErrors:
     """Errors of the distances that an estimator corrects, over data sets, in metres.
 
     `bias` is the root mean square over pairs of points of the mean error, `scatter` that of the
-    standard deviation, `rms` that of all errors. Without any bias the scatter alone would give a
-    bias of `chance`. `rms_error` is the standard error of `rms`.
+    standard deviation, `rms` that of all errors. `chance` is the expected `bias` of an unbiased
+    estimator, and `rms_error` the standard error of `rms`.
     """
 
     bias: float
@@ -25,17 +25,13 @@ class TruthErrors:
 
     @property
     def is_biased(self) -> bool:
-        """Whether the bias is more than scatter explains: beyond three times its chance level."""
+        """Whether the bias is significant: beyond three times its chance level."""
         return self.bias > 3.0 * self.chance
 
 
-def truth_errors(errors: Array) -> TruthErrors | None:
-    """Errors (t, p) of the distances between p pairs of points in t data sets; None of fewer than
-    two.
-    """
+def truth_errors(errors: Array) -> TruthErrors:
+    """Return statistics of errors (t, p) of p distances in t data sets, at least two."""
     count = len(errors)
-    if count < 2:
-        return None
     squares = (errors**2).mean(axis=1)
     rms = float(np.sqrt(squares.mean()))
     scatter = float(np.sqrt(errors.var(axis=0, ddof=1).mean()))

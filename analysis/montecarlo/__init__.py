@@ -1,4 +1,4 @@
-"""Monte Carlo: repeated estimates of synthetic readings beside the linearised uncertainties."""
+"""Monte Carlo: repeated estimates of synthetic readings, compared with linearised uncertainties."""
 
 from __future__ import annotations
 

@@ -1,8 +1,8 @@
-"""Running sums over replicates, and the resulting figures, each with its standard error.
+"""Running sums over replicates, and the resulting values with standard errors.
 
-A replicate's errors in one quantity, say all distances of U5, are far from independent of one
-another; replicates are. Each figure is therefore a mean over replicates of one number for each, and
-its standard error that of the mean.
+Errors of one replicate in a quantity, such as all distances of U5, are strongly correlated;
+replicates are independent. Each value is therefore a mean over replicates of one number, with the
+standard error of the mean.
 """
 
 from __future__ import annotations
@@ -17,16 +17,16 @@ from ballplate.simulator.machines.protocol import Array
 
 from .targets import MonteCarloQuantity
 
-# Share of true values that an expanded uncertainty is to cover.
+# Coverage probability of expanded uncertainties.
 COVERAGE = 0.95
 
-# Names of the numbers that each replicate gives for a quantity.
+# Indices of a replicate's numbers for a quantity, see `QuantityAccumulator`.
 SPREAD, ACTUAL, SYSTEMATIC, KNOWN, ESTIMATED = range(5)
 
 
 @dataclass(frozen=True)
 class Factors:
-    """Coverage factors, normal and Student's, and the largest S^2 that is no sign of misfit."""
+    """Coverage factors, normal and Student's, and the critical S^2."""
 
     known: float
     estimated: float
@@ -35,7 +35,7 @@ class Factors:
 
 
 def factors(freedom: int) -> Factors:
-    """Factors for 95 % coverage, and S^2's 95 % quantile; NaN without degrees of freedom."""
+    """Return factors for 95 % coverage, and S^2's 95 % quantile; NaN without degrees of freedom."""
     from scipy.special import chdtri, ndtri, stdtrit
 
     tail = 0.5 * (1.0 + COVERAGE)
@@ -50,10 +50,10 @@ class QuantityAccumulator:
     """Sums over replicates of a quantity: errors (q,), their squares (q,), and of (5,) numbers and
     their squares.
 
-    The five: mean square of the errors' scatter in standard uncertainties; mean square of the
-    errors over that of the uncertainties; how much larger than the first the errors' mean square in
-    standard uncertainties is; share of errors within the expanded uncertainty with sigma known, and
-    with sigma estimated from the replicate's residuals.
+    The five: mean square of the errors' deviations in standard uncertainties; mean square of the
+    errors over that of the uncertainties; excess of the errors' mean square in standard
+    uncertainties over the first; share of errors within the expanded uncertainty with sigma known,
+    and with sigma estimated from the replicate's residuals.
     """
 
     errors: Array
@@ -67,10 +67,10 @@ class QuantityAccumulator:
 
 @dataclass(frozen=True)
 class Accumulator:
-    """Sums over `count` replicates that converged; `failed` holds the numbers of the others.
+    """Sums over `count` converged replicates; `failed` holds the numbers of the others.
 
     `residual` (2,) sums S^2 and its square, `rejected` counts S^2 beyond its limit, `passes` is the
-    most that any took.
+    maximum.
     """
 
     count: int
@@ -87,21 +87,21 @@ class Accumulator:
             max(self.passes, other.passes),
             self.residual + other.residual,
             self.rejected + other.rejected,
-            tuple(one + two for one, two in zip(self.quantities, other.quantities, strict=True)),
+            tuple(map(add, self.quantities, other.quantities)),
         )
 
 
 def accumulate(
     shared: Reference, aims: tuple[MonteCarloQuantity, ...], estimates: Estimates, count: int
 ) -> Accumulator:
-    """Sums over the first `count` replicates of a batch."""
+    """Return sums over the first `count` replicates of a batch."""
     limits = factors(shared.degrees_of_freedom)
     used = estimates.converged & (np.arange(len(estimates.index)) < count)
     failed = estimates.index[:count][~estimates.converged[:count]]
     squares = estimates.sum_of_squares[used]
     sigma = np.sqrt(np.maximum(squares, 0.0) / max(limits.freedom, 1))
     quantities = []
-    # Memory of the largest vectors, once for all: they are far larger than what stays in cache.
+    # Allocated once, since the largest vectors exceed the cache.
     work = np.empty((2, len(squares) * max((len(aim.base) for aim in aims), default=0)))
     for aim in aims:
         change = aim.change(estimates.found)
@@ -110,25 +110,25 @@ def accumulate(
         # Sums over the quantity's members are products with vectors of weights: one pass each.
         weight = aim.uncertainty**-2.0
         of_scatter = np.square(change, out=squared) @ weight
-        # What the squares of the errors have beyond those of their scatter, without the difference
-        # of two sums that may be far larger.
+        # Excess of the errors' squares over those of their deviations, without subtracting two sums
+        # that may be far larger.
         systematic = change @ (2.0 * aim.base * weight) + aim.base**2 @ weight
         np.add(change, aim.base, out=error)
         np.square(error, out=squared)
         errors, squares_of_errors = error.sum(axis=0), squared.sum(axis=0)
-        # Over the mean square uncertainty of those in the same unit: in units of their own
-        # uncertainties they would be ruled by the few that have almost none.
+        # Relative to the mean square uncertainty in the same unit: relative to each uncertainty,
+        # the few members that have almost none would dominate.
         against_typical = squared @ (1.0 / aim.typical)
         squared *= weight
-        is_known = squared <= limits.known**2
-        is_estimated = squared <= (limits.estimated * sigma[:, None]) ** 2
+        within_known = squared <= limits.known**2
+        within_estimated = squared <= (limits.estimated * sigma[:, None]) ** 2
         numbers = np.stack(
             [
                 of_scatter,
                 against_typical,
                 systematic,
-                np.count_nonzero(is_known, axis=1),
-                np.count_nonzero(is_estimated, axis=1),
+                np.count_nonzero(within_known, axis=1),
+                np.count_nonzero(within_estimated, axis=1),
             ]
         )
         numbers /= change.shape[1]

@@ -12,13 +12,12 @@ from ..uncertainty.quantities import QUANTITIES
 from .experiments import Trials
 from .figures import BEYOND, MonteCarloComparison, MonteCarloEstimate, MonteCarloOutcome
 
-# S^2 of readings without noise, for each degree of freedom, below which nothing is left but
-# rounding.
+# S^2 of readings without noise, per degree of freedom, below which it is rounding.
 NO_MISFIT = 1e-9
 
 
 def with_error(figure: MonteCarloEstimate, factor: float = 1.0) -> str:
-    """A value with its standard error in units of the last digit, as the GUM writes it (7.2.2).
+    """Return a value with its standard error in units of the last digit (GUM, 7.2.2).
 
     >>> with_error(MonteCarloEstimate(0.99213, 0.0066))
     '0.992(7)'
@@ -39,11 +38,11 @@ def with_error(figure: MonteCarloEstimate, factor: float = 1.0) -> str:
     return f"{value:.{decimals}f}({digits})"
 
 
-def trials_lines(done: Trials) -> list[str]:
-    """Replicates beside the linearised uncertainties, as lines of text."""
-    outcome = done.outcome
+def trials_lines(result: Trials) -> list[str]:
+    """Return replicates compared with the linearised uncertainties, as lines of text."""
+    outcome = result.outcome
     if outcome is None:
-        return [f"no Monte Carlo: {done.reason}"]
+        return [f"no Monte Carlo: {result.reason}"]
     if not outcome.comparisons:
         return [f"no Monte Carlo: {outcome.reason}", *_failed_lines(outcome)]
     rows = [
@@ -59,70 +58,72 @@ def trials_lines(done: Trials) -> list[str]:
             "",
         ]
     ]
-    for symbol, one in outcome.comparisons.items():
+    for symbol, comparison in outcome.comparisons.items():
         # Lengths and angles have ratios in common, and no average.
         averages = ["", "", ""]
-        if ", " not in one.unit:
+        if ", " not in comparison.unit:
             averages = [
-                number(1e6 * one.linear_average),
-                number(1e6 * one.actual_average),
-                shown_unit(one.unit),
+                number(1e6 * comparison.linear_average),
+                number(1e6 * comparison.actual_average),
+                shown_unit(comparison.unit),
             ]
         rows.append(
             [
                 symbol,
                 *averages,
-                with_error(one.spread),
-                with_error(one.bias),
-                with_error(one.known, 100.0),
-                with_error(one.estimated, 100.0),
-                f"<- {', '.join(one.flags)}" if one.flags else "",
+                with_error(comparison.spread),
+                with_error(comparison.bias),
+                with_error(comparison.known, 100.0),
+                with_error(comparison.estimated, 100.0),
+                f"<- {', '.join(comparison.flags)}" if comparison.flags else "",
             ]
         )
     lines = [
         (
-            f"Monte Carlo: {outcome.trials} data sets of the true machine, seed {done.seed}; in"
+            f"Monte Carlo: {outcome.trials} data sets of the true machine, seed {result.seed}; in"
             " parentheses the standard error of the last digit"
         ),
         *aligned(rows, [False, True, True, False, True, True, True, True, False]),
     ]
-    sampled = [symbol for symbol, one in outcome.comparisons.items() if one.sampled]
+    sampled = [symbol for symbol, comparison in outcome.comparisons.items() if comparison.sampled]
     if sampled:
         count = outcome.comparisons[sampled[0]].count
         lines.append(f"{' and '.join(sampled)} for a sample of {count} distances")
-    if any(one.flags for one in outcome.comparisons.values()):
+    if any(comparison.flags for comparison in outcome.comparisons.values()):
         lines.append(f"<- differs from linear theory by more than {BEYOND:g} standard errors")
-    return lines + _failed_lines(outcome) + _misfit_lines(done, outcome)
+    return lines + _failed_lines(outcome) + _misfit_lines(result, outcome)
 
 
 def _failed_lines(outcome: MonteCarloOutcome) -> list[str]:
     if not outcome.failed:
         return []
-    left_out = " and are left out of all figures" if outcome.comparisons else ""
+    omission = " and are left out of all figures" if outcome.comparisons else ""
     numbers = listing([str(k) for k in outcome.failed])
-    return [f"{len(outcome.failed)} data sets did not converge{left_out}: {numbers}"]
+    return [f"{len(outcome.failed)} data sets did not converge{omission}: {numbers}"]
 
 
-def _misfit_lines(done: Trials, outcome: MonteCarloOutcome) -> list[str]:
+def _misfit_lines(result: Trials, outcome: MonteCarloOutcome) -> list[str]:
     misfit = outcome.misfit
     lines = [
         f"S^2 is {with_error(misfit.mean)} with {misfit.degrees_of_freedom} degrees of freedom, and"
         f" beyond its 95 % limit in {with_error(misfit.rejected, 100.0)} % of the data sets"
     ]
-    if done.optimism is None:
+    if result.optimism is None:
         return lines
     if misfit.noise_free < NO_MISFIT * misfit.degrees_of_freedom:
         return [
             *lines,
             "the true machine has another error model, which the fitted one follows exactly",
         ]
-    told = {
-        symbol: one.actual
-        for symbol, one in outcome.comparisons.items()
-        if QUANTITIES[one.symbol].effect
+    ratios_by_symbol = {
+        symbol: comparison.actual
+        for symbol, comparison in outcome.comparisons.items()
+        if QUANTITIES[comparison.symbol].effect
     }
-    ratios = [f"{symbol} {with_error(ratio)}" for symbol, ratio in told.items()]
-    too_optimistic = any(ratio.value > 1.0 and ratio.differs_from(1.0) for ratio in told.values())
+    ratios = [f"{symbol} {with_error(ratio)}" for symbol, ratio in ratios_by_symbol.items()]
+    too_optimistic = any(
+        ratio.value > 1.0 and ratio.differs_from(1.0) for ratio in ratios_by_symbol.values()
+    )
     lines += [
         "",
         ("Too optimistic? " if too_optimistic else "")
@@ -131,33 +132,34 @@ def _misfit_lines(done: Trials, outcome: MonteCarloOutcome) -> list[str]:
         + ("" if too_optimistic else f"; none is above 1 by more than {BEYOND:g} standard errors"),
         (
             f"readings without noise leave S^2 = {misfit.noise_free:.4g}; with sigma known, S^2"
-            f" alone shows the misfit in {100 * done.optimism.power:.3g} % of experiments"
+            f" alone shows the misfit in {100 * result.optimism.power:.3g} % of experiments"
         ),
     ]
-    own = done.optimism.own_model
-    if own is not None:
+    own_model = result.optimism.own_model
+    if own_model is not None:
         lines.append(
-            f"a second fit with the true machine's own functions added, {own.more} parameters more"
-            f" that this design determines, brings S^2 down by {own.gain:.4g} beyond chance;"
-            f" comparing the two shows it in {100 * own.power:.3g} %"
+            f"a second fit with the true machine's own functions added, {own_model.more} parameters"
+            f" more that this design determines, brings S^2 down by {own_model.gain:.4g} beyond"
+            f" chance; comparing the two shows it in {100 * own_model.power:.3g} %"
         )
     return lines
 
 
-def trials_data(done: Trials) -> dict[str, Any]:
-    """The same as plain data in metres and radians at full precision."""
-    outcome = done.outcome
+def trials_data(result: Trials) -> dict[str, Any]:
+    """Return replicates as plain data in metres and radians at full precision."""
+    outcome = result.outcome
     if outcome is None:
-        return {"reason": done.reason}
+        return {"reason": result.reason}
     misfit = outcome.misfit
-    found: dict[str, Any] = {
+    data: dict[str, Any] = {
         **({"reason": outcome.reason} if outcome.reason else {}),
         "trials": outcome.trials,
-        "seed": done.seed,
+        "seed": result.seed,
         "not_converged": list(outcome.failed),
         **picked(outcome, "passes", "interrupted"),
         "quantities": {
-            symbol: _comparison_data(one) for symbol, one in outcome.comparisons.items()
+            symbol: _comparison_data(comparison)
+            for symbol, comparison in outcome.comparisons.items()
         },
         "sum_of_squares": {
             **_figure(misfit.mean),
@@ -166,17 +168,21 @@ def trials_data(done: Trials) -> dict[str, Any]:
             "beyond_limit": _figure(misfit.rejected),
         },
     }
-    if done.optimism is not None:
-        own = done.optimism.own_model
-        found["too_optimistic"] = {
-            "misfit_noticed": done.optimism.power,
+    if result.optimism is not None:
+        own_model = result.optimism.own_model
+        data["too_optimistic"] = {
+            "misfit_noticed": result.optimism.power,
             "own_model": (
                 None
-                if own is None
-                else {"parameters_more": own.more, "gain": own.gain, "noticed": own.power}
+                if own_model is None
+                else {
+                    "parameters_more": own_model.more,
+                    "gain": own_model.gain,
+                    "noticed": own_model.power,
+                }
             ),
         }
-    return found
+    return data
 
 
 def _comparison_data(comparison: MonteCarloComparison) -> dict[str, Any]:

@@ -1,6 +1,4 @@
-"""An error model in the neighbourhood of given readings, for many small changes of readings and
-parameters at once.
-"""
+"""Expansion of an error model about readings, for many small changes of readings and parameters."""
 
 from __future__ import annotations
 
@@ -14,16 +12,15 @@ from numpy.typing import NDArray
 
 Single = NDArray[np.float32]
 
-# Half the distance, in metres, between the readings whose difference gives a derivative.
+# Step of central differences, in metres.
 STEP = 1e-4
 
 
 class LocalModel(Protocol):
-    """How the correction at m readings changes with the readings and with the model's parameters.
+    """Changes of the correction at m readings with the readings and with the model's parameters.
 
-    For b replicates `moved` (b, d, m) is what each reading differs by, `offsets` (b, d, m) what its
-    probe's offset differs by where offsets are parameters, and `step` (b, n) what the parameters
-    differ by; without a step it is zero.
+    For b replicates `moved` (b, d, m) are changes of readings, `offsets` (b, d, m) of their probes'
+    offsets if these are parameters, and `step` (b, n) of the parameters, zero if absent.
     """
 
     def change(
@@ -35,11 +32,11 @@ class LocalModel(Protocol):
     def gather(
         self, moved: Single | Array, step: Array | None, pull: Array, offsets: Array | None = None
     ) -> Array:
-        """The derivative by the parameters, transposed, times `pull` (b, d, m): (b, n)."""
+        """The transposed derivative by the parameters, times `pull` (b, d, m): (b, n)."""
         ...
 
     def gather_offsets(self, step: Array | None, pull: Array) -> Array:
-        """The derivative by each reading's probe offset, transposed, times `pull` (b, d, m): (b, d,
+        """The transposed derivative by each reading's probe offset, times `pull` (b, d, m): (b, d,
         m).
         """
         ...
@@ -47,14 +44,14 @@ class LocalModel(Protocol):
 
 @dataclass(frozen=True)
 class Expansion:
-    """A model that is linear in its parameters and smooth in the readings: matrix products serve
+    """A model that is linear in its parameters and smooth in the readings, as matrix products for
     all replicates.
 
-    For each component: `columns` the parameters that matter, `by_parameters` (columns, m),
+    For each component: `columns` of the parameters that matter, `by_parameters` (columns, m),
     `by_place` (axes, m), and `mixed_columns` with `mixed` (columns, axes x m), the derivative of
-    `by_parameters` by the place. The axes are those of the reading and then, if they are
-    parameters, those of the probe offset, less the offset itself. What a place contributes
-    otherwise is a small part of the whole and needs no more digits than single precision has.
+    `by_parameters` by the location. The axes are those of the reading and then, if offsets are
+    parameters, of the probe offset, less the offset itself. Contributions of locations are small,
+    so that single precision suffices.
     """
 
     size: int
@@ -67,7 +64,7 @@ class Expansion:
     def change(
         self, moved: Single | Array, step: Array | None, offsets: Array | None = None
     ) -> Array:
-        found = np.empty(moved.shape)
+        change = np.empty(moved.shape)
         if step is not None and offsets is None and len(self.by_place[0]) > moved.shape[1]:
             offsets = np.zeros(moved.shape)
         places = _places(moved, offsets)
@@ -78,19 +75,19 @@ class Expansion:
                     "am,bam->bm",
                     self.by_place[i][: places.shape[1]],
                     places,
-                    out=found[:, i],
+                    out=change[:, i],
                     casting="same_kind",
                 )
                 continue
-            np.matmul(step[:, self.columns[i]], self.by_parameters[i], out=found[:, i])
+            np.matmul(step[:, self.columns[i]], self.by_parameters[i], out=change[:, i])
             if is_moved:
-                found[:, i] += np.einsum("bam,bam->bm", self._slopes(i, step), places)
+                change[:, i] += np.einsum("bam,bam->bm", self._slopes(i, step), places)
         if offsets is not None:
-            found += offsets
-        return found
+            change += offsets
+        return change
 
     def _slopes(self, i: int, step: Array) -> Single:
-        """Derivatives (b, axes, m) of component i by the places."""
+        """Derivatives (b, axes, m) of component i by the locations."""
         slopes = step[:, self.mixed_columns[i]].astype(np.float32) @ self.mixed[i]
         slopes = slopes.reshape(len(step), *self.by_place[i].shape)
         slopes += self.by_place[i]
@@ -99,29 +96,29 @@ class Expansion:
     def gather(
         self, moved: Single | Array, step: Array | None, pull: Array, offsets: Array | None = None
     ) -> Array:
-        # Some rows are added to in a fifth of the time that it takes with some columns.
-        found = np.zeros((self.size, len(pull)))
+        # Adding to rows takes a fifth of the time of adding to columns.
+        result = np.zeros((self.size, len(pull)))
         for i, columns in enumerate(self.columns):
-            found[columns] += (pull[:, i] @ self.by_parameters[i].T).T
+            result[columns] += (pull[:, i] @ self.by_parameters[i].T).T
         if step is not None:
             places, single = _places(moved, offsets), pull.astype(np.float32)
             for i, columns in enumerate(self.mixed_columns):
-                both = (places * single[:, i, None]).reshape(len(pull), -1)
-                found[columns] += (both @ self.mixed[i].T).T
-        return found.T
+                products = (places * single[:, i, None]).reshape(len(pull), -1)
+                result[columns] += (products @ self.mixed[i].T).T
+        return result.T
 
     def gather_offsets(self, step: Array | None, pull: Array) -> Array:
-        found, d = pull.copy(), pull.shape[1]
+        result, d = pull.copy(), pull.shape[1]
         for i in range(d):
             slopes = self.by_place[i][None] if step is None else self._slopes(i, step)
-            found += slopes[:, d:] * pull[:, i, None]
-        return found
+            result += slopes[:, d:] * pull[:, i, None]
+        return result
 
 
 @dataclass(frozen=True)
 class Direct:
-    """Any model, evaluated replicate by replicate: `x` (m, d), `a` (n,), `p` (m, d), `value` (m, d)
-    the correction.
+    """Any model, evaluated replicate by replicate: `x` (m, d), `a` (n,), `p` (m, d), and the
+    correction `value` (m, d).
     """
 
     model: ErrorModel
@@ -139,34 +136,34 @@ class Direct:
     def change(
         self, moved: Single | Array, step: Array | None, offsets: Array | None = None
     ) -> Array:
-        found = np.empty(moved.shape)
+        change = np.empty(moved.shape)
         for k in range(len(moved)):
             error = self.model.error(
                 self.x + moved[k].T, self._parameters(step, k), self._probe(offsets, k)
             )
-            found[k] = (error - self.value).T
-        return found
+            change[k] = (error - self.value).T
+        return change
 
     def gather(
         self, moved: Single | Array, step: Array | None, pull: Array, offsets: Array | None = None
     ) -> Array:
-        found = np.empty((len(pull), len(self.a)))
+        result = np.empty((len(pull), len(self.a)))
         for k in range(len(pull)):
             probe = self._probe(offsets, k)
             jacobian = self.model.jacobian(self.x + moved[k].T, self._parameters(step, k), probe)
-            found[k] = np.einsum("mdn,dm->n", jacobian, pull[k])
-        return found
+            result[k] = np.einsum("mdn,dm->n", jacobian, pull[k])
+        return result
 
     def gather_offsets(self, step: Array | None, pull: Array) -> Array:
-        found = np.empty_like(pull)
+        result = np.empty_like(pull)
         for k in range(len(pull)):
             by_offset = offset_sensitivity(self.model, self.x, self._parameters(step, k), self.p)
-            found[k] = np.einsum("mij,im->jm", by_offset, pull[k])
-        return found
+            result[k] = np.einsum("mij,im->jm", by_offset, pull[k])
+        return result
 
 
 def _places(moved: Single | Array, offsets: Array | None) -> Single:
-    """What readings, and offsets if they are parameters, differ by, (b, axes, m)."""
+    """Return changes of readings, and of offsets if they are parameters, (b, axes, m)."""
     if offsets is None:
         return moved.astype(np.float32)
     return np.concatenate([moved, offsets], axis=1, dtype=np.float32)
@@ -175,14 +172,14 @@ def _places(moved: Single | Array, offsets: Array | None) -> Single:
 def expand(
     model: ErrorModel, x: Array, a: Array, p: Array, with_offsets: bool = False
 ) -> Expansion:
-    """Expand a model about readings x (m, d), parameters a (n,) and, if asked for, probe offsets p
-    (m, d).
+    """Return a model expanded about readings x (m, d), parameters a (n,) and, optionally, probe
+    offsets p (m, d).
     """
     d = x.shape[1]
     jacobian = model.jacobian(x, a, p)
     by_place, mixed = [], []
     for axis in range(2 * d if with_offsets else d):
-        # Offsets act linearly, so that a step of their own size is exact to rounding.
+        # Offsets act linearly, so that a large step is exact to rounding.
         step = STEP if axis < d else OFFSET_STEP
         shift = np.zeros((2, d))
         shift[axis // d, axis % d] = step
@@ -191,8 +188,10 @@ def expand(
         mixed.append((model.jacobian(*above) - model.jacobian(*below)) / (2 * step))
     for axis in range(d, len(by_place)):
         by_place[axis][:, axis - d] -= 1.0
-    # Differences leave rounding where the derivative is zero.
-    floor = 1e-9 * max((float(np.abs(one).max(initial=0.0)) for one in mixed), default=0.0)
+    # Differences for a zero derivative are rounding errors.
+    floor = 1e-9 * max(
+        (float(np.abs(derivative).max(initial=0.0)) for derivative in mixed), default=0.0
+    )
     together = np.stack(mixed, axis=3)
     columns = tuple(np.flatnonzero(jacobian[:, i].any(axis=0)) for i in range(d))
     used = tuple(
@@ -203,7 +202,8 @@ def expand(
         columns=columns,
         by_parameters=tuple(np.ascontiguousarray(jacobian[:, i, columns[i]].T) for i in range(d)),
         by_place=tuple(
-            np.stack([one[:, i] for one in by_place]).astype(np.float32) for i in range(d)
+            np.stack([derivative[:, i] for derivative in by_place]).astype(np.float32)
+            for i in range(d)
         ),
         mixed_columns=used,
         mixed=tuple(

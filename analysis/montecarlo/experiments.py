@@ -1,6 +1,4 @@
-"""Replicates of an experiment's true machine: are the linearised uncertainties right, or too
-optimistic?
-"""
+"""Replicates of an experiment's true machine: validation of the linearised uncertainties."""
 
 from __future__ import annotations
 
@@ -33,11 +31,11 @@ from .trial_runs import TASK, run_trials, sum_of_task
 
 @dataclass(frozen=True)
 class OwnModel:
-    """What a second fit, with the true machine's own functions added, would tell (NPL Report CISE
-    15/98, section 5.3).
+    """Result of a second fit that adds the true machine's functions (NPL Report CISE 15/98, section
+    5.3).
 
-    The design determines `more` parameters more of it; it brings S^2 down by `gain` more than by
-    chance, and the difference of the two S^2 shows the misfit with probability `power`.
+    The design determines `more` further parameters; they lower S^2 by `gain` more than chance does,
+    and the difference of both S^2 shows the lack of fit with probability `power`.
     """
 
     more: int
@@ -47,9 +45,7 @@ class OwnModel:
 
 @dataclass(frozen=True)
 class Optimism:
-    """How a misfit would be noticed: by S^2 alone with probability `power`, or by a richer
-    model.
-    """
+    """Detection of a lack of fit: by S^2 alone with probability `power`, or by a larger model."""
 
     power: float
     own_model: OwnModel | None
@@ -57,8 +53,8 @@ class Optimism:
 
 @dataclass(frozen=True)
 class Trials:
-    """Replicates of an experiment; without an outcome there is a reason. `optimism` where the
-    models differ.
+    """Replicates of an experiment; without an outcome there is a reason, and `optimism` if models
+    differ.
     """
 
     seed: int
@@ -68,7 +64,7 @@ class Trials:
 
 
 def true_experiment(experiment: Experiment) -> tuple[Design, Truth]:
-    """The design, and the artefacts as drawn on the true machine."""
+    """Return the design, and the nominal artefacts on the true machine."""
     design = lay_out(experiment)
     on_truth, state = on_stated_machine(experiment, design)
     return design, Truth(state, on_truth.model)
@@ -90,19 +86,18 @@ def trials(
     shared = _shared(experiment)
     if isinstance(shared, str):
         return Trials(chosen, None, shared)
-    found = run_trials(shared, chosen, count, until, workers, report)
+    result = run_trials(shared, chosen, count, until, workers, report)
     differs = shared.truth.model != shared.design.model
-    return Trials(chosen, found, optimism=_optimism(experiment, shared) if differs else None)
+    return Trials(chosen, result, optimism=_optimism(experiment, shared) if differs else None)
 
 
 def block_of_trials(
     experiment: Experiment, count: int, seed: int, block: int, size: int
 ) -> Accumulator | None:
-    """Sums over the replicates from `block` x `size` on, `size` of `count` in all at most; None
-    where there are none.
+    """Return sums over at most `size` of `count` replicates from `block` x `size` on; None without
+    any.
 
-    `size` is a multiple of `TASK` replicates. The same replicates have the same bits, whatever the
-    blocks.
+    `size` is a multiple of `TASK` replicates. Replicates have the same bits, regardless of blocks.
 
     :raises ExperimentError: as `trials`.
     """
@@ -116,7 +111,7 @@ def block_of_trials(
 
 
 def combined(experiment: Experiment, total: Accumulator) -> MonteCarloOutcome:
-    """What sums over replicates of an experiment come to.
+    """Return the outcome of sums over an experiment's replicates.
 
     :raises ExperimentError: as `trials`.
     """
@@ -126,7 +121,7 @@ def combined(experiment: Experiment, total: Accumulator) -> MonteCarloOutcome:
 
 
 def _shared(experiment: Experiment) -> Reference | str:
-    """What all replicates share, or why there are none."""
+    """Return the common parts of replicates, or why there are none."""
     design, truth = true_experiment(experiment)
     try:
         shared = reference(design, truth)
@@ -142,19 +137,19 @@ def _optimism(experiment: Experiment, shared: Reference) -> Optimism:
     if getattr(experiment.true_machine, "error_model", None) is None:
         return Optimism(power, None)
     design = shared.design
-    # Neither model need contain the other: what the true one's functions add is the rank of both
-    # together.
+    # Neither model need contain the other: the joint rank gives the parameters that the true one
+    # adds.
     joined = replace(design, model=JoinedModel(design.model, shared.truth.model))
-    both = joined.observed(_widened(design, shared.truth))
-    known = design.parameter_count - shared.spectrum.deficiency
-    more = both.parameter_count - linearise(both).deficiency - known
+    widened = joined.observed(_widened(design, shared.truth))
+    determined = design.parameter_count - shared.spectrum.deficiency
+    more = widened.parameter_count - linearise(widened).deficiency - determined
     if more == 0:
         return Optimism(power, None)
     return Optimism(power, OwnModel(more, misfit, power_of_difference(more, misfit)))
 
 
 def _widened(design: Design, truth: Truth) -> Priors:
-    """The design's priors for a model that has the true one's parameters besides."""
+    """Return the design's priors for a model with the true one's parameters added."""
     by_model = design.of(Priors).by_model
     return replace(
         design.of(Priors), by_model=np.pad(by_model, ((0, 0), (0, len(truth.model.parameters))))

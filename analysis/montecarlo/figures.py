@@ -1,6 +1,4 @@
-"""Results of replicates: bias, spread and coverage beside the linearised uncertainties, with
-standard errors.
-"""
+"""Bias, spread and coverage of replicates relative to linearised uncertainties."""
 
 from __future__ import annotations
 
@@ -22,15 +20,15 @@ from .accumulator import (
 )
 from .targets import MonteCarloQuantity
 
-# Standard errors beyond which a difference is no accident; false in one of some hundred runs with
-# thirty figures each.
+# Standard errors beyond which a difference is significant; false in one of some hundred runs with
+# thirty values each.
 BEYOND = 4.0
 
-# Data sets below which standard errors are themselves too uncertain for flags.
+# Data sets below which standard errors are too uncertain for flags.
 REPLICATES_LIMIT = 100
 
-# Data sets without an estimate, in number and as a share of all, beyond both of which the others
-# are a selection: it is the widest errors that fail.
+# Number and share of failed data sets; beyond both, the others are a biased selection, since the
+# largest errors fail.
 FAILED_LIMIT = 2
 FAILED_SHARE = 0.01
 
@@ -48,17 +46,17 @@ class MonteCarloEstimate:
 
 @dataclass(frozen=True)
 class MonteCarloComparison:
-    """A quantity's replicates beside its linearised uncertainties.
+    """A quantity's replicates compared with its linearised uncertainties.
 
     `linear_...` are the linearised standard uncertainties, `actual_...` the root mean squares of
     the errors, over `count` members, a `sampled` selection of all pairs. `spread` is the ratio of
-    the errors' scatter to the linearised uncertainty, root mean square over the members. `actual`
-    is the root mean square of the errors themselves, what noise-free readings leave included, over
-    that of the linearised uncertainties (of members in the same unit); `bias` the mean error, a
-    root mean square in standard uncertainties like `spread`, and `largest_bias` the largest, in the
-    member's unit. `known` and `estimated` are the shares of true values within the expanded
-    uncertainty for 95 %, with sigma given and with sigma estimated by each replicate. `flags` names
-    the figures that linear theory gets wrong.
+    the errors' standard deviation to the linearised uncertainty, root mean square over the members.
+    `actual` is the root mean square of the errors, with those of noise-free readings, over that of
+    the linearised uncertainties (of members in the same unit); `bias` the mean error, a root mean
+    square in standard uncertainties like `spread`, and `largest_bias` the largest, in the member's
+    unit. `known` and `estimated` are the empirical coverage of expanded uncertainties for 95 %,
+    with sigma given and with sigma estimated by each replicate. `flags` names values that differ
+    from linear theory.
     """
 
     symbol: str
@@ -80,10 +78,11 @@ class MonteCarloComparison:
 
 @dataclass(frozen=True)
 class Misfit:
-    """What S^2 tells: its mean over replicates, its expectation, and the share of replicates beyond
-    its 95 % quantile.
+    """Statistics of S^2: its mean over replicates, its expectation, and the share of replicates
+    beyond its 95 % quantile.
 
-    `noise_free` is S^2 of readings without noise, zero if the fitted model holds the true machine.
+    `noise_free` is S^2 of readings without noise, zero if the fitted model contains the true
+    machine.
     """
 
     mean: MonteCarloEstimate
@@ -94,8 +93,10 @@ class Misfit:
 
 @dataclass(frozen=True)
 class MonteCarloOutcome:
-    """All comparisons, how many replicates they rest on and which failed; no comparison, and no
-    figures of the misfit, where so many failed that the others are a selection.
+    """All comparisons with the number of replicates and the failed ones.
+
+    If so many failed that the others are a selection, comparisons and statistics of S^2 are
+    missing.
     """
 
     trials: int
@@ -107,7 +108,7 @@ class MonteCarloOutcome:
 
     @property
     def reason(self) -> str:
-        """Why there are no comparisons; empty where there are."""
+        """Why comparisons are missing, or empty."""
         if self.comparisons:
             return ""
         return (
@@ -119,19 +120,19 @@ class MonteCarloOutcome:
 def outcome(
     shared: Reference, aims: tuple[MonteCarloQuantity, ...], total: Accumulator
 ) -> MonteCarloOutcome:
-    """Figures from sums."""
+    """Return the outcome of sums."""
     comparisons: dict[str, MonteCarloComparison] = {}
     failed, trials = len(total.failed), total.count + len(total.failed)
     n = 0 if failed > max(FAILED_LIMIT, FAILED_SHARE * trials) else total.count
     for aim, sums in zip(aims, total.quantities, strict=True):
         if not n:
             break
-        # Of several artefacts each has its own distances.
+        # Each artefact has separate distances.
         name = aim.symbol
         while name in comparisons:
             name += "'"
         comparisons[name] = _comparison(aim, sums, n)
-    mean, share = (float(one) / n if n else np.nan for one in (total.residual[0], total.rejected))
+    mean, share = (float(sum_) / n if n else np.nan for sum_ in (total.residual[0], total.rejected))
     return MonteCarloOutcome(
         trials,
         total.failed,
@@ -157,13 +158,13 @@ def _comparison(aim: MonteCarloQuantity, sums: QuantityAccumulator, n: int) -> M
     count = max(n, 1)
     means = sums.numbers / count
     errors = [
-        _error_of_mean(one, two, n)
-        for one, two in zip(sums.numbers, sums.numbers_squared, strict=True)
+        _error_of_mean(total, squares, n)
+        for total, squares in zip(sums.numbers, sums.numbers_squared, strict=True)
     ]
 
-    def root(which: int) -> MonteCarloEstimate:
-        value = float(np.sqrt(means[which]))
-        return MonteCarloEstimate(value, errors[which] / (2.0 * value) if value else 0.0)
+    def root(index: int) -> MonteCarloEstimate:
+        value = float(np.sqrt(means[index]))
+        return MonteCarloEstimate(value, errors[index] / (2.0 * value) if value else 0.0)
 
     spread, actual = root(SPREAD), root(ACTUAL)
     known, estimated = (
@@ -171,7 +172,7 @@ def _comparison(aim: MonteCarloQuantity, sums: QuantityAccumulator, n: int) -> M
         MonteCarloEstimate(float(means[ESTIMATED]), errors[ESTIMATED]),
     )
     mean_error = sums.errors / count
-    # Scatter alone makes means differ from zero; what it makes of their square is taken away.
+    # Noise alone makes means differ from zero: its share of their square is subtracted.
     by_chance = float(means[SPREAD] / count)
     square = float(((mean_error / aim.uncertainty) ** 2).mean()) - by_chance
     bias = _root_of_bias(square, by_chance, errors[SPREAD] / np.sqrt(count), errors[SYSTEMATIC])
@@ -186,8 +187,6 @@ def _comparison(aim: MonteCarloQuantity, sums: QuantityAccumulator, n: int) -> M
         flags.append("coverage with sigma estimated")
     rms = np.sqrt(sums.squares / count)
     present = [unit for unit in ("m", "rad", "1") if unit in aim.units]
-    if n < REPLICATES_LIMIT:
-        flags = []
     return MonteCarloComparison(
         aim.symbol,
         ", ".join(present),
@@ -203,22 +202,22 @@ def _comparison(aim: MonteCarloQuantity, sums: QuantityAccumulator, n: int) -> M
         float(np.abs(mean_error).max()),
         known,
         estimated,
-        tuple(flags),
+        tuple(flags) if n >= REPLICATES_LIMIT else (),
     )
 
 
 def _root_of_bias(
     square: float, by_chance: float, scatter: float, systematic: float
 ) -> MonteCarloEstimate:
-    """Bias from its `square`, of which what chance contributes is taken away, with a standard error
-    that tells how improbable the bias is without one.
+    """Return the bias from its `square`, less the contribution of chance, with a standard error
+    that expresses its improbability without bias.
 
-    Without a bias the mean square is `by_chance` and scatters by `scatter`, about as chi-squared
-    with the degrees of freedom that these two have. To first order its root would have half the
-    relative standard error of the square, and two standard errors of the square, which chance
-    passes in one of thirty figures, would be four of the bias. The standard error is therefore that
-    of a normal variable which would be as improbable, unless what is `systematic`, the bias of
-    readings without noise, is known less well.
+    Without a bias the mean square is `by_chance` with standard deviation `scatter`, about as
+    chi-squared with the degrees of freedom of these two. To first order its root would have half
+    the relative standard error of the square, and two standard errors of the square, which chance
+    exceeds in one of thirty values, would be four of the bias. The standard error is therefore that
+    of an equally improbable normal variable, unless the `systematic` bias of readings without noise
+    is less certain.
     """
     from scipy.special import chdtrc, ndtri
 
@@ -227,21 +226,21 @@ def _root_of_bias(
         return MonteCarloEstimate(float(np.sqrt(max(square, 0.0))), float(np.sqrt(error)))
     value, freedom = float(np.sqrt(square)), 2.0 * (by_chance / scatter) ** 2
     chi_squared = freedom * (1.0 + square / by_chance)
-    # Far out the probability is zero in floating point, and the two are the same.
+    # In the far tail the probability underflows, and both agree.
     improbable = min(-ndtri(0.5 * chdtrc(freedom, chi_squared)), np.sqrt(chi_squared))
     return MonteCarloEstimate(value, max(value / improbable, error / (2.0 * value)))
 
 
 def power_of_difference(more: int, gain: float) -> float:
-    """Probability that `more` parameters, which take `gain` from S^2 without noise, lower it
-    significantly, at 95 %.
+    """Return the probability that `more` parameters, which lower S^2 without noise by `gain`, lower
+    it significantly, at 95 %.
     """
     return power_of_misfit(more, gain)
 
 
 def power_of_misfit(freedom: int, noise_free: float) -> float:
-    """Probability that S^2 exceeds its 95 % quantile when readings without noise leave `noise_free`
-    of it.
+    """Return the probability that S^2 exceeds its 95 % quantile if readings without noise leave
+    `noise_free`.
 
     >>> round(power_of_misfit(100, 0.0), 3)
     0.05

@@ -1,6 +1,4 @@
-"""Common parts of all replicates: the readings without noise, the estimate from them and its
-factorisation.
-"""
+"""Common parts of all replicates: noise-free readings, their estimate and its factorisation."""
 
 from __future__ import annotations
 
@@ -21,26 +19,24 @@ from ballplate.simulator.readings.generate import true_readings
 
 from .expansion import Direct, LocalModel, expand
 
-# Readings handled at once: enough for the matrix products to be efficient, few enough to stay in
-# cache.
+# Readings of a group: enough for efficient matrix products, few enough for the cache.
 READINGS_AT_ONCE = 512
 
-# How well, in standard uncertainties of a reading, the expansion of a model must agree with the
-# model itself.
+# Largest error, in standard uncertainties of a reading, of an expanded model.
 FAITHFUL = 1e-8
-# What is more certain than this share of the repeatability is taken to be as certain: replicates
-# are solved by their gradients, which rounding spoils where weights differ more.
+# Lower limit of uncertainties as a share of the repeatability: replicates are solved by their
+# gradients, which rounding corrupts if weights differ more.
 EXACT_ENOUGH = 1e-4
 
 
 class DivergedError(ValueError):
-    """The true machine's errors are so large that not even readings without noise can be fitted."""
+    """The true machine's errors are too large for a fit of readings without noise."""
 
 
 @dataclass(frozen=True)
 class Truth:
-    """The true artefacts and poses, and the true machine, whose error model need not be the fitted
-    one.
+    """The true artefacts and poses, and the true machine, whose error model may differ from the
+    fitted one.
     """
 
     state: State
@@ -49,12 +45,12 @@ class Truth:
 
 @dataclass(frozen=True)
 class PositionReadings:
-    """Readings `rows` of one position in which no ball occurs twice, at the reference.
+    """Readings `rows` of one position, each ball at most once, at the reference.
 
-    `ball` are their m balls, a slice where they follow one another, `arm` (d, m) the balls turned
-    into the machine's axes, `residual` (d, m) in metres and `weight` (d, m). `probe` (m,) is None
-    where no probe's offset is a parameter, and `by_influence` (p, d, m), the derivative of the
-    residuals by influence quantities, where there are none.
+    `ball` are their m balls, if consecutive a slice, `arm` (d, m) the balls in the machine's axes,
+    `residual` (d, m) in metres and `weight` (d, m). `probe` (m,) is None unless probe offsets are
+    parameters, and `by_influence` (p, d, m), the derivative of the residuals, is None without
+    influence quantities.
     """
 
     rows: slice
@@ -70,15 +66,14 @@ class PositionReadings:
 
 @dataclass(frozen=True)
 class Reference:
-    """What all replicates share.
+    """Common parts of all replicates.
 
-    The plates' readings, `order` (m,) among the design's, stand in the order of `groups`; `noise`
-    (d, m) is the standard uncertainty of each. `ends` are the model at the first and the second
-    ends of the length standards' lengths, so far as they are read, with `end_noise` (d, ends) and
-    `end_difference` (m, d), their difference at the reference; `is_expanded` tells that models are
-    expanded about readings, because that is faithful. `rows` are those of each kind of observations
-    about the truth. `start` is the estimate from readings without noise. Directions that the design
-    as `drawn` leaves open are held; None where there are none.
+    The plates' readings, `order` (m,) among the design's, are in the order of `groups`; `noise` (d,
+    m) is the standard uncertainty of each. `ends` are the model at the first and second read ends
+    of length standards, with `end_noise` (d, ends) and `end_difference` (m, d), their difference at
+    the reference; models are expanded about readings if `is_expanded`. `rows` are those of each
+    type of observation about the truth. `start` is the estimate from readings without noise.
+    Directions that the nominal design `drawn` leaves undetermined are held; None without any.
     """
 
     design: Design
@@ -99,9 +94,7 @@ class Reference:
 
     @property
     def sum_of_squares(self) -> float:
-        """S^2 of readings without noise: zero unless the true machine is none of the fitted
-        model's.
-        """
+        """S^2 of readings without noise: zero if the fitted model contains the true machine."""
         return self.factor.sum_of_squares
 
     @property
@@ -117,7 +110,7 @@ class Reference:
         )
 
     def local_model(self, points: Array, probes: Integers) -> LocalModel:
-        """The model about readings (m, d) with probes of indices (m,)."""
+        """Return the model about readings (m, d) with probes of indices (m,)."""
         p = self.start.probes[probes]
         return _local_model(self.design, self.start.a, points, p, self.is_expanded)
 
@@ -126,8 +119,7 @@ class Reference:
         return self.linearisation.degrees_of_freedom
 
 
-# In one piece: everything that replicates share is made at one reference, each part from those
-# before.
+# In one function, since each part needs those before.
 @single_threaded
 def reference(design: Design, truth: Truth) -> Reference:
     """Prepare the replicates of a design whose true artefacts, poses and machine are `truth`.
@@ -138,14 +130,17 @@ def reference(design: Design, truth: Truth) -> Reference:
     """
     observed = _observed(design)
     least = EXACT_ENOUGH * float(observed.machine.repeatability.min())
-    observed = observed.observed(*(one.loosened(least) for one in observed.observations))
-    # As drawn, because a small machine error makes a direction that is open merely all but open.
+    observed = observed.observed(*(kind.loosened(least) for kind in observed.observations))
+    # At zero machine error, because a small error makes an undetermined direction weakly
+    # determined.
     drawn = linearise(observed)
     readings = observed.readings
     exact = true_readings(observed, truth.state, readings, truth.model)
-    true = [one.true_values(observed, truth.state, truth.model) for one in observed.observations]
     observed = observed.observed(
-        *(one.given(value=value) for one, value in zip(observed.observations, true, strict=True))
+        *(
+            kind.given(value=kind.true_values(observed, truth.state, truth.model))
+            for kind in observed.observations
+        )
     )
     held = drawn.spectrum if drawn.deficiency else None
     solution = gauss_newton(observed, exact, initial_state(observed, exact), held=held)
@@ -163,13 +158,14 @@ def reference(design: Design, truth: Truth) -> Reference:
     blocks = reading_blocks(observed, start, readings.select(plates), exact[plates])
     weight = reading_weights(observed, readings.select(plates))
     noise = reading_noise(observed, readings.select(plates))
-    groups, at = [], 0
-    for chosen in _groups(observed):
+    groups, row = [], 0
+    indices = _groups(observed)
+    for chosen in indices:
         rows = readings.select(plates[chosen])
         position = int(rows.position[0])
         groups.append(
             PositionReadings(
-                slice(at, at + len(chosen)),
+                slice(row, row + len(chosen)),
                 position,
                 _as_slice(rows.ball),
                 np.ascontiguousarray(start.rotations[position] @ start.balls[rows.ball].T),
@@ -184,27 +180,25 @@ def reference(design: Design, truth: Truth) -> Reference:
                 ),
             )
         )
-        at += len(chosen)
-    order = np.concatenate([np.arange(0), *_groups(observed)])
-    given = observed.of(Lengths)
-    read = ~given.to_pivot
-    both = given.first, given.second[read]
-    ends = (
-        (local(exact[both[0]], p[both[0]]), local(exact[both[1]], p[both[1]]))
-        if len(given)
-        else None
-    )
-    difference, end_noise = np.zeros((len(given), observed.dimension)), []
+        row += len(chosen)
+    order = np.concatenate([np.arange(0), *indices])
+    lengths = observed.of(Lengths)
+    is_read = ~lengths.to_pivot
+    first, second = lengths.first, lengths.second[is_read]
+    ends = None
+    if len(lengths):
+        ends = local(exact[first], p[first]), local(exact[second], p[second])
+    difference, end_noise = np.zeros((len(lengths), observed.dimension)), []
     for sign, end, of_end in (
-        (1.0, both[0], np.arange(len(given))),
-        (-1.0, both[1], np.flatnonzero(read)),
+        (1.0, first, np.arange(len(lengths))),
+        (-1.0, second, np.flatnonzero(is_read)),
     ):
         if len(end):
             difference[of_end] += sign * (
                 exact[end] + observed.model.error(exact[end], start.a, p[end])
             )
         end_noise.append(reading_noise(observed, readings.select(end)).T)
-    difference[~read] -= start.origins[readings.position[given.first[~read]]]
+    difference[~is_read] -= start.origins[readings.position[first[~is_read]]]
     return Reference(
         observed,
         truth,
@@ -218,16 +212,14 @@ def reference(design: Design, truth: Truth) -> Reference:
         (end_noise[0], end_noise[1]),
         difference,
         is_expanded,
-        tuple(one.rows(observed, start, exact) for one in observed.observations),
+        tuple(kind.rows(observed, start, exact) for kind in observed.observations),
         exact,
         drawn if drawn.deficiency else None,
     )
 
 
 def _observed(design: Design) -> Design:
-    """The design with a row for each repeat, but for length standards, whose lengths point to their
-    readings.
-    """
+    """Return the design with a row per repeat, except repeats of length standards."""
     readings = design.readings
     times = readings.repeats.copy()
     times[np.setdiff1d(np.arange(len(readings)), design.plate_readings)] = 1
@@ -235,12 +227,14 @@ def _observed(design: Design) -> Design:
     first = np.cumsum(times) - times
     repeats = np.where(times == readings.repeats, 1, readings.repeats)[chosen]
     single = replace(readings.select(chosen), repeats=repeats)
-    moved = (one.reread(design, first) for one in design.observations)
+    moved = (kind.reread(design, first) for kind in design.observations)
     return replace(design, readings=single).observed(*moved)
 
 
 def _groups(design: Design) -> list[Integers]:
-    """Indices into the plates' readings: of one position each, no ball twice, of bounded number."""
+    """Return indices into the plates' readings, in groups of limited size: one position, each ball
+    once.
+    """
     readings = design.readings.select(design.plate_readings)
     key = readings.position * len(design.balls.names) + readings.ball
     order = np.argsort(key, kind="stable")
@@ -249,23 +243,27 @@ def _groups(design: Design) -> list[Integers]:
     turn[order] = np.arange(len(key)) - first
     order = np.lexsort((readings.ball, turn, readings.position))
     changes = np.diff(readings.position[order]) | np.diff(turn[order])
-    found: list[Integers] = []
-    for part in np.split(order, np.flatnonzero(changes) + 1):
-        pieces = -(-len(part) // READINGS_AT_ONCE)
-        found += (
-            [piece for piece in np.array_split(part, pieces) if len(piece)] if len(part) else []
+    groups: list[Integers] = []
+    for members in np.split(order, np.flatnonzero(changes) + 1):
+        count = -(-len(members) // READINGS_AT_ONCE)
+        groups += (
+            [group for group in np.array_split(members, count) if len(group)]
+            if len(members)
+            else []
         )
-    return found
+    return groups
 
 
 def _as_slice(ascending: Integers) -> Integers | slice:
-    """Indices as a slice if they follow one another: a view of an array instead of a copy."""
+    """Return consecutive indices as a slice, which makes a view of an array instead of a copy."""
     first, last = int(ascending[0]), int(ascending[-1])
     return slice(first, last + 1) if last - first + 1 == len(ascending) else ascending
 
 
 def _local_model(design: Design, a: Array, x: Array, p: Array, is_expanded: bool) -> LocalModel:
-    """The model about readings x (m, d), with parameters a (n,) and probe offsets p (m, d)."""
+    """Return the model about readings x (m, d), with parameters a (n,) and probe offsets p (m,
+    d).
+    """
     if is_expanded:
         return expand(design.model, x, a, p, bool(design.probes.free.any()))
     return Direct(design.model, x, a, p, design.model.error(x, a, p))
@@ -274,7 +272,7 @@ def _local_model(design: Design, a: Array, x: Array, p: Array, is_expanded: bool
 def _is_faithful(
     design: Design, spectrum: Spectrum, columns: slice, start: State, exact: Array
 ) -> bool:
-    """Whether an expansion of the model tells the same as the model itself."""
+    """Return whether an expansion of the model agrees with the model."""
     p = start.probes[design.readings.probe]
     generator = np.random.default_rng(np.random.SeedSequence(0))
     noise = reading_noise(design, design.readings).T

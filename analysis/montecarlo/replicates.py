@@ -1,15 +1,14 @@
-"""Estimates of many replicates at once, refined until nothing changes.
+"""Estimates of many replicates at once, refined to convergence.
 
 A pass computes the exact non-linear residuals of all replicates of a batch and their exact
-gradient; the step solves R'R step = -gradient with the triangular factor that all share. What the
-passes end at is each replicate's own least-squares estimate, whatever factor the steps were made
-with. A replicate that the shared factor does not bring near enough, because its own is another, is
-estimated by itself with `complete_fit`: to leave it out would make the others a selection.
-Everything is counted from the reference, so that differences of a nanometre in a metre keep their
-digits.
+gradient; the step solves R'R step = -gradient with the shared triangular factor. Passes converge to
+each replicate's least-squares estimate, regardless of the factor. A replicate whose own factor
+differs too much is estimated separately with `complete_fit`, since omitting it would bias the
+selection. All deviations are from the reference, so that differences of a nanometre in a metre keep
+their digits.
 
-A batch has a seed of its own and a fixed size, so that neither the number of workers nor the size
-of their tasks changes a bit of the result.
+A batch has its own seed and a fixed size: neither the number of workers nor the size of their tasks
+changes a bit of the result.
 """
 
 from __future__ import annotations
@@ -31,29 +30,27 @@ from .complete_fits import complete_fit
 from .expansion import Single
 from .reference import PositionReadings, Reference
 
-# Replicates of a batch. The size of a matrix product decides the last bits of its result: it must
-# be constant.
+# Replicates of a batch: constant, since the size of a matrix product affects its last bits.
 BATCH = 128
 
-# Passes after which a replicate is estimated by itself.
+# Passes after which a replicate is estimated separately.
 PASSES = 20
 
-# A step longer than this share of the one before shortens too slowly for the passes that there are,
-# or not at all: the replicate is estimated by itself at once.
+# Ratio of successive steps above which a replicate converges too slowly for `PASSES`, and is
+# estimated separately at once.
 SLOWEST = 0.5
 
-# A replicate has converged when its step is below this fraction of its first, which is as long as
-# its errors are. Each pass shortens it a hundredfold at least, so that a few millionths of the
-# errors are left at the most.
+# Step of a converged replicate as a fraction of its first, which is as long as its errors. Each
+# pass shortens it at least a hundredfold: at most a few millionths of the errors remain.
 SMALLEST_STEP = 1e-4
 
-# Share of the replicates looked at from which on those left go on alone: copying them takes time.
+# Share of active replicates below which they are copied into smaller arrays; copying takes time.
 FEW_LEFT = 0.5
 
 
 @dataclass(frozen=True)
 class Deviations:
-    """What b replicates differ by from the reference.
+    """Deviations of b replicates from the reference.
 
     `balls` (b, d, n), `rotations` (b, k, pose size - d) as vectors about the machine's axes,
     `origins` (b, k, d), `a` (b, n) and `offsets` of probes (b, l, d). `shared` (b, s) are the sums
@@ -68,22 +65,23 @@ class Deviations:
     shared: Array
 
     def select(self, chosen: Integers | Flags) -> Deviations:
-        """Those of some replicates."""
         return Deviations(*(value[chosen] for value in vars(self).values()))
 
-    def with_rows(self, chosen: Integers, others: Deviations) -> Deviations:
-        """With others in the places of those chosen."""
-        found = Deviations(*(value.copy() for value in vars(self).values()))
-        for value, other in zip(vars(found).values(), vars(others).values(), strict=True):
-            value[chosen] = other
-        return found
+    def with_rows(self, chosen: Integers, replacements: Deviations) -> Deviations:
+        """Return deviations with those of chosen replicates replaced."""
+        result = Deviations(*(value.copy() for value in vars(self).values()))
+        for value, replacement in zip(
+            vars(result).values(), vars(replacements).values(), strict=True
+        ):
+            value[chosen] = replacement
+        return result
 
 
 @dataclass(frozen=True)
 class Estimates:
-    """Estimates of b replicates with their S^2, passes and whether they converged, each (b,).
+    """Estimates of b replicates with their S^2, passes and convergence, each (b,).
 
-    Passes of a replicate that was estimated by itself are its iterations.
+    Passes of a separately estimated replicate are its iterations.
     """
 
     index: Integers
@@ -95,8 +93,8 @@ class Estimates:
 
 @dataclass(frozen=True)
 class Draw:
-    """Noise of b replicates: of the plates' readings `moved` (b, d, m), of the values of each kind
-    of observations `errors` (b, m), and of the readings of the lengths' two ends (b, d, m).
+    """Noise of b replicates: of the plates' readings `moved` (b, d, m), of the values of each type
+    of observation `errors` (b, m), and of the readings of the lengths' two ends (b, d, m).
     """
 
     moved: Single
@@ -107,73 +105,69 @@ class Draw:
         """Noise of readings (d, m), of values and of both ends of one replicate."""
         return (
             self.moved[k],
-            tuple(one[k] for one in self.errors),
+            tuple(error[k] for error in self.errors),
             (self.ends[0][k], self.ends[1][k]),
         )
 
     def select(self, chosen: Integers | Flags) -> Draw:
-        """That of some replicates."""
-        errors, (first, second) = tuple(one[chosen] for one in self.errors), self.ends
+        errors, (first, second) = tuple(error[chosen] for error in self.errors), self.ends
         return Draw(self.moved[chosen], errors, (first[chosen], second[chosen]))
 
 
 def draw(shared: Reference, seed: int, batch: int) -> Draw:
-    """Noise of one batch."""
+    """Draw the noise of one batch."""
     generator = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(batch,)))
     design = shared.design
-    # Single precision: drawn in half the time, and noise is noise.
+    # Single precision takes half the time, and suffices for noise.
     shape = (BATCH, *shared.noise.shape)
     moved = design.noise.draw(generator, shape, shared.position, 2, np.float32)
     moved *= shared.noise.astype(np.float32)
 
-    errors = tuple(one.errors(generator, BATCH) for one in design.observations)
+    errors = tuple(kind.errors(generator, BATCH) for kind in design.observations)
     return Draw(moved, errors, _drawn_ends(shared, generator))
 
 
 def _drawn_ends(shared: Reference, generator: np.random.Generator) -> tuple[Array, Array]:
-    """Noise of the readings that lengths are formed of; a reading that serves several is drawn
-    once.
-    """
-    given = shared.design.of(Lengths)
-    read, place = np.unique(
-        np.concatenate([given.first, given.second[~given.to_pivot]]), return_inverse=True
+    """Draw the noise of the readings of lengths; a reading of several lengths is drawn once."""
+    lengths = shared.design.of(Lengths)
+    readings, index = np.unique(
+        np.concatenate([lengths.first, lengths.second[~lengths.to_pivot]]), return_inverse=True
     )
-    shape = (BATCH, shared.design.dimension, len(read))
-    position = shared.design.readings.position[read]
+    shape = (BATCH, shared.design.dimension, len(readings))
+    position = shared.design.readings.position[readings]
     drawn = shared.design.noise.draw(generator, shape, position, 2)
-    first, second = np.split(place.ravel(), [len(given)])
+    first, second = np.split(index.ravel(), [len(lengths)])
     return drawn[:, :, first] * shared.end_noise[0], drawn[:, :, second] * shared.end_noise[1]
 
 
 @single_threaded
 def estimate_batch(shared: Reference, seed: int, batch: int, count: int = BATCH) -> Estimates:
-    """Estimates of the `BATCH` replicates of one batch, or of the first `count` of them."""
+    """Estimate the `BATCH` replicates of one batch, or the first `count`."""
     drawn = draw(shared, seed, batch)
     if count < BATCH:
         drawn = drawn.select(np.arange(count))
-    found = _refined(shared, drawn, batch * BATCH + np.arange(count))
-    for k in np.flatnonzero(~found.converged).tolist():
-        found = _with_estimate(found, k, shared, complete_fit(shared, *drawn.of(k)))
-    return found
+    estimates = _refined(shared, drawn, batch * BATCH + np.arange(count))
+    for k in np.flatnonzero(~estimates.converged).tolist():
+        estimates = _with_estimate(estimates, k, shared, complete_fit(shared, *drawn.of(k)))
+    return estimates
 
 
 def _refined(shared: Reference, drawn: Draw, index: Integers) -> Estimates:
-    """What passes with the shared factor end at."""
+    """Return estimates refined with the shared factor."""
     count, d, layout = len(index), shared.design.dimension, shared.factor.layout
     columns, offset = layout.pose_columns, layout.offset_columns
     at = _no_deviations(shared, count)
     passes, converged = np.zeros(count, np.int64), np.zeros(count, bool)
     squares, first, previous = np.full(count, np.nan), np.zeros(count), np.zeros(count)
-    alone = np.zeros(count, bool)
-    # Those still looked at, and what all were at when fewer were left.
+    is_separate = np.zeros(count, bool)
+    # Replicates in the arrays, and the deviations of all when the arrays were last reduced.
     chosen, ended = np.arange(count), None
     with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
         for number in range(PASSES):
-            now, by_ball, by_shared = _gradient(shared, drawn, at, is_start=number == 0)
+            before, by_ball, by_shared = _gradient(shared, drawn, at, is_start=number == 0)
             balls, common = _step(shared, by_ball, by_shared)
-            # A replicate that has converged is left alone, so that its end does not depend on its
-            # neighbours.
-            active = ~(converged[chosen] | alone[chosen])
+            # A converged replicate stays unchanged, so that its result does not depend on others.
+            active = ~(converged[chosen] | is_separate[chosen])
             balls, common = balls * active[:, None, None], common * active[:, None]
             poses = np.where(columns >= 0, common[:, np.maximum(columns, 0)], 0.0)
             turn = poses[:, :, d:]
@@ -185,9 +179,8 @@ def _refined(shared: Reference, drawn: Draw, index: Integers) -> Estimates:
                 at.offsets + np.where(offset >= 0, common[:, np.maximum(offset, 0)], 0.0),
                 at.shared + common,
             )
-            # S^2 after the step, which the quadratic that the factor stands for foretells to its
-            # own accuracy.
-            after = now + (by_ball * balls).sum(axis=(1, 2)) + (by_shared * common).sum(axis=1)
+            # S^2 after the step, predicted by the quadratic approximation of the factor.
+            after = before + (by_ball * balls).sum(axis=(1, 2)) + (by_shared * common).sum(axis=1)
             squares[chosen[active]] = after[active]
             size = np.maximum(
                 np.abs(common / layout.scale).max(axis=1, initial=0.0),
@@ -198,19 +191,19 @@ def _refined(shared: Reference, drawn: Draw, index: Integers) -> Estimates:
                 first = size
             else:
                 converged[chosen] |= size <= SMALLEST_STEP * first[chosen]
-                # What is no number is no shorter either.
-                alone[chosen] |= ~(converged[chosen] | (size <= SLOWEST * previous[chosen]))
+                # The negation includes NaN.
+                is_separate[chosen] |= ~(converged[chosen] | (size <= SLOWEST * previous[chosen]))
             previous[chosen] = size
-            left = ~(converged[chosen] | alone[chosen])
-            if not left.any():
+            is_active = ~(converged[chosen] | is_separate[chosen])
+            if not is_active.any():
                 break
-            if left.sum() <= FEW_LEFT * len(chosen):
-                # Some may take many passes; the others need not be looked at any more.
+            if is_active.sum() <= FEW_LEFT * len(chosen):
+                # A few may take many passes: drop the others from the arrays.
                 ended = at if ended is None else ended.with_rows(chosen, at)
-                drawn, at, chosen = drawn.select(left), at.select(left), chosen[left]
+                drawn, at, chosen = drawn.select(is_active), at.select(is_active), chosen[is_active]
     converged &= np.isfinite(squares)
-    found = at if ended is None else ended.with_rows(chosen, at)
-    return Estimates(index, found, squares, passes, converged)
+    estimate = at if ended is None else ended.with_rows(chosen, at)
+    return Estimates(index, estimate, squares, passes, converged)
 
 
 def _no_deviations(shared: Reference, count: int) -> Deviations:
@@ -227,23 +220,25 @@ def _no_deviations(shared: Reference, count: int) -> Deviations:
     )
 
 
-def _with_estimate(all_of: Estimates, k: int, shared: Reference, solution: Solution) -> Estimates:
-    """The same with one of them from a fit of its own."""
-    squares, passes = all_of.sum_of_squares.copy(), all_of.passes.copy()
-    converged = all_of.converged.copy()
+def _with_estimate(
+    estimates: Estimates, k: int, shared: Reference, solution: Solution
+) -> Estimates:
+    """Return the estimates with replicate k from a separate fit."""
+    squares, passes = estimates.sum_of_squares.copy(), estimates.passes.copy()
+    converged = estimates.converged.copy()
     squares[k], passes[k] = solution.factor.sum_of_squares, len(solution.iterations) - 1
     converged[k] = solution.status == "converged"
-    found = all_of.found.with_rows(np.array([k]), _deviation(shared, solution.state))
-    return Estimates(all_of.index, found, squares, passes, converged)
+    deviations = estimates.found.with_rows(np.array([k]), _deviation(shared, solution.state))
+    return Estimates(estimates.index, deviations, squares, passes, converged)
 
 
 def _deviation(shared: Reference, state: State) -> Deviations:
-    """What a single estimate differs by from the reference."""
+    """Return the deviation of a single estimate from the reference."""
     start, layout = shared.start, shared.factor.layout
     turns = vector_from_rotation(state.rotations @ start.rotations.transpose(0, 2, 1))
     origins, a = state.origins - start.origins, state.a - start.a
     offsets = state.probes - start.probes
-    # What is held goes to the extra column.
+    # Columns of held parameters are -1: the extra one.
     common = np.zeros(len(layout) + 1)
     common[layout.pose_columns] = np.concatenate([origins, turns], axis=1)
     common[layout.model], common[layout.offset_columns] = a, offsets
@@ -257,9 +252,10 @@ def _deviation(shared: Reference, state: State) -> Deviations:
 def _gradient(
     shared: Reference, drawn: Draw, at: Deviations, is_start: bool
 ) -> tuple[Array, Array, Array]:
-    """S^2 (b,), its half gradient by the balls (b, d, n) and by the shared parameters (b, s).
+    """Return S^2 (b,), its half gradient by the balls (b, d, n) and by the shared parameters (b,
+    s).
 
-    At the start all deviations are zero, and less is to be computed.
+    At the start all deviations are zero, which saves computation.
     """
     layout, d = shared.factor.layout, shared.design.dimension
     squares = np.zeros(len(at.a))
@@ -301,11 +297,11 @@ def _gradient(
         by_shared,
         layout.offset_columns,
     )
-    for one, rows, errors in zip(
+    for kind, rows, errors in zip(
         shared.design.observations, shared.rows, drawn.errors, strict=True
     ):
-        if not isinstance(one, Lengths):
-            one.add_misfit(rows, errors, among)
+        if not isinstance(kind, Lengths):
+            kind.add_misfit(rows, errors, among)
         elif shared.ends is not None:
             _lengths(shared, drawn.ends, errors, at, is_start, squares, by_shared)
     return squares, by_ball, by_shared
@@ -318,10 +314,10 @@ def _pull(
     at: Deviations,
     less: Array | None,
 ) -> tuple[Array, Array]:
-    """Weighted residuals (b, d, m) of a group, and its balls about their position's origin, (d, m)
-    or (b, d, m).
+    """Return weighted residuals (b, d, m) of a group, and its balls about their position's origin,
+    (d, m) or (b, d, m).
 
-    `less` (b, d, d) are the turns of its position, less the unit matrix; None at the start.
+    `less` (b, d, d) are the position's rotations, less the unit matrix; None at the start.
     """
     residual = group.residual + moved
     arm = group.arm
@@ -329,7 +325,7 @@ def _pull(
         residual += group.model.change(moved, None)
     else:
         residual += group.model.change(moved, at.a, _offsets(at, group.probe))
-        # Turned less straight, so that the small difference of two large vectors is never formed.
+        # From the rotation less unity, to avoid the small difference of two large vectors.
         rotation = shared.start.rotations[group.position]
         displaced = (less.reshape(-1, less.shape[2]) @ group.arm).reshape(moved.shape)
         displaced += (rotation + less @ rotation) @ at.balls[:, :, group.ball]
@@ -344,7 +340,7 @@ def _pull(
 
 
 def _turn_less_one(turn: Array) -> Array:
-    """Rotation matrices (b, d, d) of rotation vectors (b, r), less the unit matrix, to full
+    """Return rotation matrices (b, d, d) of rotation vectors (b, r), less the unit matrix, to full
     relative accuracy.
     """
     if turn.shape[1] == 1:
@@ -362,21 +358,21 @@ def _turn_less_one(turn: Array) -> Array:
 
 
 def _turns_less_one(turns: Array) -> Array:
-    """The same (b, k, d, d) of several rotation vectors (b, k, r) each, all at once."""
+    """Return `_turn_less_one` (b, k, d, d) of rotation vectors (b, k, r)."""
     less = _turn_less_one(turns.reshape(-1, turns.shape[2]))
     return less.reshape(*turns.shape[:2], *less.shape[1:])
 
 
 def _moment(arm: Array, pull: Array) -> Array:
-    """Sum over m of arm x pull, with arm (d, m) or (b, d, m) and pull (b, d, m): (b, 3), in the
-    plane (b, 1).
+    """Return the sum over m of arm x pull, with arm (d, m) or (b, d, m) and pull (b, d, m): (b, 3),
+    in the plane (b, 1).
     """
     planes = [(0, 1)] if pull.shape[1] == 2 else [(1, 2), (2, 0), (0, 1)]
     if arm.ndim == 2:
         products = (pull.reshape(-1, arm.shape[1]) @ arm.T).reshape(len(pull), *arm.shape[:1], -1)
         return np.stack([products[:, j, i] - products[:, i, j] for i, j in planes], axis=1)
 
-    # One by one: as a product of matrices for each replicate it takes twice as long.
+    # Separately for each pair of axes: a matrix product per replicate takes twice as long.
     def product(i: int, j: int) -> Array:
         return np.asarray(np.einsum("bm,bm->b", arm[:, i], pull[:, j]))
 
@@ -384,8 +380,8 @@ def _moment(arm: Array, pull: Array) -> Array:
 
 
 def _bracket(turn: Array, before: Array) -> Array:
-    """turn x before, both (b, k, r): what two small rotations one after the other add to their sum,
-    twice over.
+    """Return turn x before, both (b, k, r): twice the excess of two successive small rotations over
+    their sum.
     """
     if turn.shape[2] == 1:
         return np.zeros_like(turn)
@@ -395,7 +391,7 @@ def _bracket(turn: Array, before: Array) -> Array:
 def _add_by_offset(
     by_shared: Array, layout: SharedLayout, probe: Integers, gradient: Array
 ) -> None:
-    """Add a gradient (b, d, m) by the offsets of the probes (m,) that readings were made with."""
+    """Add a gradient (b, d, m) by the offsets of the readings' probes (m,)."""
     for k in np.unique(probe):
         columns = layout.offset_columns[k]
         free = columns >= 0
@@ -403,7 +399,7 @@ def _add_by_offset(
 
 
 def _offsets(at: Deviations, probe: Integers | None) -> Array | None:
-    """What the offsets of the probes (m,) differ by, (b, d, m), where they are parameters."""
+    """Return deviations (b, d, m) of the offsets of probes (m,), if these are parameters."""
     return None if probe is None else at.offsets[:, probe].swapaxes(1, 2)
 
 
@@ -416,75 +412,75 @@ def _lengths(
     squares: Array,
     by_shared: Array,
 ) -> None:
-    """Add the part of length standards read in the volume, which the readings' noise is in."""
+    """Add the contribution of length standards read in the volume, with the readings' noise."""
     step = None if is_start else at.a
-    given = shared.design.of(Lengths)
+    lengths = shared.design.of(Lengths)
     assert shared.ends is not None
     first, second = shared.ends
     design = shared.design
-    layout, pivoted = shared.factor.layout, given.to_pivot
-    read = slice(None) if not pivoted.any() else np.flatnonzero(~pivoted)
-    pivot = design.readings.position[given.first[pivoted]]
-    at_ends = given.first, given.second[read]
+    layout, pivoted = shared.factor.layout, lengths.to_pivot
+    has_second = slice(None) if not pivoted.any() else np.flatnonzero(~pivoted)
+    pivot = design.readings.position[lengths.first[pivoted]]
+    at_ends = lengths.first, lengths.second[has_second]
     probes = [None if not design.probes.free.any() else design.readings.probe[k] for k in at_ends]
     offsets = [_offsets(at, probe) for probe in probes]
     difference = shared.end_difference.T + (ends[0] + first.change(ends[0], step, offsets[0]))
-    difference[:, :, read] -= ends[1] + second.change(ends[1], step, offsets[1])
+    difference[:, :, has_second] -= ends[1] + second.change(ends[1], step, offsets[1])
     difference[:, :, pivoted] -= at.origins[:, pivot].swapaxes(1, 2)
     unit = difference / np.sqrt((difference**2).sum(axis=1))[:, None]
-    unit = np.where(given.projected, given.direction.T, unit)
+    unit = np.where(lengths.projected, lengths.direction.T, unit)
     length = (unit * difference).sum(axis=1)
     white = design.once(length_whitening)
     expected = length_values(design, shared.start) + errors
-    is_free = given.free is not None and len(design.unknown_lengths.names) > 0
-    if given.free is not None and is_free:
-        changed = at.shared[:, layout.lengths][:, given.free]
-        expected = expected + np.where(given.free >= 0, changed, 0.0)
+    is_free = lengths.free is not None and len(design.unknown_lengths.names) > 0
+    if lengths.free is not None and is_free:
+        changed = at.shared[:, layout.lengths][:, lengths.free]
+        expected = expected + np.where(lengths.free >= 0, changed, 0.0)
     residual = white.whitened((length - expected).T)
     squares += (residual**2).sum(axis=0)
     pull = unit * white.pulled(residual).T[:, None]
-    pulls = pull, pull[:, :, read]
-    for sign, end, moved, probe, moved_probe, own in zip(
+    pulls = pull, pull[:, :, has_second]
+    for sign, end, moved, probe, moved_probe, end_pull in zip(
         (1.0, -1.0), shared.ends, ends, probes, offsets, pulls, strict=True
     ):
-        by_shared[:, layout.model] += sign * end.gather(moved, step, own, moved_probe)
+        by_shared[:, layout.model] += sign * end.gather(moved, step, end_pull, moved_probe)
         if probe is not None:
-            _add_by_offset(by_shared, layout, probe, sign * end.gather_offsets(step, own))
+            _add_by_offset(by_shared, layout, probe, sign * end.gather_offsets(step, end_pull))
     for k in np.unique(pivot):
         columns = layout.pose_columns[k, : design.dimension]
         by_shared[:, columns] -= pull[:, :, np.flatnonzero(pivoted)[pivot == k]].sum(axis=2)
-    if given.free is not None and is_free:
+    if lengths.free is not None and is_free:
         tight = white.pulled(residual).T
         for number in range(len(design.unknown_lengths.names)):
-            by_shared[:, layout.lengths.start + number] -= tight[:, given.free == number].sum(
+            by_shared[:, layout.lengths.start + number] -= tight[:, lengths.free == number].sum(
                 axis=1
             )
 
 
-def _step(of_all: Reference, by_ball: Array, by_shared: Array) -> tuple[Array, Array]:
+def _step(reference: Reference, by_ball: Array, by_shared: Array) -> tuple[Array, Array]:
     """Solve R'R step = -gradient for all replicates: steps of the balls (b, d, n), shared
-    parameters (b, s), none along what is held.
+    parameters (b, s), zero along held directions.
     """
-    factor = of_all.factor
+    factor = reference.factor
     b, d, n = by_ball.shape
     e, s = len(factor.eliminated), by_shared.shape[1]
     rows = factor.ball_shared.reshape(e * d, s)
-    # The columns of the systems are replicates.
+    # Replicates become columns of the systems.
     of_ball = np.ascontiguousarray(by_ball.transpose(2, 1, 0))
     single = solve_balls(factor, of_ball[factor.eliminated], transposed=True)
     right = by_shared.T - rows.T @ single.reshape(e * d, b)
-    kept = of_ball[factor.kept].reshape(-1, b)
+    kept_balls = of_ball[factor.kept].reshape(-1, b)
     if len(factor.kept):
-        kept = solve_kept(factor, kept, transposed=True)
-        right = right - factor.kept_shared.T @ kept
-    if of_all.drawn is None:
+        kept_balls = solve_kept(factor, kept_balls, transposed=True)
+        right = right - factor.kept_shared.T @ kept_balls
+    if reference.drawn is None:
         shared = solve_shared(factor, solve_shared(factor, right, transposed=True))
     else:
-        shared = of_all.spectrum.root @ (of_all.spectrum.root.T @ right)
+        shared = reference.spectrum.root @ (reference.spectrum.root.T @ right)
     steps = np.zeros((n, d, b))
     carried = (rows @ shared).reshape(e, d, b)
     steps[factor.eliminated] = solve_balls(factor, single - carried)
     if len(factor.kept):
-        kept = solve_kept(factor, kept - factor.kept_shared @ shared)
-        steps[factor.kept] = kept.reshape(-1, d, b)
+        kept_balls = solve_kept(factor, kept_balls - factor.kept_shared @ shared)
+        steps[factor.kept] = kept_balls.reshape(-1, d, b)
     return -np.ascontiguousarray(steps.transpose(2, 1, 0)), -shared.T

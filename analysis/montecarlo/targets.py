@@ -1,4 +1,4 @@
-"""Quantities compared between replicates and the truth: those behind U1 to U6, one vector each."""
+"""Quantities of U1 to U6 that are compared between replicates and the truth."""
 
 from __future__ import annotations
 
@@ -28,14 +28,13 @@ from ballplate.simulator.machines.protocol import Array, Integers
 from ..uncertainty.pairs import pairs_of
 from ..uncertainty.quantities import QUANTITIES, functions_of
 
-# Distances that are followed through all replicates; a sample of the pairs where there are more.
+# Distances followed through all replicates; more are sampled.
 MOST_PAIRS = 1000
 
-# Changes of distances that are computed at once.
+# Changes of distances computed at once, so that they stay in cache.
 ENTRIES_AT_ONCE = 16_384
 
-# An uncertainty below this fraction of the largest in its unit is that of a value which the model
-# leaves alone: a length of a metre is rounded by a billionth of a tenth of a micrometre.
+# Fraction of the largest uncertainty in a unit below which a value is unchanged but for rounding.
 UNCHANGED = 1e-8
 
 
@@ -45,7 +44,7 @@ class MonteCarloQuantity:
 
     `base` (q,) is its error in the estimate from readings without noise, `uncertainty` (q,) the
     linearised standard uncertainties, `change` its change (b, q) in replicates, `units` (q,)
-    metres, radians or 1. `sampled` tells that q is a sample of all pairs.
+    metres, radians or 1. `sampled` marks a sample of all pairs.
     """
 
     symbol: str
@@ -57,40 +56,42 @@ class MonteCarloQuantity:
 
     @cached_property
     def typical(self) -> Array:
-        """Mean square uncertainty (q,) of those in the same unit."""
-        found, units = np.empty_like(self.uncertainty), np.array(self.units)
+        """Mean square uncertainty (q,) of the members in the same unit."""
+        mean_squares, units = np.empty_like(self.uncertainty), np.array(self.units)
         for unit in np.unique(units):
-            found[units == unit] = (self.uncertainty[units == unit] ** 2).mean()
-        return found
+            mean_squares[units == unit] = (self.uncertainty[units == unit] ** 2).mean()
+        return mean_squares
 
 
 @single_threaded
 def targets(shared: Reference) -> tuple[MonteCarloQuantity, ...]:
-    """The quantities that a design has; those of the model only where the true machine is one of
-    the fitted model's.
+    """Return the quantities of a design; those of the model only if the true machine has the fitted
+    model.
     """
     at = shared.linearisation
     displaced = _displaced(shared, at)
-    found: list[MonteCarloQuantity] = []
+    quantities: list[MonteCarloQuantity] = []
     for symbol, kind in QUANTITIES.items():
         for functions in functions_of(symbol, at.design, at.layout) if kind.in_replicates else ():
             if isinstance(functions, Parameters):
-                is_known = (
+                has_truth = (
                     shared.truth.model == at.design.model
                     or not functions.rows[:, at.layout.model].any()
                 )
-                found += [_parameters(symbol, shared, at, functions)] if is_known else []
+                quantities += [_parameters(symbol, shared, at, functions)] if has_truth else []
             elif isinstance(functions, Coordinates):
-                found.append(_coordinates(symbol, displaced(functions.places)))
+                quantities.append(_coordinates(symbol, displaced(functions.places)))
             else:
-                found.append(_distances(symbol, functions, displaced(functions.places)))
-    return tuple(uncertain for target in found if (uncertain := _uncertain(target)) is not None)
+                quantities.append(_distances(symbol, functions, displaced(functions.places)))
+    return tuple(
+        uncertain for target in quantities if (uncertain := _uncertain(target)) is not None
+    )
 
 
 @dataclass(frozen=True)
 class Displaced:
-    """Places at the reference, with their displacements, where they `truly` are (n, d), and their
-    change (b, d, n).
+    """Points at the reference, with their displacements, their true co-ordinates `truly` (n, d),
+    and their change (b, d, n).
     """
 
     moved: Displacements
@@ -99,10 +100,8 @@ class Displaced:
 
 
 def _displaced(shared: Reference, at: Linearisation) -> Callable[[Places], Displaced]:
-    """A function from places to what becomes of them, which remembers the points that it has been
-    asked for.
-    """
-    made: dict[bytes, Displaced] = {}
+    """Return a function from places to `Displaced`, with a cache of points."""
+    cache: dict[bytes, Displaced] = {}
 
     def displaced(places: Places) -> Displaced:
         if isinstance(places, BallPlaces):
@@ -111,21 +110,21 @@ def _displaced(shared: Reference, at: Linearisation) -> Callable[[Places], Displ
                 displacements(at, places), truly, lambda found: found.balls[:, :, places.index]
             )
         key = places.points.tobytes() + places.probes.tobytes()
-        if key not in made:
+        if key not in cache:
             true = replace(at.design, model=shared.truth.model)
             truly = places.at(true, shared.truth.state)
-            made[key] = Displaced(displacements(at, places), truly, _change(shared, places))
-        return made[key]
+            cache[key] = Displaced(displacements(at, places), truly, _change(shared, places))
+        return cache[key]
 
     return displaced
 
 
 def _change(shared: Reference, places: MeasuredPoints) -> Callable[[Deviations], Array]:
-    """The change (b, d, n) of corrected points in replicates."""
+    """Return the change (b, d, n) of corrected points in replicates."""
     model = shared.local_model(places.points, places.probes)
     n, d = places.points.shape
     are_free = bool((shared.factor.layout.offset_columns[places.probes] >= 0).any())
-    # Co-ordinates and distances of the same points are asked for one after the other.
+    # Co-ordinates and distances of the same points are computed successively: one is cached.
     last: list[tuple[Deviations, Array]] = []
 
     def change(replicates: Deviations) -> Array:
@@ -134,35 +133,34 @@ def _change(shared: Reference, places: MeasuredPoints) -> Callable[[Deviations],
         return last[0][1]
 
     def changed(replicates: Deviations) -> Array:
-        none = np.zeros((len(replicates.a), d, n))
+        unmoved = np.zeros((len(replicates.a), d, n))
         offsets = replicates.offsets[:, places.probes].swapaxes(1, 2) if are_free else None
-        return model.change(none, replicates.a, offsets)
+        return model.change(unmoved, replicates.a, offsets)
 
     return change
 
 
 def _uncertain(target: MonteCarloQuantity) -> MonteCarloQuantity | None:
-    """A target without the members that the design leaves undetermined, and without those that no
-    observation could change, whose uncertainties are rounding beside the others in their unit; None
-    where nothing is left.
+    """Return a target without undetermined and unchanged members, whose uncertainties are rounding;
+    None without any member.
     """
-    kept, units = np.zeros(len(target.uncertainty), bool), np.array(target.units)
+    chosen, units = np.zeros(len(target.uncertainty), bool), np.array(target.units)
     for unit in set(target.units):
         size = np.nan_to_num(target.uncertainty[units == unit])
-        kept[units == unit] = size > UNCHANGED * size.max(initial=0.0)
-    if not kept.any():
+        chosen[units == unit] = size > UNCHANGED * size.max(initial=0.0)
+    if not chosen.any():
         return None
-    if kept.all():
+    if chosen.all():
         return target
 
     def change(replicates: Deviations) -> Array:
-        return target.change(replicates)[:, kept]
+        return target.change(replicates)[:, chosen]
 
     return MonteCarloQuantity(
         target.symbol,
-        target.base[kept],
-        target.uncertainty[kept],
-        tuple(units[kept].tolist()),
+        target.base[chosen],
+        target.uncertainty[chosen],
+        tuple(units[chosen].tolist()),
         change,
         target.sampled,
     )
@@ -175,8 +173,7 @@ def _parameters(
     used = functions.rows.any(axis=0)
     rows = functions.rows[:, used]
     turned = vector_from_rotation(start.rotations @ real.rotations.transpose(0, 2, 1))
-    # Parameters of another true model are no errors of these, which then have no part in the
-    # functions.
+    # Parameters of another true model are not comparable; the functions then exclude the model's.
     a = start.a - real.a if shared.truth.model == design.model else start.a
     offsets = start.probes - real.probes
     steps = np.zeros((1, len(layout)))
@@ -194,33 +191,33 @@ def _parameters(
 
 
 def _shared(layout: SharedLayout, deviations: Deviations) -> Array:
-    """Changes (b, s) of the shared parameters; those of rotations are not the sums of their
-    steps.
-    """
+    """Return changes (b, s) of the shared parameters; rotations are not the sums of their steps."""
     changed = deviations.shared.copy()
-    position, place = np.nonzero(layout.pose_columns >= 0)
+    position, parameter = np.nonzero(layout.pose_columns >= 0)
     poses = np.concatenate([deviations.origins, deviations.rotations], axis=2)
-    changed[:, layout.pose_columns[position, place]] = poses[:, position, place]
+    changed[:, layout.pose_columns[position, parameter]] = poses[:, position, parameter]
     changed[:, layout.model] = deviations.a
     probe, axis = np.nonzero(layout.offset_columns >= 0)
     changed[:, layout.offset_columns[probe, axis]] = deviations.offsets[:, probe, axis]
     return changed
 
 
-def _coordinates(symbol: str, of: Displaced) -> MonteCarloQuantity:
-    base, moved = (of.moved.places - of.truly).ravel(), of.change
+def _coordinates(symbol: str, displaced: Displaced) -> MonteCarloQuantity:
+    base, moved = (displaced.moved.places - displaced.truly).ravel(), displaced.change
 
     def change(replicates: Deviations) -> Array:
         return moved(replicates).swapaxes(1, 2).reshape(-1, len(base))
 
     return MonteCarloQuantity(
-        symbol, base, of.moved.uncertainties.ravel(), ("m",) * len(base), change
+        symbol, base, displaced.moved.uncertainties.ravel(), ("m",) * len(base), change
     )
 
 
-def _distances(symbol: str, functions: Distances, of: Displaced) -> MonteCarloQuantity:
-    """Distances between all places, or a sample of them, or between some."""
-    places, moved = of.moved.places, of.change
+def _distances(
+    symbol: str, functions: Distances, displaced_points: Displaced
+) -> MonteCarloQuantity:
+    """Return distances between all points, a sample of them, or given pairs."""
+    places, moved = displaced_points.moved.places, displaced_points.change
     if functions.pairs is None:
         *ends, sampled = sample_of_pairs(len(places), MOST_PAIRS)
     else:
@@ -228,32 +225,33 @@ def _distances(symbol: str, functions: Distances, of: Displaced) -> MonteCarloQu
     first, second = ends
     between = places[first] - places[second]
     length = np.linalg.norm(between, axis=1)
-    true_length = np.linalg.norm(of.truly[first] - of.truly[second], axis=1)
-    pairs = pairs_of(of.moved, np.stack(ends, axis=1))
+    true_length = np.linalg.norm(
+        displaced_points.truly[first] - displaced_points.truly[second], axis=1
+    )
+    pairs = pairs_of(displaced_points.moved, np.stack(ends, axis=1))
     uncertainty = np.where(pairs.is_open, np.nan, pairs.uncertainties)
 
     squared, double = length**2, 2.0 * between
 
     def change(replicates: Deviations) -> Array:
         displaced = moved(replicates)
-        # The square of the new length less that of the old, without the loss of digits that
-        # subtracting would bring.
+        # The difference of squared lengths from that of co-ordinates keeps all digits.
         gained = np.zeros((len(displaced), len(first)))
-        # So many replicates at a time that all stays in cache.
+
         rows = max(ENTRIES_AT_ONCE // len(first), 1)
         work = np.empty((2, rows, len(first)))
         for start in range(0, len(gained), rows):
-            part, of_axis = gained[start : start + rows], displaced[start : start + rows]
-            difference, other = work[:, : len(part)]
+            chunk, changes = gained[start : start + rows], displaced[start : start + rows]
+            difference, buffer = work[:, : len(chunk)]
             for axis in range(displaced.shape[1]):
-                np.take(of_axis[:, axis], first, axis=1, out=difference, mode="clip")
-                difference -= np.take(of_axis[:, axis], second, axis=1, out=other, mode="clip")
-                np.add(difference, double[:, axis], out=other)
-                other *= difference
-                part += other
-            root = np.sqrt(np.add(squared, part, out=other), out=other)
+                np.take(changes[:, axis], first, axis=1, out=difference, mode="clip")
+                difference -= np.take(changes[:, axis], second, axis=1, out=buffer, mode="clip")
+                np.add(difference, double[:, axis], out=buffer)
+                buffer *= difference
+                chunk += buffer
+            root = np.sqrt(np.add(squared, chunk, out=buffer), out=buffer)
             root += length
-            part /= root
+            chunk /= root
         return gained
 
     return MonteCarloQuantity(
@@ -262,7 +260,8 @@ def _distances(symbol: str, functions: Distances, of: Displaced) -> MonteCarloQu
 
 
 def sample_of_pairs(n: int, most: int) -> tuple[Integers, Integers, bool]:
-    """All pairs of n places, or `most` of them, always the same; and whether it is a sample.
+    """Return all pairs of n places, or `most` of them, always the same; and whether they are a
+    sample.
 
     >>> sample_of_pairs(3, 10)
     (array([0, 0, 1]), array([1, 2, 2]), False)

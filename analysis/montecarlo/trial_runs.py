@@ -1,6 +1,4 @@
-"""Computation of replicates, on one processor or several, until there are enough, summed in
-order.
-"""
+"""Computation of replicates in processes, summed in a fixed order."""
 
 from __future__ import annotations
 
@@ -17,11 +15,11 @@ from ballplate.simulator.computing.processes import in_processes
 from ballplate.simulator.computing.steps import ProgressStep, Report, unreported
 from ballplate.simulator.computing.threads import single_threaded
 
-# Batches of a task. A fixed number, so that sums are formed in the same order whoever forms them.
+# Batches of a task: constant, so that the order of sums is independent of the workers.
 BATCHES = 4
 TASK = BATCH * BATCHES
 
-# Replicates of a run, those of one included that is to go on until its figures are accurate.
+# Limit of the replicates of a run, also with `until`.
 MOST_TRIALS = 1_000_000
 
 
@@ -35,14 +33,14 @@ def run_trials(
 ) -> MonteCarloOutcome:
     """Estimate up to `trials` replicates and compare them with the linearised uncertainties.
 
-    With `until` the run ends as soon as the relative standard error of every ratio of spread to
-    linearised uncertainty is no larger. Neither `workers` nor an interruption changes what a given
-    number of replicates comes to: after a KeyboardInterrupt the outcome is that of the tasks done
-    so far, in order.
+    With `until` the run ends when the relative standard error of every ratio of spread to
+    linearised uncertainty is at most this. The result of a number of replicates is independent of
+    `workers` and interruptions: after a KeyboardInterrupt the outcome is that of the finished
+    tasks, in order.
 
-    :raises KeyboardInterrupt: before the first task was done.
+    :raises KeyboardInterrupt: before the first task was finished.
     """
-    # What figures are made with is loaded first: after an interruption there is little time.
+    # Loaded first, since there is little time after an interruption.
     import scipy.special  # noqa: F401
 
     aims = targets(shared)
@@ -71,16 +69,16 @@ def run_trials(
 
 
 def accuracy_of(total: Accumulator) -> float:
-    """Largest relative standard error of the ratios of spread to linearised uncertainty; infinite
-    for 1 replicate.
+    """Return the largest relative standard error of the ratios of spread to linearised uncertainty;
+    infinite for one replicate.
     """
     if total.count < 2:
         return float("inf")
     n = total.count
     worst = 0.0
-    for one in total.quantities:
-        mean = one.numbers[0] / n
-        variance = max(one.numbers_squared[0] / n - mean**2, 0.0) * n / (n - 1)
+    for sums in total.quantities:
+        mean = sums.numbers[0] / n
+        variance = max(sums.numbers_squared[0] / n - mean**2, 0.0) * n / (n - 1)
         worst = max(worst, float(np.sqrt(variance / n) / (2.0 * mean)))
     return worst
 
@@ -89,7 +87,7 @@ def accuracy_of(total: Accumulator) -> float:
 def sum_of_task(
     shared: Reference, aims: tuple[MonteCarloQuantity, ...], seed: int, task: int, trials: int
 ) -> Accumulator:
-    """Sums over the replicates of one task."""
+    """Return sums over the replicates of one task."""
     total: Accumulator | None = None
     for batch in range(task * BATCHES, (task + 1) * BATCHES):
         count = min(BATCH, trials - batch * BATCH)

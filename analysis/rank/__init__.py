@@ -1,4 +1,4 @@
-"""Null directions of a design, and their description in words."""
+"""Null directions of a design, and their description."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 """Rank report of a design: null directions in the names of errors, balls and positions.
 
-A null direction is a change of parameters that no observation notices. It is described by the
+A null direction is a change of parameters that no observation detects. It is described by the
 parameters that trade against one another: error functions with their size and shape, the
 deformation of the artefact, the motion of positions.
 """
@@ -21,21 +21,19 @@ from ballplate.simulator.inputs.extensions import optional_service
 from ballplate.simulator.inputs.quantities import Target
 from ballplate.simulator.machines.protocol import Array, HasLines, Unit
 
-# Parts of a direction that move points by less than this fraction of its largest part are not told.
+# Shares of a direction that move points by less than this fraction of its largest are not reported.
 NEGLIGIBLE = 0.01
 
-# What moves points by less than this fraction of a direction's largest part is rounding.
+# Changes that move points by less than this fraction of a direction's largest are rounding.
 ROUNDING = 1e-9
 
-# A gap beyond this is one to mere rounding, and counts as this.
+# Limit of the gap: a greater one separates determined directions from rounding.
 GREAT = 1e9
 
-# A direction is weak when one standard deviation along it moves corrected points, relative to one
-# another, by more than the target uncertainty at half the volume's diagonal or, without a target,
-# this many times the repeatability.
+# Factor of the repeatability beyond which a direction is weak without a target: see `weak_limit`.
 WEAK = 10.0
 
-# Curves that no polynomial of this degree describes are called irregular.
+# Highest degree of polynomial tried for a curve before it is called irregular.
 HIGHEST = 10
 SHAPES = {1: "linear", 2: "quadratic", 3: "cubic"}
 
@@ -55,8 +53,8 @@ class FunctionPart:
 
 @dataclass(frozen=True)
 class ArtefactPart:
-    """An artefact's share: the largest displacement of a ball in metres, and the deformation in
-    words.
+    """An artefact's share: the largest displacement of a ball in metres, and the deformation as
+    text.
     """
 
     name: str
@@ -66,8 +64,8 @@ class ArtefactPart:
 
 @dataclass(frozen=True)
 class PositionPart:
-    """A position's or a probe's share: its shift in metres, its turn in radians, and their axes in
-    words if any.
+    """A position's or a probe's share: its shift in metres, its rotation in radians, and their axes
+    as text, or empty.
     """
 
     name: str
@@ -79,9 +77,7 @@ class PositionPart:
 
 @dataclass(frozen=True)
 class LengthPart:
-    """The change of an unknown length, or of a parameter of an influence quantity, in its
-    `unit`.
-    """
+    """The change of an unknown length or influence parameter, in its `unit`."""
 
     name: str
     change: float
@@ -92,11 +88,11 @@ class LengthPart:
 class Direction:
     """A change of parameters that observations do not show, or show too weakly.
 
-    Null directions are scaled so that the part that moves points most moves them by one micrometre;
-    weak ones are as long as their standard deviation. `standard_deviation` is what a weak one adds
-    to corrected points, relative to one another, in metres, as the root mean square over the
-    evaluation `points`; it adds more than `limit`, beyond which a direction is weak, at `beyond` of
-    them. It is infinite for a null direction.
+    Null directions are scaled so that their largest share moves points by one micrometre; weak ones
+    are one standard deviation long. `standard_deviation` is the contribution of a weak one to
+    corrected points, relative to one another, in metres (root mean square over the evaluation
+    `points`), infinite for a null direction. It exceeds `limit`, beyond which a direction is weak,
+    at `beyond` of the points.
     """
 
     functions: tuple[FunctionPart, ...]
@@ -111,10 +107,10 @@ class Direction:
     limit: float = float("inf")
 
     def is_pose_of(self, positions: Collection[str]) -> bool:
-        """Whether it changes nothing but poses of some positions."""
-        others = self.functions, self.artefacts, self.probes, self.lengths, self.influences
+        """Return whether it changes poses of these positions only."""
+        further_shares = self.functions, self.artefacts, self.probes, self.lengths, self.influences
         return (
-            not any(others)
+            not any(further_shares)
             and bool(self.positions)
             and all(part.name in positions for part in self.positions)
         )
@@ -124,18 +120,18 @@ class Direction:
 
 
 def rank_complaint(deficiency: int, expected: int | None) -> str:
-    """A rank that is not the expected one, in words that are true where the file expects nothing.
+    """Return text about an unexpected rank.
 
     >>> rank_complaint(1, None)
     'rank deficiency 1, and the file does not say expected_rank_deficiency: 1'
     >>> rank_complaint(0, 2)
     'full rank where the file expects rank deficiency 2'
     """
-    found = f"rank deficiency {deficiency}" if deficiency else "full rank"
+    rank = f"rank deficiency {deficiency}" if deficiency else "full rank"
     if expected is None:
-        return f"{found}, and the file does not say expected_rank_deficiency: {deficiency}"
+        return f"{rank}, and the file does not say expected_rank_deficiency: {deficiency}"
     return (
-        f"{found} where the file expects"
+        f"{rank} where the file expects"
         f" {f'rank deficiency {expected}' if expected else 'full rank'}"
     )
 
@@ -146,7 +142,7 @@ class Verdict:
 
     `singular_values` are in standard deviations per micrometre, largest first, see `Spectrum`;
     `gap` is the ratio across the border between determined and undetermined, `GREAT` at most.
-    `reasons` tell what bars and gauges lack.
+    `reasons` are missing conditions of bars and gauges.
     """
 
     parameters: int
@@ -161,24 +157,22 @@ class Verdict:
 
     @property
     def as_expected(self) -> bool:
-        """Whether the deficiency is the one the file states; a file that states none expects full
-        rank.
-        """
+        """Whether the deficiency is the one in the file, by default none."""
         return self.deficiency == (self.expected or 0)
 
     @property
     def complaint(self) -> str:
-        """What is wrong where the deficiency is not as expected; otherwise empty."""
+        """Text about an unexpected deficiency, or empty."""
         return "" if self.as_expected else rank_complaint(self.deficiency, self.expected)
 
 
 def verdict(
     at: Linearisation, expected: int | None = None, target: Target | None = None
 ) -> Verdict:
-    """Judge a design from its spectrum; how the balls follow the undetermined directions is asked
-    for where there are any.
+    """Judge a design from its spectrum; the balls' null directions are computed only if there are
+    any.
     """
-    design, layout, found = at.design, at.layout, at.spectrum
+    design, layout, spectrum = at.design, at.layout, at.spectrum
     weak, effect = _weak_roots(at, target)
     limit = weak_limit(design, target)
     open_ = np.concatenate([at.shared_null, weak], axis=1)
@@ -186,10 +180,10 @@ def verdict(
     return Verdict(
         design.parameter_count,
         design.observation_count,
-        found.deficiency,
+        spectrum.deficiency,
         expected,
-        found.values,
-        found.gap if np.isinf(found.gap) else min(found.gap, GREAT),
+        spectrum.values,
+        spectrum.gap if np.isinf(spectrum.gap) else min(spectrum.gap, GREAT),
         null_directions(at),
         _weak_directions(design, layout, weak, effect, limit),
         () if reasons is None else reasons(design, layout, open_),
@@ -197,8 +191,8 @@ def verdict(
 
 
 def relative_changes(design: Design, layout: SharedLayout, directions: Array) -> Array:
-    """How directions (s, k) move the corrected points relative to one another, (points, d, k)
-    metres.
+    """Return how directions (s, k) move the corrected points relative to one another, (points, d,
+    k) metres.
     """
     points = design.evaluation.points
     offsets = np.broadcast_to(design.probes.offsets[design.evaluation.probe], points.shape)
@@ -207,40 +201,38 @@ def relative_changes(design: Design, layout: SharedLayout, directions: Array) ->
 
 
 def null_directions(at: Linearisation) -> tuple[Direction, ...]:
-    """The undetermined directions, in a basis in which each involves as little as possible."""
-    return tuple(_told(at.design, at.layout, *change) for change in null_changes(at))
+    """Return the undetermined directions, in a basis in which each involves few parameters."""
+    return tuple(_described(at.design, at.layout, *change) for change in null_changes(at))
 
 
 def null_changes(at: Linearisation) -> list[tuple[Array, Array]]:
-    """Each undetermined direction as it is told: changes (s,) of the shared parameters, and (n, d)
-    of the balls, the part that moves points most by one micrometre.
+    """Return each undetermined direction as reported: changes (s,) of the shared parameters and (n,
+    d) of the balls, at most one micrometre.
     """
-    found = []
+    changes = []
     for mixture in independent_mixture(at).T:
         shared, balls = at.shared_null @ mixture, at.ball_null @ mixture
         size = _largest(at.layout, shared, balls) / 1e-6
-        found.append(_signed(at.design, at.layout, shared / size, balls / size))
-    return found
+        changes.append(_signed(at.design, at.layout, shared / size, balls / size))
+    return changes
 
 
 def weak_changes(at: Linearisation, target: Target | None = None) -> list[Array]:
-    """Each weak direction as it is told, weakest first: changes (s,) of the shared parameters, one
-    standard deviation long.
+    """Return each weak direction as reported, weakest first: changes (s,) of the shared parameters,
+    one standard deviation long.
     """
     still = np.zeros_like(at.design.balls.places)
     return [_signed(at.design, at.layout, root, still)[0] for root in _weak_roots(at, target)[0].T]
 
 
 def independent_mixture(at: Linearisation) -> Array:
-    """Mixtures (k, k) of the null directions in which they are reported: each involves as little as
-    possible.
-    """
+    """Return mixtures (k, k) of the null directions in which each involves few parameters."""
     return elementary_mixture(at.shared_null / at.spectrum.scale[:, None])
 
 
 def _weak_roots(at: Linearisation, target: Target | None) -> tuple[Array, Array]:
-    """Weak directions (s, k), one standard deviation long, weakest first, and what each adds to
-    corrected points.
+    """Return weak directions (s, k), one standard deviation long, weakest first, and their effects
+    on corrected points.
     """
     root, effect = _principal(at)
     columns = np.flatnonzero(above(effect, weak_limit(at.design, target)))[::-1]
@@ -248,32 +240,32 @@ def _weak_roots(at: Linearisation, target: Target | None) -> tuple[Array, Array]
 
 
 def effects(at: Linearisation) -> Array:
-    """What one standard deviation along each determined direction adds to corrected points, in
-    metres, (rank,).
+    """Return the effect of one standard deviation along each determined direction on corrected
+    points, relative to one another, in metres, (rank,).
 
-    Relative to one another, that is, as the root mean square over the points; empty where the
-    design has none.
+    It is the root mean square over the points; empty without evaluation points.
     """
     return _principal(at)[1]
 
 
 def _principal(at: Linearisation) -> tuple[Array, Array]:
-    """Determined directions (s, rank), one standard deviation long, and the effect of each on
+    """Return determined directions (s, rank), one standard deviation long, and their effects on
     corrected points.
     """
-    design, layout, found = at.design, at.layout, at.spectrum
-    if not len(design.evaluation.points) or found.rank == 0:
+    design, layout, spectrum = at.design, at.layout, at.spectrum
+    if not len(design.evaluation.points) or spectrum.rank == 0:
         return np.zeros((len(layout), 0)), np.zeros(0)
-    root = found.principal_root
+    root = spectrum.principal_root
     change = relative_changes(design, layout, root)
-    # Two points whose errors are independent differ by the root of two times the error of one, per
-    # co-ordinate.
-    effect = np.sqrt(2.0 / change[:, :, 0].size) * change.reshape(-1, found.rank)
-    return principal_directions(found.values[: found.rank], root, effect, found.scale)
+    # The difference of two independent points has twice the variance of one.
+    effect = np.sqrt(2.0 / change[:, :, 0].size) * change.reshape(-1, spectrum.rank)
+    return principal_directions(spectrum.values[: spectrum.rank], root, effect, spectrum.scale)
 
 
 def weak_limit(design: Design, target: Target | None) -> float:
-    """The effect, in metres, beyond which a direction is weak."""
+    """Return the effect, in metres, beyond which a direction is weak: the target uncertainty at
+    half the volume's diagonal, by default `WEAK` times the repeatability.
+    """
     if target is None:
         return WEAK * float(design.machine.repeatability.max())
     return float(target.at(0.5 * float(np.linalg.norm(design.machine.volume.size))))
@@ -289,7 +281,7 @@ def _weak_directions(
     beyond = above(of_points, limit).sum(axis=0)
     for root, size, count in zip(roots.T, effect.tolist(), beyond.tolist(), strict=True):
         still = np.zeros_like(design.balls.places)
-        description = _told(design, layout, *_signed(design, layout, root, still))
+        description = _described(design, layout, *_signed(design, layout, root, still))
         weak = replace(
             description, artefacts=(), standard_deviation=size, points=len(design.evaluation.points)
         )
@@ -300,36 +292,34 @@ def _weak_directions(
 def _signed(
     design: Design, layout: SharedLayout, shared: Array, balls: Array
 ) -> tuple[Array, Array]:
-    """A direction less rounding, with the sign that makes the first of its changes a positive
-    one.
-    """
+    """Return a direction without rounding errors, its first change positive."""
     shared, balls = _less_rounding(layout, shared, balls)
-    told = _told(design, layout, shared, balls)
-    if told.functions:
-        first = told.functions[0].peak
-    elif told.lengths:
-        first = told.lengths[0].change
+    direction = _described(design, layout, shared, balls)
+    if direction.functions:
+        first = direction.functions[0].peak
+    elif direction.lengths:
+        first = direction.lengths[0].change
     else:
-        every = np.concatenate([shared / layout.scale, balls.ravel()])
-        first = float(every[comparable(np.abs(every)).argmax()])
+        changes = np.concatenate([shared / layout.scale, balls.ravel()])
+        first = float(changes[comparable(np.abs(changes)).argmax()])
     return (shared, balls) if first >= 0.0 else (-shared, -balls)
 
 
 def _largest(layout: SharedLayout, shared: Array, balls: Array) -> float:
-    """What a direction moves points by at the most, in metres."""
+    """Return the largest displacement of points in a direction, in metres."""
     parts = np.abs(shared / layout.scale), np.abs(balls)
     return max(float(part.max(initial=0.0)) for part in parts)
 
 
 def _less_rounding(layout: SharedLayout, shared: Array, balls: Array) -> tuple[Array, Array]:
-    """A direction with zeros for what is mere rounding."""
+    """Return a direction with zeros for rounding errors."""
     least = ROUNDING * _largest(layout, shared, balls)
     return np.where(np.abs(shared / layout.scale) > least, shared, 0.0), np.where(
         np.abs(balls) > least, balls, 0.0
     )
 
 
-def _told(design: Design, layout: SharedLayout, shared: Array, balls: Array) -> Direction:
+def _described(design: Design, layout: SharedLayout, shared: Array, balls: Array) -> Direction:
     d = design.dimension
     functions = _function_parts(design, layout, shared)
     effect = np.abs(shared / layout.scale)
@@ -364,9 +354,11 @@ def _told(design: Design, layout: SharedLayout, shared: Array, balls: Array) -> 
         if above(abs(change), NEGLIGIBLE * largest)
     )
     influences = tuple(
-        LengthPart(one.name, float(change), one.unit)
-        for one, change in zip(design.influence_parameters, shared[layout.influences], strict=True)
-        if above(abs(change) * one.effect, NEGLIGIBLE * largest)
+        LengthPart(parameter.name, float(change), parameter.unit)
+        for parameter, change in zip(
+            design.influence_parameters, shared[layout.influences], strict=True
+        )
+        if above(abs(change) * parameter.effect, NEGLIGIBLE * largest)
     )
     return Direction(
         functions,
@@ -379,7 +371,6 @@ def _told(design: Design, layout: SharedLayout, shared: Array, balls: Array) -> 
 
 
 def _single_axis(vector: Array, word: str) -> str:
-    """The axis that a vector lies along, if it lies along one."""
     if len(vector) == 1 or not vector.any():
         return ""
     axis = int(comparable(np.abs(vector)).argmax())
@@ -408,15 +399,15 @@ def _function_parts(
             form = " ".join(filter(None, (shape(t, values[k]), lines[k].words)))
         else:
             peak, form = float(a[members[0]]), ""
-        told = FunctionPart(name, parameter.meaning, peak, parameter.unit, form)
-        parts.append((effect[members].max(), told))
+        function_part = FunctionPart(name, parameter.meaning, peak, parameter.unit, form)
+        parts.append((effect[members].max(), function_part))
     order = np.argsort(-comparable([size for size, _ in parts]), kind="stable")
     return tuple(parts[k][1] for k in order)
 
 
 def shape(t: Array, values: Array) -> str:
-    """Word for a curve's shape: the lowest degree of polynomial, up to 10, that describes it; none
-    for a constant.
+    """Return a word for a curve's shape: the lowest degree of polynomial, up to 10, that describes
+    it; empty for a constant.
 
     >>> t = np.linspace(0, 1, 50)
     >>> shape(t, 3 * t), shape(t, t - t**2), shape(t, t**5), shape(t, 0 * t + 2)
@@ -428,14 +419,15 @@ def shape(t: Array, values: Array) -> str:
     size = float(np.abs(values).max())
     for degree in range(1, HIGHEST + 1):
         part = basis[:, : degree + 1]
-        left = values - part @ np.linalg.lstsq(part, values, rcond=None)[0]
-        if np.abs(left).max() <= 1e-3 * size:
+        residual = values - part @ np.linalg.lstsq(part, values, rcond=None)[0]
+        if np.abs(residual).max() <= 1e-3 * size:
             return SHAPES.get(degree, f"of degree {degree}")
     return "irregular"
 
 
 def deformation(places: Array, displacement: Array) -> str:
-    """Words for how an artefact deforms, from ball places and their displacements, both (n, d).
+    """Return a description of an artefact's deformation, from ball places and their displacements,
+    both (n, d).
 
     >>> square = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0]])
     >>> deformation(square, square * [1.0, -1.0])
@@ -448,7 +440,7 @@ def deformation(places: Array, displacement: Array) -> str:
         return "moves as a whole"
     centred = places - places.mean(axis=0)
     linear = np.linalg.lstsq(centred, moved, rcond=1e-9)[0].T
-    rest = moved - centred @ linear.T
+    remainder = moved - centred @ linear.T
     extent = np.ptp(places, axis=0)
     words = []
     if above(((centred @ linear.T) ** 2).sum(), 0.02 * total):
@@ -477,30 +469,30 @@ def deformation(places: Array, displacement: Array) -> str:
             if i < j and above(abs(linear[i, j] + linear[j, i]), 0.1 * largest)
         ]
         words += [f"shears in its {names[i]}{names[j]} plane" for i, j in sheared]
-    if above((rest**2).sum(), 0.02 * total):
+    if above((remainder**2).sum(), 0.02 * total):
         out_of_plane = (
             d == 3
             and extent[2] == 0
-            and above((rest[:, 2] ** 2).sum(), 0.5 * float((rest**2).sum()))
+            and above((remainder[:, 2] ** 2).sum(), 0.5 * float((remainder**2).sum()))
         )
         words.append("bends out of its plane" if out_of_plane else "distorts unevenly")
     return ", ".join(words) if words else "deforms"
 
 
 def in_words(direction: Direction) -> str:
-    """A direction as a sentence: what trades against what, and by how much."""
+    """Return a direction as a sentence: the changes that trade against each other, with sizes."""
     parts = []
     if direction.functions:
-        told = [_function_words(part) for part in direction.functions[:8]]
-        more = len(direction.functions) - len(told)
-        parts.append(", ".join(told) + (f" and {more} errors more" if more > 0 else ""))
+        described = [_function_words(part) for part in direction.functions[:8]]
+        more = len(direction.functions) - len(described)
+        parts.append(", ".join(described) + (f" and {more} errors more" if more > 0 else ""))
     for artefact in direction.artefacts:
         parts.append(f"{artefact.name} {artefact.words} (balls by up to {length(artefact.peak)})")
     if direction.positions:
-        told = [_position_words(part) for part in direction.positions[:6]]
-        more = len(direction.positions) - len(told)
+        described = [_position_words(part) for part in direction.positions[:6]]
+        more = len(direction.positions) - len(described)
         parts.append(
-            "moved positions: " + ", ".join(told) + (f" and {more} more" if more > 0 else "")
+            "moved positions: " + ", ".join(described) + (f" and {more} more" if more > 0 else "")
         )
     if direction.probes:
         parts.append(
@@ -544,7 +536,7 @@ def _position_words(part: PositionPart) -> str:
 
 
 def length(value: float) -> str:
-    """A small length in micrometres.
+    """Return a small length in micrometres as text.
 
     >>> length(2.5e-7)
     '0.25 µm'
@@ -553,7 +545,7 @@ def length(value: float) -> str:
 
 
 def _amount(value: float, unit: str) -> str:
-    """A small value in the unit it reads well in, without an exponent below a million.
+    """Return a small value in a suitable unit as text, without an exponent below a million.
 
     >>> _amount(8.12e-3, "K"), _amount(1.234e-3, "m"), _amount(2e-9, "rad")
     ('8.12 mK', '1230 µm', '0.002 µrad')
@@ -570,15 +562,13 @@ def _amount(value: float, unit: str) -> str:
 
 
 def changed_names(direction: Direction) -> list[str]:
-    """Errors that a direction changes, or else what it changes instead."""
+    """Return errors that a direction changes, or else artefacts, lengths, probes and positions."""
     if direction.functions:
         return [part.name for part in direction.functions]
-    artefacts, lengths = (
-        [part.name for part in direction.artefacts],
-        [part.name for part in direction.lengths],
+    parts: tuple[ArtefactPart | LengthPart | PositionPart, ...] = (
+        *direction.artefacts,
+        *direction.lengths,
+        *direction.probes,
+        *direction.positions,
     )
-    return [
-        *artefacts,
-        *lengths,
-        *(part.name for part in (*direction.probes, *direction.positions)),
-    ]
+    return [part.name for part in parts]

@@ -1,7 +1,6 @@
-"""The quantities whose uncertainties are reported: U1 to U6 of NPL Report CISE 15/98, section 6,
-and measuring tasks.
+"""Quantities of the kernel: U1 to U6 of NPL Report CISE 15/98, section 6, and measuring tasks.
 
-Extensions have further ones; `QUANTITIES` has all of them.
+Extensions add further ones; `QUANTITIES` has all.
 """
 
 from __future__ import annotations
@@ -26,18 +25,15 @@ from ballplate.simulator.machines.protocol import Unit
 
 @dataclass(frozen=True)
 class QuantityKind:
-    """A kind of quantity: what its standard uncertainties are of, and the function that makes its
-    functions.
+    """A type of quantity, with the function that returns its functions.
 
-    Functions in several groups are of the same kind, such as distances of several artefacts; a
-    design without any has none of this quantity. `parts` split it by unit, each with a word and a
-    description of its own; `unit` is that of the whole. `are_lengths` tells that it is about
-    distances only, which a plan can make small, and `about_balls` that these are between balls.
-    `effect` says in a few words what reliability looks at changes of, and is empty where it does
-    not. `has_target` states whether it is compared with the target uncertainty of the file,
-    `in_replicates` whether Monte Carlo follows it, and `is_recorded` whether a sweep records it
-    by default. `one_by_one` tells each of its `Parameters` besides the largest. `needs` is what a
-    design without it lacks.
+    Several groups of functions belong to one quantity, such as distances of several artefacts; no
+    group means that the design lacks the quantity. `parts` split it by unit, each with a word and a
+    description; `unit` is that of the whole. `are_lengths` marks quantities of distances only,
+    which a plan can minimise, `about_balls` those between balls. `effect` names the changes in
+    reliability, if any. `has_target`: compared with the file's target uncertainty; `in_replicates`:
+    followed by Monte Carlo; `is_recorded`: recorded by sweeps by default; `one_by_one`: printed for
+    each of its `Parameters`. `needs` is missing in a design without it.
 
     :raises ValueError: it is between balls, or has a target, and is not about distances.
     """
@@ -64,55 +60,45 @@ class QuantityKind:
 
 
 def evaluation_points(design: Design) -> MeasuredPoints:
-    """The evaluation points as places, with the probe that they are evaluated with."""
-    given = design.evaluation
-    return MeasuredPoints(given.points, np.full(len(given.points), given.probe))
+    """Return the evaluation points with their probe."""
+    evaluation = design.evaluation
+    return MeasuredPoints(evaluation.points, np.full(len(evaluation.points), evaluation.probe))
 
 
 def task_distances(design: Design) -> Distances:
-    """The lengths of the measuring tasks."""
-    given = design.tasks
-    ends = MeasuredPoints(given.points.reshape(-1, design.dimension), given.probes.ravel())
-    pairs = np.arange(2 * len(given.names)).reshape(-1, 2)
-    return Distances(ends, pairs, given.names, given.targets)
+    """Return the lengths of the measuring tasks."""
+    tasks = design.tasks
+    ends = MeasuredPoints(tasks.points.reshape(-1, design.dimension), tasks.probes.ravel())
+    pairs = np.arange(2 * len(tasks.names)).reshape(-1, 2)
+    return Distances(ends, pairs, tasks.names, tasks.targets)
 
 
 def _shared(layout: SharedLayout, columns: slice) -> tuple[Functions, ...]:
-    """Some of the shared parameters themselves."""
-    own = layout.parameters[columns]
-    rows = np.eye(len(layout))[columns]
-    return (
-        (Parameters(rows, tuple(p.name for p in own), tuple(p.unit for p in own)),) if own else ()
-    )
+    parameters = layout.parameters[columns]
+    names, units = tuple(p.name for p in parameters), tuple(p.unit for p in parameters)
+    return (Parameters(np.eye(len(layout))[columns], names, units),) if parameters else ()
 
 
 def _reported(design: Design, layout: SharedLayout) -> tuple[Functions, ...]:
-    """The model's parameters as it reports them, less those that are zero in any machine of the
-    model.
-    """
+    """Return the model's reported parameters, except those that are zero in any machine."""
     reported = design.model.reported()
     quoted = np.flatnonzero(reported.matrix.any(axis=1)).tolist()
     rows = np.zeros((len(quoted), len(layout)))
     rows[:, layout.model] = reported.matrix[quoted]
-    names, units = (
-        tuple(reported.names[i] for i in quoted),
-        tuple(reported.units[i] for i in quoted),
-    )
+    names = tuple(reported.names[i] for i in quoted)
+    units = tuple(reported.units[i] for i in quoted)
     return (Parameters(rows, names, units),) if quoted else ()
 
 
 def _squareness(design: Design, layout: SharedLayout) -> tuple[Functions, ...]:
-    """The squareness errors among the model's parameters, as angles."""
-    own = [k for k, one in enumerate(design.model.parameters) if one.function in SQUARENESS_ERRORS]
-    rows = np.zeros((len(own), len(layout)))
-    rows[np.arange(len(own)), layout.model.start + np.array(own, int)] = 1.0
-    parameters = [design.model.parameters[k] for k in own]
-    names, units = tuple(one.name for one in parameters), tuple(one.unit for one in parameters)
-    return (Parameters(rows, names, units),) if own else ()
+    every = enumerate(design.model.parameters, start=layout.model.start)
+    chosen = [(column, p) for column, p in every if p.function in SQUARENESS_ERRORS]
+    rows = np.eye(len(layout))[[column for column, _ in chosen]]
+    names, units = tuple(p.name for _, p in chosen), tuple(p.unit for _, p in chosen)
+    return (Parameters(rows, names, units),) if chosen else ()
 
 
 def _plates(design: Design) -> tuple[BallPlaces, ...]:
-    """The balls of each plate."""
     return tuple(BallPlaces(design.balls.of(plate)) for plate in design.artefacts.plates)
 
 

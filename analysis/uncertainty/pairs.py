@@ -1,4 +1,4 @@
-"""Standard uncertainties of the distances between all pairs of many places, in bounded memory."""
+"""Standard uncertainties of the distances between all pairs of many points, in bounded memory."""
 
 from __future__ import annotations
 
@@ -14,16 +14,16 @@ from ballplate.simulator.inputs.quantities import LengthFunction
 from ballplate.simulator.machines.protocol import Array, Integers
 from numpy.typing import NDArray
 
-# Places on a side of the tiles in which pairs are worked through: their products stay in cache.
+# Points on a side of a tile of pairs, whose products stay in cache.
 TILE = 256
 
 
 @dataclass(frozen=True)
 class PairSummary:
-    """Running result over pairs: how many, how many open, sum and maximum of the others and where
-    it stands.
+    """Running result over pairs: count, undetermined ones, sum and maximum of the others, and the
+    pair of the maximum.
 
-    `within` counts those that are no larger than the limit they were compared with.
+    `within` counts pairs up to the limit.
     """
 
     count: int = 0
@@ -34,9 +34,11 @@ class PairSummary:
     within: int = 0
 
     def __add__(self, other: PairSummary) -> PairSummary:
-        one, two = comparable([self.maximum, other.maximum])
-        # Of equal ones the first by its places, so that tiles do not matter.
-        top = other if two > one or (two == one and other.where < self.where) else self
+        maximum, other_maximum = comparable([self.maximum, other.maximum])
+        is_equal = other_maximum == maximum
+        # Of equal maxima the first pair, so that the division into tiles does not matter.
+        is_other = other_maximum > maximum or (is_equal and other.where < self.where)
+        top = other if is_other else self
         return PairSummary(
             self.count + other.count,
             self.undetermined + other.undetermined,
@@ -49,11 +51,10 @@ class PairSummary:
 
 @dataclass(frozen=True, eq=False)
 class PairTile:
-    """Pairs of places by index, `first` and `second` (m,): `lengths` and `uncertainties` (m,) in
+    """Pairs of points by index, `first` and `second` (m,): `lengths` and `uncertainties` (m,) in
     metres.
 
-    `is_open` (m,) marks those that an undetermined direction changes, whose uncertainties mean
-    nothing.
+    `is_open` (m,) marks undetermined distances, whose uncertainties are meaningless.
     """
 
     first: Integers
@@ -66,20 +67,18 @@ class PairTile:
 def all_pairs(
     moved: Displacements, labels: Integers, limit: LengthFunction | None = None, sigma: float = 1.0
 ) -> PairSummary:
-    """Standard uncertainty of the distances between all pairs of n places, as `pair_tiles` gives
-    them.
+    """Return a summary of the distances between all pairs of n points, as in `pair_tiles`.
 
-    `labels` (n,) name the places in the result. `sigma` times the uncertainty of each is compared
-    with the `limit`.
+    `labels` (n,) number the points in the result. `sigma` times each uncertainty is compared with
+    the `limit`.
     """
     return sum((_summary(tile, labels, limit, sigma) for tile in pair_tiles(moved)), PairSummary())
 
 
 def pair_tiles(moved: Displacements) -> Iterator[PairTile]:
-    """Standard uncertainties of the distances between all pairs of places, a tile of pairs at a
-    time.
+    """Yield standard uncertainties of the distances between all pairs of points, in tiles.
 
-    Places that coincide make no pair. Memory is that of a tile.
+    Coincident points make no pair. Memory is that of a tile.
     """
     places, common, null, drawn = relative(moved)
     single = common @ common.transpose(0, 2, 1) + moved.own @ moved.own.transpose(0, 2, 1)
@@ -89,32 +88,30 @@ def pair_tiles(moved: Displacements) -> Iterator[PairTile]:
 
 
 def pairs_of(moved: Displacements, pairs: Integers) -> PairTile:
-    """Standard uncertainties of the distances between some pairs (m, 2) of places that are
-    apart.
-    """
+    """Return standard uncertainties of the distances between pairs (m, 2) of distinct points."""
     places, common, null, drawn = relative(moved)
     lengths, variance = np.zeros(len(pairs)), np.zeros(len(pairs))
     change = np.zeros((len(pairs), null.shape[2]))
-    # A slice of the pairs at a time: the products of all would take far more memory than the pairs.
+    # In slices, since the products of all pairs would take far more memory than the pairs.
     for start in range(0, len(pairs), 2 * TILE):
-        part = slice(start, start + 2 * TILE)
-        i, j = pairs[part].T
-        apart = places[i] - places[j]
-        lengths[part] = np.linalg.norm(apart, axis=1)
-        unit = apart / lengths[part, None]
-        variance[part] = (np.einsum("md,mdr->mr", unit, common[i] - common[j]) ** 2).sum(axis=1)
+        chunk = slice(start, start + 2 * TILE)
+        i, j = pairs[chunk].T
+        difference = places[i] - places[j]
+        lengths[chunk] = np.linalg.norm(difference, axis=1)
+        unit = difference / lengths[chunk, None]
+        variance[chunk] = (np.einsum("md,mdr->mr", unit, common[i] - common[j]) ** 2).sum(axis=1)
         for end in (i, j):
-            variance[part] += (np.einsum("md,mdr->mr", unit, moved.own[end]) ** 2).sum(axis=1)
+            variance[chunk] += (np.einsum("md,mdr->mr", unit, moved.own[end]) ** 2).sum(axis=1)
         as_drawn = drawn[i] - drawn[j]
         as_drawn /= np.linalg.norm(as_drawn, axis=1)[:, None]
-        change[part] = np.einsum("md,mdk->mk", as_drawn, null[i] - null[j])
+        change[chunk] = np.einsum("md,mdk->mk", as_drawn, null[i] - null[j])
     open_ = np.linalg.norm(change, axis=1) > open_above(null)
     return PairTile(pairs[:, 0], pairs[:, 1], lengths, np.sqrt(variance), open_)
 
 
 def relative(moved: Displacements) -> tuple[Array, Array, Array, Array]:
-    """Places, displacements and those along undetermined directions without what all do together,
-    and places as drawn.
+    """Return points, displacements and those along undetermined directions without rigid motion,
+    and nominal points.
     """
     return (
         moved.places,
@@ -125,7 +122,7 @@ def relative(moved: Displacements) -> tuple[Array, Array, Array, Array]:
 
 
 def _tiles(n: int) -> Iterator[tuple[slice, slice]]:
-    # All about as large, so that the tiles of the diagonal, of which half is in vain, are small.
+    # Tiles of about equal size, so that those of the diagonal, half unused, stay small.
     bounds = np.linspace(0, n, -(-n // TILE) + 1).astype(int).tolist()
     edges = [slice(*ends) for ends in pairwise(bounds)]
     for i, rows in enumerate(edges):
@@ -145,13 +142,12 @@ def _tile(
 ) -> PairTile:
     diagonal = rows.start == columns.start
     n, m, d = rows.stop - rows.start, columns.stop - columns.start, places.shape[1]
-    # Arrays of a tile's size that are made once: asking the system for memory takes as long as
-    # using it.
-    views = [one[: n * m].reshape(n, m) for one in work]
+    # Arrays allocated once: allocating takes as long as computing.
+    views = [buffer[: n * m].reshape(n, m) for buffer in work]
     product, term, along, weighted, squared, *difference = views
     for axis in range(d):
         np.subtract(places[rows, None, axis], places[None, columns, axis], out=difference[axis])
-    # A plate lies in a plane of its own frame, so that one component of all its distances is zero.
+    # A plate is in a plane of its own frame, so that one component of all its distances is zero.
     used = [axis for axis in range(d) if difference[axis].any()]
     squared[:] = weighted[:] = 0.0
     for k, i in enumerate(used):
@@ -160,12 +156,12 @@ def _tile(
         for j in used[k:]:
             np.matmul(common[rows, i], common[columns, j].T, out=product)
             if i == j:
-                other = product
+                transposed = product
             elif diagonal:
-                other = product.T
+                transposed = product.T
             else:
-                other = np.matmul(common[rows, j], common[columns, i].T, out=term)
-            np.add(product, other, out=term)
+                transposed = np.matmul(common[rows, j], common[columns, i].T, out=term)
+            np.add(product, transposed, out=term)
             np.subtract(single[rows, None, i, j], term, out=term)
             term += single[None, columns, i, j]
             term *= difference[j]
@@ -179,12 +175,12 @@ def _tile(
     values = np.sqrt(np.maximum(weighted[chosen] / lengths, 0.0))
     open_ = np.zeros(len(values), bool)
     if null.shape[2]:
-        apart = drawn[rows, None] - drawn[None, columns]
+        difference_drawn = drawn[rows, None] - drawn[None, columns]
         change = sum(
-            apart[:, :, i, None] * (null[rows, None, i, :] - null[None, columns, i, :])
+            difference_drawn[:, :, i, None] * (null[rows, None, i, :] - null[None, columns, i, :])
             for i in range(d)
         )
-        length = (apart**2).sum(axis=2)
+        length = (difference_drawn**2).sum(axis=2)
         size = np.sqrt((np.asarray(change) ** 2).sum(axis=2) / np.where(length > 0.0, length, 1.0))
         open_ = size[chosen] > open_above(null)
     first, second = np.nonzero(chosen)
@@ -215,5 +211,7 @@ def _summary(
 
 
 def open_above(null: Array) -> float:
-    """What a null direction must change a distance by to leave it open: well above rounding."""
+    """Return the change of a distance along a null direction above which the distance is
+    undetermined: well above rounding.
+    """
     return 1e-7 * float(np.linalg.norm(null, axis=2).max(initial=0.0)) + 1e-13

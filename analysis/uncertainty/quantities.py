@@ -30,37 +30,39 @@ QUANTITIES: dict[str, QuantityKind] = KERNEL_QUANTITIES | {
 
 
 def functions_of(symbol: str, design: Design, layout: SharedLayout) -> tuple[Functions, ...]:
-    """The functions of a quantity, none in a design without it.
+    """Return the functions of a quantity, empty in a design without it.
 
-    :raises ValueError: its entry contradicts itself.
+    :raises ValueError: the entry is inconsistent.
     """
     kind = QUANTITIES[symbol]
     try:
-        found = kind.functions(design, layout)
+        functions = kind.functions(design, layout)
     except ValueError as error:
         raise ValueError(f"quantity {symbol}: {error}") from error
-    wrong = _wrong_with(kind, found)
-    if wrong:
-        raise ValueError(f"quantity {symbol}: {wrong}")
-    return found
+    fault = _fault_of(kind, functions)
+    if fault:
+        raise ValueError(f"quantity {symbol}: {fault}")
+    return functions
 
 
-def _wrong_with(kind: QuantityKind, found: object) -> str:
-    """What contradicts the kind in what its function made, in words."""
-    if not isinstance(found, tuple) or not all(isinstance(one, Functions) for one in found):
-        return f"give a tuple of Parameters, Coordinates or Distances, not {shorten(repr(found))}"
-    are = {type(one) for one in found}
-    if kind.are_lengths and are - {Distances}:
+def _fault_of(kind: QuantityKind, groups: object) -> str:
+    """Return a contradiction between a quantity and its functions, or an empty text."""
+    if not isinstance(groups, tuple) or not all(isinstance(group, Functions) for group in groups):
+        return f"give a tuple of Parameters, Coordinates or Distances, not {shorten(repr(groups))}"
+    types = {type(group) for group in groups}
+    if kind.are_lengths and types - {Distances}:
         return "are_lengths goes with Distances only; remove it"
-    if kind.effect and Parameters in are:
+    if kind.effect and Parameters in types:
         return "effect goes with Distances and Coordinates only; remove it"
-    # What has names is shown one by one, so that a second group would be left out.
-    if len(found) > 1 and not all(isinstance(one, Distances) and not one.names for one in found):
+    # Only one group of names is shown.
+    if len(groups) > 1 and not all(
+        isinstance(group, Distances) and not group.names for group in groups
+    ):
         return "only Distances without names can be in several groups; put all into one"
     return ""
 
 
-# What all quantities, and the parts of those that have several units, are the uncertainties of.
+# Descriptions of quantities and of their parts by unit.
 DESCRIPTIONS: dict[str, str] = {}
 for _symbol, _kind in QUANTITIES.items():
     if _symbol.partition(" ")[0] not in QUANTITIES:
@@ -68,10 +70,9 @@ for _symbol, _kind in QUANTITIES.items():
     DESCRIPTIONS[_symbol] = _kind.description
     DESCRIPTIONS |= {f"{_symbol} {word}": description for word, description in _kind.parts.values()}
 
-# Quantities that a sweep records unless told, those whose symbol has a word of its own with the
-# whole.
+# Quantities that a sweep records by default, with their parts.
 RECORDED = tuple(
     symbol for symbol, kind in QUANTITIES.items() if kind.is_recorded and " " not in symbol
 )
-# Those that it records if told.
+# Quantities that a sweep records on request.
 RECORDED_IF_TOLD = tuple(symbol for symbol, kind in QUANTITIES.items() if not kind.is_recorded)

@@ -1,8 +1,8 @@
-"""Origin of a design's scale: certificates, priors, probe offsets, or an error model that cannot
+"""Sources of a design's scale: certificates, priors, probe offsets, or an error model that cannot
 stretch.
 
-Readings alone never determine it. Machine, plates, poses and offsets that are all larger by the
-same ratio give the same readings, so that some knowledge of a length must say how large they are.
+Readings alone never determine it: machine, plates, poses and offsets that are all larger by the
+same ratio give the same readings.
 """
 
 from __future__ import annotations
@@ -25,26 +25,23 @@ from ballplate.simulator.machines.protocol import Array, ErrorModel
 from .pairs import PairSummary
 from .summaries import point_pairs
 
-# The standard uncertainty of offsets for which a design that rests on them is told what becomes of
-# it.
+# Trial standard uncertainty of offsets (m) for designs whose scale rests on exact ones.
 OFFSET_TRIAL = 1e-6
-# What is left out carries scale where the scale is less certain without it by this factor.
+# Without a source, the uncertainty of scale increases by at least this factor.
 CARRIES = 1.05
-# A design rests on offsets held exact where its scale is less certain without them by this factor.
+# Without exact offsets, the scale that rests on them is less certain by this factor.
 RESTS = 3.0
-# The part of a stretched volume that an error model must follow to have a common scale.
+# Relative residual of a stretched volume that an error model with a common scale may leave.
 FOLLOWED = 1e-6
-# Artefacts whose certificates are told apart.
+# Artefacts whose certificates are separate sources.
 MOST_ARTEFACTS = 3
 
 
 @dataclass(frozen=True)
 class Carrier:
-    """What carries scale, in words; `without` is the relative standard uncertainty of scale if it
-    were not known.
+    """A source of scale; `without` is the relative standard uncertainty of scale without it.
 
-    Infinite where the scale would then be undetermined; None of the machine's own scales, which are
-    what they are.
+    Infinite if the scale is then undetermined; None of the machine's own scales.
     """
 
     words: str
@@ -53,8 +50,8 @@ class Carrier:
 
 @dataclass(frozen=True)
 class Loosened:
-    """U6 of a design whose exact probe offsets, but for one, have a standard uncertainty: average
-    and maximum, metres.
+    """Average and maximum U6, in metres, if exact probe offsets, except one, have a standard
+    uncertainty.
 
     `before` is the average with exact offsets.
     """
@@ -67,13 +64,12 @@ class Loosened:
 
 @dataclass(frozen=True)
 class Scale:
-    """The relative standard uncertainty of scale, and what carries it, the most important first.
+    """The relative standard uncertainty of scale, and its sources, the most important first.
 
     Scale is the mean relative change of the distances between corrected points, weighted by their
-    squares. `rests_on_offsets`: whether, but for probe offsets that are held exact, it would be
-    undetermined or at least three times as uncertain; `loosened` then tells what becomes of U6.
-    Where the error model cannot stretch the volume by the same ratio in all directions, the
-    machine's own scales carry as well.
+    squares. `rests_on_offsets`: without exact probe offsets, it would be undetermined or at least
+    three times as uncertain; `loosened` is U6 without them. If the error model cannot stretch the
+    volume equally in all directions, the machine's own scales are a source, too.
     """
 
     uncertainty: float
@@ -83,8 +79,8 @@ class Scale:
 
 
 def scale_of(experiment: Experiment, at: Linearisation) -> Scale | None:
-    """What carries the scale of a design; None where it is undetermined or the design is evaluated
-    nowhere.
+    """Return the sources of a design's scale; None if it is undetermined or without evaluation
+    points.
     """
     uncertainty = float(at.of_shared(scale_row(at)[None])[0])
     if np.isnan(uncertainty):
@@ -92,17 +88,16 @@ def scale_of(experiment: Experiment, at: Linearisation) -> Scale | None:
     stretches = can_stretch(at.design, at.state)
     groups = list(_groups(experiment))
     if len(groups) == 1 and stretches:
-        # Nothing else can: readings alone do not tell the scale.
+        # Readings alone do not determine scale, so that this is the only source.
         carriers = [Carrier(groups[0][0], np.inf)]
     else:
-        found = sorted(((scale_uncertainty(rest), words) for words, rest in groups), reverse=True)
-        some = [one for one in found if one[0] > CARRIES * uncertainty] or (
-            found if stretches else []
-        )
-        carriers = [Carrier(words, without) for without, words in some]
+        sources = sorted(((scale_uncertainty(rest), words) for words, rest in groups), reverse=True)
+        significant = [source for source in sources if source[0] > CARRIES * uncertainty]
+        chosen = significant or (sources if stretches else [])
+        carriers = [Carrier(words, without) for without, words in chosen]
     rests = any(
-        one.words == EXACT_OFFSETS and (one.without or 0.0) > RESTS * uncertainty
-        for one in carriers
+        carrier.words == EXACT_OFFSETS and (carrier.without or 0.0) > RESTS * uncertainty
+        for carrier in carriers
     )
     loosened = _loosened(experiment, at) if rests else None
     if not stretches:
@@ -115,13 +110,13 @@ EXACT_OFFSETS = "exact probe offsets"
 
 
 def _groups(experiment: Experiment) -> Iterator[tuple[str, Experiment]]:
-    """What may carry scale, in words, with the experiment in which it is not known."""
+    """Yield possible sources of scale, each with the experiment without it."""
     names = list(dict.fromkeys(item.artefact for item in experiment.calibration))
     sets = [[name] for name in names] if len(names) <= MOST_ARTEFACTS else [names]
-    for some in sets:
-        rest = tuple(item for item in experiment.calibration if item.artefact not in some)
-        words = listing((name or "the machine" for name in some), 3)
-        yield f"certificates of {words}", replace(experiment, calibration=rest)
+    for artefacts in sets:
+        remaining = tuple(item for item in experiment.calibration if item.artefact not in artefacts)
+        words = listing((name or "the machine" for name in artefacts), 3)
+        yield f"certificates of {words}", replace(experiment, calibration=remaining)
     if experiment.priors:
         yield "priors", replace(experiment, priors=())
     certified = [probe.name for probe, *_ in experiment.certified_offsets]
@@ -137,26 +132,26 @@ def _groups(experiment: Experiment) -> Iterator[tuple[str, Experiment]]:
 
 
 def exact_offsets(experiment: Experiment) -> tuple[str, ...]:
-    """Probes whose offsets are held exact, but for one: what the others are relative to."""
-    return tuple(name for name, one in experiment.probes.items() if not one.is_estimated)[1:]
+    """Return probes whose offsets are exact, except the first, which the others are relative to."""
+    return tuple(name for name, probe in experiment.probes.items() if not probe.is_estimated)[1:]
 
 
 def with_offsets(experiment: Experiment, uncertainty: float) -> Experiment:
-    """The experiment with a standard uncertainty, in metres, of the offsets that are held exact,
-    but for one.
+    """Return the experiment with a standard uncertainty, in metres, of all exact offsets except
+    one.
     """
     return _with_offsets(experiment, exact_offsets(experiment), uncertainty)
 
 
 def _with_offsets(experiment: Experiment, names: Iterable[str], uncertainty: float) -> Experiment:
-    own, probes = np.full(experiment.dimension, uncertainty), dict(experiment.probes)
+    uncertainties, probes = np.full(experiment.dimension, uncertainty), dict(experiment.probes)
     for name in names:
-        probes[name] = replace(probes[name], standard_uncertainty=own)
+        probes[name] = replace(probes[name], standard_uncertainty=uncertainties)
     return replace(experiment, probes=probes)
 
 
 def _without_stars(experiment: Experiment) -> Experiment:
-    """The experiment with unknown offsets in place of stars, but for one that is the reference."""
+    """Return the experiment with unknown offsets instead of stars; one stays as the reference."""
     probes = dict(experiment.probes)
     if all(probe.is_estimated for probe in probes.values()):
         first = next(iter(probes.values()))
@@ -165,7 +160,9 @@ def _without_stars(experiment: Experiment) -> Experiment:
 
 
 def scale_uncertainty(experiment: Experiment) -> float:
-    """Relative standard uncertainty of an experiment's scale; infinite where it is undetermined."""
+    """Return the relative standard uncertainty of an experiment's scale; infinite if
+    undetermined.
+    """
     at = _linearised(experiment)
     if at is None:
         return float("inf")
@@ -174,12 +171,12 @@ def scale_uncertainty(experiment: Experiment) -> float:
 
 
 def scale_row(at: Linearisation) -> Array:
-    """Derivative (s,) of the scale by the shared parameters: of the mean relative change of
-    distances.
+    """Return the derivative (s,) of the scale, the mean relative change of distances, by the shared
+    parameters.
 
-    Distances between the evaluation points or, where there is but one or none, between the corners
-    of the volume, are weighted by their squares; the sum over all pairs is one over all points,
-    less their centroid.
+    Distances between the evaluation points, or between the corners of the volume if there are fewer
+    than two, are weighted by their squares; the sum over all pairs is one over all points, less
+    their centroid.
     """
     points = _points(at.design)
     rows = correction_rows(
@@ -190,14 +187,14 @@ def scale_row(at: Linearisation) -> Array:
 
 
 def can_stretch(design: Design, state: State) -> bool:
-    """Whether the error model can stretch the volume by the same ratio along all axes."""
+    """Return whether the error model can stretch the volume equally along all axes."""
     offset = state.probes[design.evaluation.probe]
     return _stretches(design.model, _points(design), state.a, offset)
 
 
 def stretches(model: ErrorModel, volume: Volume, a: Array) -> bool:
-    """Whether an error model with parameters a (n,) can stretch its volume by the same ratio along
-    all axes.
+    """Return whether an error model with parameters a (n,) can stretch its volume equally along all
+    axes.
     """
     return _stretches(model, _corners(volume), a, np.zeros(len(volume.lower)))
 
@@ -211,8 +208,8 @@ def _stretches(model: ErrorModel, points: Array, a: Array, offset: Array) -> boo
     columns = columns[:, size > 0] / size[size > 0]
     if not columns.shape[1]:
         return False
-    left = centred.ravel() - columns @ np.linalg.lstsq(columns, centred.ravel(), rcond=1e-12)[0]
-    return bool(np.abs(left).max() <= FOLLOWED * np.abs(centred).max())
+    residual = centred.ravel() - columns @ np.linalg.lstsq(columns, centred.ravel(), rcond=1e-12)[0]
+    return bool(np.abs(residual).max() <= FOLLOWED * np.abs(centred).max())
 
 
 def _points(design: Design) -> Array:
@@ -227,7 +224,7 @@ def _corners(volume: Volume) -> Array:
 
 
 def _linearised(experiment: Experiment) -> Linearisation | None:
-    """The linearised design; None where it cannot be laid out."""
+    """Return the linearised design; None if it cannot be laid out."""
     try:
         return linearise(lay_out(experiment))
     except ExperimentError:
@@ -235,7 +232,7 @@ def _linearised(experiment: Experiment) -> Linearisation | None:
 
 
 def _loosened(experiment: Experiment, at: Linearisation) -> Loosened | None:
-    """What becomes of U6 once the exact offsets have an uncertainty; None where something of it is
+    """Return U6 with uncertain instead of exact offsets; None if any distance is then
     undetermined.
     """
     after = lengths_with_offsets(experiment, OFFSET_TRIAL)
@@ -248,8 +245,8 @@ def _loosened(experiment: Experiment, at: Linearisation) -> Loosened | None:
 
 
 def lengths_with_offsets(experiment: Experiment, uncertainty: float) -> PairSummary | None:
-    """U6 where exact offsets, but for one, have an uncertainty in metres; None where something of
-    it is open.
+    """Return U6 if exact offsets, except one, have an uncertainty in metres; None if any distance
+    is undetermined.
     """
     at = _linearised(with_offsets(experiment, uncertainty))
     if at is None:

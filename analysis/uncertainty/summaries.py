@@ -1,4 +1,6 @@
-"""The uncertainties U1 to U6 of NPL Report CISE 15/98, section 6, and those of measuring tasks."""
+"""Summaries of the uncertainties U1 to U6 (NPL Report CISE 15/98, section 6) and of measuring
+tasks.
+"""
 
 from __future__ import annotations
 
@@ -32,15 +34,14 @@ from .tasks import TaskUncertainty, task_uncertainties
 
 @dataclass(frozen=True)
 class Quantity:
-    """Standard uncertainties of one kind: the largest and the mean of those that are determined.
+    """Standard uncertainties of a quantity: maximum and average of the determined ones.
 
-    `count` of them there are, `undetermined` of which the observations leave open; the maximum and
-    the average are NaN when nothing is left, and `largest` then is empty, otherwise it names where
-    the maximum stands. `within_target` is the share of distances whose uncertainty,
-    `coverage_factor` times the standard one, is within the target uncertainty, those undetermined
-    counted as not; None where no target is compared with. `places` tell where in the volume the
-    evaluation points are that `largest` names. `named` are distances with names one by one,
-    `parameters` names of parameters with their uncertainties, NaN where undetermined.
+    `count` includes `undetermined` ones; if all are undetermined, maximum and average are NaN and
+    `largest`, the name of the maximum, is empty. `within_target` is the share of distances whose
+    uncertainty, `coverage_factor` times the standard one, is within the target uncertainty
+    (undetermined ones are not); None without target. `places` locate the evaluation points of
+    `largest`. `named` are distances with names, `parameters` names of parameters with their
+    uncertainties, NaN if undetermined.
     """
 
     symbol: str
@@ -68,24 +69,24 @@ def uncertainties(
     target: Target | None = None,
     symbols: Collection[str] | None = None,
 ) -> dict[str, Quantity]:
-    """All quantities of a linearised design, or those of some `symbols`; those of several units
-    also split by these.
+    """Return all quantities of a linearised design, or those of some `symbols`, also split by
+    unit.
 
     `sigma` multiplies all stated uncertainties: 1 for planning, the residuals' estimate after a
-    fit. The distances between corrected points are compared with the `target` accuracy if there is
-    one, measuring tasks with their own.
+    fit. The distances between corrected points are compared with the `target`, measuring tasks with
+    their own.
     """
-    found: dict[str, Quantity] = {}
-    made: dict[bytes, Displacements] = {}
+    quantities: dict[str, Quantity] = {}
+    cache: dict[bytes, Displacements] = {}
 
     def displaced(places: Places) -> Displacements:
         if isinstance(places, BallPlaces):
             return displacements(at, places)
-        # Co-ordinates and distances are of the same points.
+        # Co-ordinates and distances of the same points share displacements.
         key = places.points.tobytes() + places.probes.tobytes()
-        if key not in made:
-            made[key] = displacements(at, places)
-        return made[key]
+        if key not in cache:
+            cache[key] = displacements(at, places)
+        return cache[key]
 
     for symbol, kind in QUANTITIES.items():
         functions = (
@@ -97,47 +98,49 @@ def uncertainties(
             continue
         first = functions[0]
         if isinstance(first, Parameters):
-            found |= _of_parameters(at, symbol, first, sigma)
+            quantities |= _of_parameters(at, symbol, first, sigma)
         elif isinstance(first, Coordinates):
-            found[symbol] = _of_coordinates(at, symbol, first.places, displaced, sigma)
+            quantities[symbol] = _of_coordinates(at, symbol, first.places, displaced, sigma)
         elif first.pairs is not None:
-            found[symbol] = _of_named(
+            quantities[symbol] = _of_named(
                 symbol, first, pairs_of(displaced(first.places), first.pairs), sigma
             )
         else:
             groups = [
-                (one.places, displaced(one.places))
-                for one in functions
-                if isinstance(one, Distances)
+                (group.places, displaced(group.places))
+                for group in functions
+                if isinstance(group, Distances)
             ]
             lengths = _of_pairs(
                 at.design, symbol, groups, sigma, target if kind.has_target else None
             )
-            found |= {} if lengths is None else {symbol: lengths}
-    return found
+            quantities |= {} if lengths is None else {symbol: lengths}
+    return quantities
 
 
 def tasks_of(quantities: Mapping[str, Quantity]) -> tuple[TaskUncertainty, ...]:
-    """The measuring tasks one by one; none without any."""
+    """Return the measuring tasks."""
     return quantities["tasks"].named if "tasks" in quantities else ()
 
 
 def _of_parameters(
-    at: Linearisation, symbol: str, given: Parameters, sigma: float
+    at: Linearisation, symbol: str, parameters: Parameters, sigma: float
 ) -> dict[str, Quantity]:
-    values, kind = sigma * at.of_shared(given.rows), QUANTITIES[symbol]
-    unit = kind.unit or ", ".join(unit for unit in ("m", "rad", "1") if unit in given.units)
-    whole = summarise(symbol, values, unit, given.names.__getitem__)
+    values, kind = sigma * at.of_shared(parameters.rows), QUANTITIES[symbol]
+    unit = kind.unit or ", ".join(unit for unit in ("m", "rad", "1") if unit in parameters.units)
+    whole = summarise(symbol, values, unit, parameters.names.__getitem__)
     if kind.one_by_one:
-        whole = replace(whole, parameters=tuple(zip(given.names, values.tolist(), strict=True)))
-    found = {symbol: whole}
+        whole = replace(
+            whole, parameters=tuple(zip(parameters.names, values.tolist(), strict=True))
+        )
+    quantities = {symbol: whole}
     for part, (word, _) in kind.parts.items():
-        chosen = [i for i, unit in enumerate(given.units) if unit == part]
+        chosen = [i for i, unit in enumerate(parameters.units) if unit == part]
         if chosen:
             name = f"{symbol} {word}"
-            names = [given.names[i] for i in chosen]
-            found[name] = summarise(name, values[chosen], part, names.__getitem__)
-    return found
+            names = [parameters.names[i] for i in chosen]
+            quantities[name] = summarise(name, values[chosen], part, names.__getitem__)
+    return quantities
 
 
 def _of_coordinates(
@@ -151,22 +154,24 @@ def _of_coordinates(
         values = sigma * at.of_balls()[places.index].ravel()
     else:
         values = sigma * displaced(places).uncertainties.ravel()
-    found = summarise(symbol, values, "m", lambda index: coordinate_name(at.design, places, index))
-    if isinstance(places, BallPlaces) or not found.largest:
-        return found
-    return replace(found, places=(_point(places, first_largest(values) // at.design.dimension),))
+    quantity = summarise(
+        symbol, values, "m", lambda index: coordinate_name(at.design, places, index)
+    )
+    if isinstance(places, BallPlaces) or not quantity.largest:
+        return quantity
+    return replace(quantity, places=(_point(places, first_largest(values) // at.design.dimension),))
 
 
-def _of_named(symbol: str, given: Distances, tile: PairTile, sigma: float) -> Quantity:
-    """Distances that have names, each compared with its own target."""
-    named = task_uncertainties(given, tile, sigma)
-    values = np.array([one.standard_uncertainty for one in named])
-    found = replace(summarise(symbol, values, "m", given.names.__getitem__), named=named)
-    judged = [one.is_within for one in named if one.is_within is not None]
-    if not judged:
-        return found
-    share = sum(judged) / len(judged)
-    return replace(found, within_target=share, coverage_factor=named[0].coverage_factor)
+def _of_named(symbol: str, distances: Distances, tile: PairTile, sigma: float) -> Quantity:
+    """Return the quantity of distances with names, each compared with its own target."""
+    named = task_uncertainties(distances, tile, sigma)
+    values = np.array([task.standard_uncertainty for task in named])
+    quantity = replace(summarise(symbol, values, "m", distances.names.__getitem__), named=named)
+    verdicts = [task.is_within for task in named if task.is_within is not None]
+    if not verdicts:
+        return quantity
+    share = sum(verdicts) / len(verdicts)
+    return replace(quantity, within_target=share, coverage_factor=named[0].coverage_factor)
 
 
 def _of_pairs(
@@ -176,7 +181,7 @@ def _of_pairs(
     sigma: float,
     target: Target | None,
 ) -> Quantity | None:
-    """Distances between all places of each group; None where all coincide."""
+    """Return the quantity of distances between all points of each group; None if all coincide."""
     limit = None if target is None else target.standard
     pairs = sum(
         (all_pairs(moved, places.labels, limit, sigma) for places, moved in groups), PairSummary()
@@ -184,32 +189,34 @@ def _of_pairs(
     if not pairs.count:
         return None
     determined = pairs.count - pairs.undetermined
-    found = Quantity(symbol, np.nan, np.nan, "m", pairs.count, pairs.undetermined)
+    quantity = Quantity(symbol, np.nan, np.nan, "m", pairs.count, pairs.undetermined)
     places = groups[0][0]
     if determined:
         where = " to ".join(places.name(design, label) for label in pairs.where)
         average = sigma * pairs.total / determined
-        found = replace(found, maximum=sigma * pairs.maximum, average=average, largest=where)
+        quantity = replace(quantity, maximum=sigma * pairs.maximum, average=average, largest=where)
         if isinstance(places, MeasuredPoints):
-            found = replace(found, places=tuple(_point(places, label) for label in pairs.where))
+            quantity = replace(
+                quantity, places=tuple(_point(places, label) for label in pairs.where)
+            )
     if target is None:
-        return found
+        return quantity
     return replace(
-        found, within_target=pairs.within / pairs.count, coverage_factor=target.coverage_factor
+        quantity, within_target=pairs.within / pairs.count, coverage_factor=target.coverage_factor
     )
 
 
 def _point(places: MeasuredPoints, label: int) -> str:
-    """A point by its number from 1, as in the file, and its place."""
-    place = ", ".join(f"{round(1e3 * value, 1) + 0.0:.9g}" for value in places.points[label])
-    return f"point {label + 1} at ({place}) mm"
+    """Return a point's number from 1, as in the file, and its co-ordinates."""
+    coordinates = ", ".join(f"{round(1e3 * value, 1) + 0.0:.9g}" for value in places.points[label])
+    return f"point {label + 1} at ({coordinates}) mm"
 
 
 def point_pairs(
     at: Linearisation, limit: LengthFunction | None = None
 ) -> tuple[Array, PairSummary]:
-    """Uncertainties of the corrected evaluation points' co-ordinates (n, d), and of all distances
-    between them.
+    """Return uncertainties of the corrected evaluation points' co-ordinates (n, d), and of all
+    distances between them.
     """
     places = evaluation_points(at.design)
     moved = displacements(at, places)
@@ -217,7 +224,7 @@ def point_pairs(
 
 
 def summarise(symbol: str, values: Array, unit: str, name_of: Callable[[int], str]) -> Quantity:
-    """Maximum and average of the standard uncertainties `values` (m,) that are not NaN."""
+    """Return maximum and average of the standard uncertainties `values` (m,) that are not NaN."""
     open_ = np.isnan(values)
     if open_.all():
         return Quantity(symbol, np.nan, np.nan, unit, len(values), len(values))

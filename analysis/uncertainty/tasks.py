@@ -1,6 +1,4 @@
-"""Standard uncertainties of measuring tasks: lengths between two points that the corrected machine
-is to measure.
-"""
+"""Standard uncertainties of measuring tasks: lengths between two points."""
 
 from __future__ import annotations
 
@@ -18,10 +16,10 @@ COVERAGE = 2.0
 
 @dataclass(frozen=True)
 class TaskUncertainty:
-    """A measuring task: its length, standard uncertainty and the one to be reached, in metres.
+    """A measuring task: its length, standard uncertainty and target, in metres.
 
-    The standard uncertainty is NaN where observations leave it open; `target` is None where nothing
-    is to be reached, and otherwise compared with `coverage_factor` times the standard uncertainty.
+    The standard uncertainty is NaN if undetermined; `target`, if any, is compared with
+    `coverage_factor` times the standard uncertainty.
     """
 
     name: str
@@ -32,17 +30,17 @@ class TaskUncertainty:
 
     @property
     def expanded_uncertainty(self) -> float:
-        """With the coverage factor of the target, or 2 where that is 1."""
+        """Expanded uncertainty with the target's coverage factor, or 2 if that is 1."""
         return self.expansion * self.standard_uncertainty
 
     @property
     def expansion(self) -> float:
-        """The coverage factor of the expanded uncertainty."""
+        """Coverage factor of the expanded uncertainty."""
         return expansion(self.coverage_factor)
 
     @property
     def is_within(self) -> bool | None:
-        """Whether the uncertainty is within its target; None where there is none."""
+        """Whether the uncertainty is within its target; None without target."""
         return (
             None
             if self.target is None
@@ -51,22 +49,22 @@ class TaskUncertainty:
 
 
 def expansion(coverage_factor: float) -> float:
-    """The coverage factor of an expanded uncertainty that is shown: that of the target, or 2 where
-    that is 1.
+    """Return the coverage factor of printed expanded uncertainties: the target's, or 2 if that is
+    1.
     """
     return coverage_factor if coverage_factor > 1.0 else COVERAGE
 
 
 def task_uncertainties(
-    given: Distances, tile: PairTile, sigma: float = 1.0
+    distances: Distances, tile: PairTile, sigma: float = 1.0
 ) -> tuple[TaskUncertainty, ...]:
-    """Standard uncertainties of distances that have names, which are the pairs of a tile.
+    """Return standard uncertainties of named distances, which are the pairs of a tile.
 
     `sigma` multiplies all stated uncertainties.
     """
     values = sigma * np.where(tile.is_open, np.nan, tile.uncertainties)
-    targets = given.targets or (None,) * len(given.names)
-    told = zip(given.names, tile.lengths.tolist(), values.tolist(), targets, strict=True)
+    targets = distances.targets or (None,) * len(distances.names)
+    rows = zip(distances.names, tile.lengths.tolist(), values.tolist(), targets, strict=True)
     return tuple(
         (
             TaskUncertainty(name, length, value, None)
@@ -75,10 +73,10 @@ def task_uncertainties(
                 name, length, value, float(target.stated.at(length)), target.coverage_factor
             )
         )
-        for name, length, value, target in told
+        for name, length, value, target in rows
     )
 
 
 def is_determined(task: TaskUncertainty) -> bool:
-    """Whether the observations determine the task's length."""
+    """Return whether the observations determine the task's length."""
     return not math.isnan(task.standard_uncertainty)
