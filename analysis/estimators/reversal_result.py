@@ -139,8 +139,9 @@ class ReversalFit(FitResult):
                 f' from "{self.first}"'
             ),
             (
-                f"sigma = {number(1e6 * reversal.sigma)} µm with {reversal.degrees_of_freedom} degrees"
-                " of freedom, of the difference of two readings; of a single one"
+                f"sigma = {number(1e6 * reversal.sigma)} µm with"
+                f" {reversal.degrees_of_freedom} degrees of freedom, of the difference of two"
+                " readings; of a single one"
                 f" {number(1e6 * reversal.single)} µm"
             ),
             (
