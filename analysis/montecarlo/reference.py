@@ -119,7 +119,7 @@ class Reference:
         return self.linearisation.degrees_of_freedom
 
 
-# In one function, since each part needs those before.
+# In one piece: each part needs those before.
 @single_threaded
 def reference(design: Design, truth: Truth) -> Reference:
     """Prepare the replicates of a design whose true artefacts, poses and machine are `truth`.

@@ -163,7 +163,7 @@ def labels(functions: Sequence[Function | ParameterEstimate]) -> list[str]:
     ]
 
 
-# In one function, since the order of its additions is that of results.
+# In one piece: the order of additions is that of results.
 @single_threaded
 def estimated_functions(at: Linearisation, monomials: bool) -> EstimatedFunctions:
     """Return all estimates of a fit: the machine, poses, offsets, lengths of standards, influence

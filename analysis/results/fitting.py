@@ -32,7 +32,7 @@ from .residuals import largest_residuals
 from .sigmas_by_campaign import CampaignSigmas, campaign_sigmas
 
 
-# In one function, since each step of judging an estimate needs those before.
+# In one piece: each step of judging an estimate needs those before.
 @single_threaded
 def fit(
     experiment: Experiment,

@@ -95,7 +95,7 @@ def true_influences(design: Design, generator: np.random.Generator) -> Array:
     return np.asarray(design.influence_values + errors)
 
 
-# In one function, since the order in which random numbers are drawn determines a seed's values.
+# In one piece: the order in which random numbers are drawn determines a seed's values.
 def true_artefacts(design: Design, generator: np.random.Generator) -> Array:
     """Draw true balls (n, d) of artefacts, each certified item in error by its uncertainty.
 

@@ -51,7 +51,7 @@ def write_readings(stream: TextIO, design: Design, readings: Readings, x: Array)
         writer.writerow([*row[:3], *("" if v != v else repr(v) for v in row[3:])])
 
 
-# In one function, since the order of its refusals matters: each precedes code that relies on it.
+# In one piece: each refusal precedes code that relies on it, in this order.
 def read_readings(
     source: Source | Sequence[Source],
     design: Design,
