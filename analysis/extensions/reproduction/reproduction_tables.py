@@ -43,13 +43,6 @@ class Heading:
 
 
 @dataclass(frozen=True)
-class Paragraph:
-    """One or several sentences."""
-
-    text: str
-
-
-@dataclass(frozen=True)
 class Grid:
     """A table: its head, its rows, and a mask of right-aligned columns."""
 
@@ -58,7 +51,8 @@ class Grid:
     right: tuple[bool, ...]
 
 
-Block = Heading | Paragraph | Grid
+# A string is a paragraph.
+Block = Heading | str | Grid
 
 QUANTILES = (0.0, 0.05, 0.5, 0.95, 1.0)
 
@@ -69,8 +63,8 @@ def reproduction_lines(reproduction: Reproduction) -> list[str]:
     for block in _blocks(reproduction):
         if isinstance(block, Heading):
             lines += [*([""] if lines else []), block.text]
-        elif isinstance(block, Paragraph):
-            lines.append(block.text)
+        elif isinstance(block, str):
+            lines.append(block)
         else:
             lines += ["", *aligned([block.head, *block.rows], block.right), ""]
     # One empty line replaces two, without any at the end.
@@ -83,8 +77,8 @@ def reproduction_markdown(reproduction: Reproduction) -> str:
     for block in _blocks(reproduction, with_assumptions=True):
         if isinstance(block, Heading):
             parts.append(f"{'#' * block.level} {block.text}")
-        elif isinstance(block, Paragraph):
-            parts.append(block.text)
+        elif isinstance(block, str):
+            parts.append(block)
         else:
             marks = ["---:" if right else "---" for right in block.right]
             cells = [block.head, marks, *block.rows]
@@ -104,7 +98,7 @@ def _blocks(reproduction: Reproduction, with_assumptions: bool = False) -> list[
         Heading(
             1, f"{statements.title}: published values, and those computed from the shipped designs"
         ),
-        Paragraph(
+        (
             "Ratios are published over computed values. They agree if they are within"
             f" {100 * statements.limits.figure:g} % after the common factor of their column, and"
             f" that factor is within {100 * statements.limits.factor:g} % of 1, unless a numbered"
@@ -113,7 +107,7 @@ def _blocks(reproduction: Reproduction, with_assumptions: bool = False) -> list[
         Heading(2, "Assumptions"),
     ]
     blocks += [
-        Paragraph(f"{assumption.key}: {assumption.text}.")
+        f"{assumption.key}: {assumption.text}."
         for assumption in statements.assumptions
         if assumption.key in keys
     ]
@@ -125,7 +119,7 @@ def _blocks(reproduction: Reproduction, with_assumptions: bool = False) -> list[
 def _section_blocks(document: Document, section: Section, with_assumptions: bool) -> list[Block]:
     blocks: list[Block] = [
         Heading(2, f"Section {section.name}: {section.title}"),
-        Paragraph(f"Rests on {_resting(document, section)}."),
+        f"Rests on {_resting(document, section)}.",
     ]
     if section.ranks:
         rows = [
@@ -139,17 +133,15 @@ def _section_blocks(document: Document, section: Section, with_assumptions: bool
         ]
         blocks.append(_grid(("rank of", "published", "computed", "agrees"), rows, 1))
     if section.columns:
-        blocks.append(
-            Paragraph("Columns of tables, their common factor, and the largest deviation from it:")
-        )
+        blocks.append("Columns of tables, their common factor, and the largest deviation from it:")
         blocks.append(_factors(section.columns))
         text = (
             "Published and computed U in µm and µrad; their ratio, and the ratio after the common"
             " factor. Notes refer to the exceptions and open differences at the end."
         )
-        blocks.append(Paragraph(text))
+        blocks.append(text)
         blocks.append(_figures(section.columns, with_assumptions))
-    blocks += [Paragraph(_remark(statement)) for statement in section.remarks]
+    blocks += [_remark(remark) for remark in section.remarks]
     for erratum in section.errata:
         blocks += _erratum(erratum)
     for progress in section.progress:
@@ -157,13 +149,11 @@ def _section_blocks(document: Document, section: Section, with_assumptions: bool
     if section.differences:
         blocks += _differences(section)
     if section.skipped:
-        blocks.append(Paragraph(f"Left out: {section.skipped}."))
+        blocks.append(f"Left out: {section.skipped}.")
     for block in section.illegible:
         blocks.append(
-            Paragraph(
-                f"Not legible in the copy at hand: Table {block.table}, {block.what}"
-                + ("; computed values in µm and µrad:" if block.told else ".")
-            )
+            f"Not legible in the copy at hand: Table {block.table}, {block.what}"
+            + ("; computed values in µm and µrad:" if block.told else ".")
         )
     if section.told:
         blocks.append(_computed_grid(section))
@@ -288,7 +278,7 @@ def _wanted(remark: Remark) -> str:
 def _erratum(compared: ComparedErratum) -> list[Block]:
     verdict = "confirmed" if compared.agrees else "NOT confirmed"
     blocks: list[Block] = [
-        Paragraph(f"Erratum in Table {compared.erratum.table}: {compared.erratum.text}; {verdict}.")
+        f"Erratum in Table {compared.erratum.table}: {compared.erratum.text}; {verdict}."
     ]
     for statistic in compared.erratum.statistics:
         rows = []
@@ -330,7 +320,7 @@ def _progress(compared: ComparedProgress) -> list[Block]:
         for line in compared.lines
     ]
     return [
-        Paragraph(text),
+        text,
         _grid(("iteration", "published", "computed", "limit", "agrees"), rows, 1),
     ]
 
@@ -359,10 +349,8 @@ def _differences(section: Section) -> list[Block]:
     for compared in section.differences:
         if compared.comparison.failed:
             blocks.append(
-                Paragraph(
-                    f"{compared.difference.design}: {len(compared.comparison.failed)} data sets"
-                    " did not converge."
-                )
+                f"{compared.difference.design}: {len(compared.comparison.failed)} data sets"
+                " did not converge."
             )
         rows += [
             (
@@ -384,7 +372,7 @@ def _differences(section: Section) -> list[Block]:
     )
     quantiles = ("least", *(f"{100 * q:.0f} %" for q in QUANTILES[1:-1]), "largest")
     head = ("case", "", "published", *quantiles, "below", "agrees")
-    return [*blocks, Paragraph(text), _grid(head, rows, 2)]
+    return [*blocks, text, _grid(head, rows, 2)]
 
 
 def _computed_grid(section: Section) -> Grid:
@@ -422,7 +410,7 @@ def _exception_blocks(reproduction: Reproduction) -> list[Block]:
         sides = reproduction.sides if is_open else ()
         if chosen or sides:
             blocks.append(Heading(2, title))
-        blocks += [Paragraph(_side(exception)) for exception in sides]
+        blocks += [_side(side) for side in sides]
         for exception, under in chosen:
             ratios = [f.adjusted for f in under]
             many = number_of(len(under), "value")
@@ -430,12 +418,10 @@ def _exception_blocks(reproduction: Reproduction) -> list[Block]:
                 dict.fromkeys(f"{value:.3f}" for value in (min(ratios), max(ratios)))
             )
             blocks.append(
-                Paragraph(
-                    f"{exception.key}: {' and '.join(exception.quantities)} in"
-                    f" {_tables(exception)}, {many}: after the common factor {between} times the"
-                    f" computed ones, limits {exception.within[0]:g} to {exception.within[1]:g}."
-                    f" {_sentence(exception.reason)}"
-                )
+                f"{exception.key}: {' and '.join(exception.quantities)} in"
+                f" {_tables(exception)}, {many}: after the common factor {between} times the"
+                f" computed ones, limits {exception.within[0]:g} to {exception.within[1]:g}."
+                f" {_sentence(exception.reason)}"
             )
     return blocks
 
@@ -497,7 +483,7 @@ def _summary(reproduction: Reproduction) -> list[Block]:
         if reproduction.agrees
         else "NOT everything compared agrees."
     )
-    blocks: list[Block] = [Heading(2, "Summary"), _grid(("", "agree"), parts, 1), Paragraph(text)]
+    blocks: list[Block] = [Heading(2, "Summary"), _grid(("", "agree"), parts, 1), text]
     if regular:
         deviations = np.array([abs(f.adjusted - 1.0) for f in regular])
         factors = [column.factor for column in columns]
@@ -506,7 +492,7 @@ def _summary(reproduction: Reproduction) -> list[Block]:
             f" exception are off by {100 * float(np.median(deviations)):.1f} % (median) and"
             f" {100 * deviations.max():.1f} % at most."
         )
-        blocks.append(Paragraph(text))
+        blocks.append(text)
     return blocks
 
 

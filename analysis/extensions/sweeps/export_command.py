@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 BAD_FILE = 3
 
-REPLACE = "to compute and replace, run ballplate sweep again"
+REPLACE = "run ballplate sweep again to replace unreadable cells"
 
 
 DESCRIPTION = (
@@ -62,7 +62,7 @@ def warn_of_other_methods(path: Path, keys: Iterable[str]) -> None:
     from .store import of_other_methods
 
     for text in of_other_methods(keys):
-        complain(f"{path}: {text}; to replace them, run ballplate sweep again")
+        complain(f"{path}: {text}; run ballplate sweep again to replace them")
 
 
 def warn_of_damage(path: Path, results: StoredResults) -> bool:

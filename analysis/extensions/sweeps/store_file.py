@@ -19,7 +19,7 @@ PATIENCE = 20.0
 
 MAGIC = b"SQLite format 3\0"
 MEND = "name a store made by ballplate sweep"
-RECOMPUTE = "to recompute, name a new file with ballplate sweep --store; this one stays unchanged"
+RECOMPUTE = "name a new file with ballplate sweep --store to recompute; this one stays unchanged"
 
 TABLES = """
 CREATE TABLE about (name TEXT PRIMARY KEY, value TEXT NOT NULL) WITHOUT ROWID;
@@ -176,7 +176,7 @@ def check_tables(path: Path, connection: sqlite3.Connection) -> None:
     if stored_format != FORMAT and stored_format.startswith(FORMAT[:-1]):
         number = stored_format[len(FORMAT) - 1 :]
         text = f"was made by another version of ballplate (format {number}); use that version"
-        raise StoreError(f"{path}: {text}; {RECOMPUTE}")
+        raise StoreError(f"{path}: {text}, or {RECOMPUTE}")
     if stored_format != FORMAT or statements != {text.strip() for text in TABLES.split(";")[:-1]}:
         raise StoreError(f"{path}: is no store of ballplate sweep but another database; {MEND}")
 

@@ -14,7 +14,7 @@ CELLS_MORE_ARE_NOT_SHOWN_HERE_BALLPLATE = (
 )
 UNREADABLE_CELL = "1 unreadable cell"
 UNREADABLE_CELL_ITS_CONTENT = (
-    "1 unreadable cell: 1 (its content has changed since it was stored); to compute"
+    "1 unreadable cell: 1 (its content has changed since it was stored); run ballplate sweep"
 )
 COMPARE_APPLIES_TO_PAGES = "compare applies to pages only"
 UNREADABLE = "1 unreadable in the damaged store"
@@ -53,7 +53,7 @@ SETTINGS_ARE_RANK_DEFICIENT_ONLY = (
 )
 SMALLER_THAN_IN_SQLITE = "smaller than in b.sqlite in 11 of them, by a factor of 0.800."
 SMALLEST_AVERAGE_OF = "Smallest average of U6, 0.117 µm: cell 11, size 750 mm, balls 7"
-NAME_A_NEW_FILE = "to recompute, name a new file with ballplate sweep --store"
+NAME_A_NEW_FILE = "name a new file with ballplate sweep --store to recompute"
 SWEPT_OVER_BALLS = "swept over balls, edge, model and"
 THERE_IS_NO_SUCH_STORE = "there is no such store"
 THERE_IS_NO_SUCH_SWEEP = "there is no such sweep; it has 1"

@@ -190,7 +190,7 @@ def _verb(count: int, verb: str) -> str:
 
 
 def _setting(results: ReportedSweep, row: int) -> str:
-    return results.label(int(results.frame["cell"].to_numpy()[row]))
+    return results.label(results.cell(row))
 
 
 def _symbol(column: str) -> str:
@@ -203,7 +203,6 @@ def _quantity(results: ReportedSweep, column: str, value: float) -> str:
 
 
 def _table(results: ReportedSweep, rows: Integers, column: str, symbol: str) -> Table:
-    cells = results.frame["cell"].to_numpy()
     of_largest = column.replace("_average_", "_maximum_")
     unit, words = column_unit(column), _symbol(column)
     columns = [("observations", "observations", 1.0), (f"{words} average, {unit}", column, 1e6)]
@@ -222,9 +221,8 @@ def _table(results: ReportedSweep, rows: Integers, column: str, symbol: str) -> 
                 text = "-" if np.isnan(value) else percent(value)
             if name == "observations":
                 text = "-" if np.isnan(value) else f"{value:.0f}"
-            entries.append(Entry(text, value, int(cells[row]), name))
-        labels = [axis.labels[k] for axis, k in zip(results.axes, results.chosen[row], strict=True)]
-        listed.append(Row(tuple(labels), tuple(entries)))
+            entries.append(Entry(text, value, results.cell(row), name))
+        listed.append(Row(results.labels(row), tuple(entries)))
     headings = tuple(axis.name for axis in results.axes)
     names = tuple(name for name, _, _ in columns)
     notes = ["Observations are readings and certified values; other costs are not included."]

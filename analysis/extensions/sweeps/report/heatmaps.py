@@ -111,7 +111,7 @@ def _heat(results: ReportedSweep, i: int, j: int, measure: Measure, best: int) -
 
 def _entry(results: ReportedSweep, row: int, measure: Measure, is_open: bool) -> tuple[Entry, bool]:
     """Return a cell's entry, and whether something is undetermined."""
-    cell = int(results.frame["cell"].to_numpy()[row])
+    cell = results.cell(row)
     if not results.done[row]:
         return Entry(results.statuses[row], None, cell, measure.figure), False
     figure = results.value(measure.figure, row)

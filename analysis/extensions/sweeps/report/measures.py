@@ -33,16 +33,6 @@ class Measure:
         return f"{self.symbol} {self.statistic}"
 
     @property
-    def stands_for_all(self) -> bool:
-        """Return whether the value excludes undetermined ones."""
-        return self.statistic in (*STATISTICS, "actual average")
-
-    @property
-    def is_share(self) -> bool:
-        """Return whether the value is a share within a target."""
-        return self.statistic == "within target"
-
-    @property
     def title(self) -> str:
         return f"{self.name}, {self.unit}" if self.unit else self.name
 

@@ -91,6 +91,16 @@ class ReportedSweep:
             for axis, k in zip(self.axes, self.cells[cell].tolist(), strict=True)
         )
 
+    def cell(self, row: int) -> int:
+        """Return the cell of a row of the frame."""
+        return int(self.frame["cell"].to_numpy()[row])
+
+    def labels(self, row: int) -> tuple[str, ...]:
+        """Return the axes' values in a row of the frame."""
+        return tuple(
+            axis.labels[k] for axis, k in zip(self.axes, self.chosen[row].tolist(), strict=True)
+        )
+
     def value(self, name: str, row: int) -> float:
         """Return a value in a row of the frame; NaN if it is not recorded."""
         return float(self.frame[name].to_numpy()[row]) if name in self.frame else math.nan

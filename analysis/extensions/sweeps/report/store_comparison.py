@@ -171,18 +171,16 @@ def _table(
 ) -> Table | None:
     if not shown:
         return None
-    cells = results.frame["cell"].to_numpy()
     table_rows = []
     for k in shown:
         row = int(rows[k])
-        labels = [axis.labels[i] for axis, i in zip(results.axes, results.chosen[row], strict=True)]
         value = results.value(column, row)
         entries = (
-            Entry(number(1e6 * value, 4), value, int(cells[row]), column),
+            Entry(number(1e6 * value, 4), value, results.cell(row), column),
             Entry(number(1e6 * float(before[k]), 4)),
             Entry(number(float(ratio[k]), 4)),
         )
-        table_rows.append(Row(tuple(labels), entries))
+        table_rows.append(Row(results.labels(row), entries))
     headings = tuple(axis.name for axis in results.axes)
     unit = column_unit(column)
     columns = (f"average here, {unit}", f"in {name}, {unit}", "ratio")

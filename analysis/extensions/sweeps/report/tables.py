@@ -10,6 +10,7 @@ from ballplate.presentation import Block, Entry, Row, Table, number, percent
 
 from ..store_columns import symbol_column
 from .measures import (
+    STATISTICS,
     Measure,
     descriptions,
     rank_measures,
@@ -142,13 +143,9 @@ def _rows_table(
     """Return a table with a row for each cell, up to MOST_ROWS, or for some of them."""
     cell_rows = []
     for row in range(min(len(results.frame), MOST_ROWS)) if rows is None else rows:
-        cell = int(results.frame["cell"].to_numpy()[row])
-        labels = tuple(
-            axis.labels[k]
-            for axis, k in zip(results.axes, results.cells[cell].tolist(), strict=True)
-        )
+        cell = results.cell(row)
         entries = tuple(_entry(results, measure, cell, row) for measure in measures)
-        cell_rows.append(Row((str(cell), *labels), entries))
+        cell_rows.append(Row((str(cell), *results.labels(row)), entries))
     more = len(results.frame) - len(cell_rows)
     if more > 0 and rows is None:
         notes = (
@@ -176,13 +173,13 @@ def _entry(results: ReportedSweep, measure: Measure, cell: int, row: int | None)
         text = with_error(
             MonteCarloEstimate(value, results.value(measure.error, row)), measure.factor
         )
-    elif measure.is_share:
+    elif measure.statistic == "within target":
         # Never rounded up: 100 % means all.
         text = "-" if math.isnan(value) else percent(value).removesuffix(" %")
     else:
         text = number(measure.factor * value, DIGITS)
     if (
-        measure.stands_for_all
+        measure.statistic in (*STATISTICS, "actual average")
         and partly_open(results, measure.symbol)[row]
         and not math.isnan(value)
     ):

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+
+from ballplate.simulator.inputs import number_of
 
 from .results import ReportedSweep, cell_list, common_values
 
@@ -46,7 +48,7 @@ class VerdictGroups:
 NOT = "not "
 
 # A heading with its lines.
-Statement = tuple[str, tuple[str, ...]]
+Form = tuple[str, tuple[str, ...]]
 
 
 def ranks(results: ReportedSweep) -> VerdictGroups:
@@ -54,34 +56,29 @@ def ranks(results: ReportedSweep) -> VerdictGroups:
     if "rank_deficiency" not in results.frame:
         return VerdictGroups(())
     columns = results.frame[["cell", "rank_deficiency", "as_expected"]][results.done]
-    cells_by_statement: dict[Statement, list[int]] = {}
+    statements = []
     for cell, deficiency, expected in columns.to_numpy():
-        heading = f"rank deficiency {int(deficiency)}" if deficiency else "full rank"
-        lines = tuple(results.texts.get(int(cell), {}).get("undetermined", ()))
-        cells_by_statement.setdefault(
-            (f"{heading}, {'' if expected else NOT}as expected", lines), []
-        ).append(int(cell))
-    return _grouped(results, cells_by_statement)
+        rank = f"rank deficiency {int(deficiency)}" if deficiency else "full rank"
+        lines = results.texts.get(int(cell), {}).get("undetermined", ())
+        statements.append((f"{rank}, {'' if expected else NOT}as expected", lines, int(cell)))
+    return _grouped(results, statements)
 
 
 def weak(results: ReportedSweep) -> VerdictGroups:
     """Return cells by weakly determined directions."""
-    cells_by_statement: dict[Statement, list[int]] = {}
-    for cell, texts in results.texts.items():
-        if texts.get("weak"):
-            lines = tuple(texts["weak"])
-            word = "direction" if len(lines) == 1 else "directions"
-            cells_by_statement.setdefault(
-                (f"{len(lines)} {word} weakly determined", lines), []
-            ).append(cell)
-    return _grouped(results, cells_by_statement)
+    return _grouped(
+        results,
+        [
+            (f"{number_of(len(texts['weak']), 'direction')} weakly determined", texts["weak"], cell)
+            for cell, texts in results.texts.items()
+            if texts.get("weak")
+        ],
+    )
 
 
 def flags(results: ReportedSweep) -> VerdictGroups:
-    """Return cells by differences of Monte Carlo from linear theory, or by the reason for its
-    absence.
-    """
-    cells_by_statement: dict[Statement, list[int]] = {}
+    """Return cells by differences of Monte Carlo from linear theory, or by why it is absent."""
+    statements = []
     for cell, texts in results.texts.items():
         parts = [
             f"{symbol}: {', '.join(names)}" for symbol, names in texts.get("flags", {}).items()
@@ -91,39 +88,40 @@ def flags(results: ReportedSweep) -> VerdictGroups:
         elif texts.get("not_converged"):
             parts.append("data sets that did not converge, and are left out")
         if parts:
-            cells_by_statement.setdefault(("; ".join(parts), ()), []).append(cell)
-    return _grouped(results, cells_by_statement)
+            statements.append(("; ".join(parts), (), cell))
+    return _grouped(results, statements)
 
 
 def failures(results: ReportedSweep) -> VerdictGroups:
     """Return failed cells by reason."""
-    cells_by_statement: dict[Statement, list[int]] = {}
+    statements: list[tuple[str, list[str], int]] = []
     failed = results.frame[results.frame["status"] == "failed"]
     for cell, reason in zip(failed["cell"], failed["reason"], strict=True):
-        lines = tuple(str(reason).splitlines())
-        statement: Statement = (
-            (lines[0] if lines else "failed", ())
-            if len(lines) < 2
-            else (f"{len(lines)} errors", lines)
-        )
-        cells_by_statement.setdefault(statement, []).append(int(cell))
-    return _grouped(results, cells_by_statement)
+        lines = str(reason).splitlines() or ["failed"]
+        if len(lines) == 1:
+            statements.append((lines[0], [], int(cell)))
+        else:
+            statements.append((f"{len(lines)} errors", lines, int(cell)))
+    return _grouped(results, statements)
 
 
 def _grouped(
-    results: ReportedSweep, cells_by_statement: Mapping[Statement, list[int]]
+    results: ReportedSweep, statements: Iterable[tuple[str, Sequence[str], int]]
 ) -> VerdictGroups:
-    """Return groups of cells whose statements differ only in amounts."""
-    alike: dict[Statement, tuple[Statement, list[int]]] = {}
-    for (heading, lines), cells in cells_by_statement.items():
+    """Return groups of cells whose headings agree, and whose lines differ only in amounts."""
+    texts: dict[Form, set[Form]] = {}
+    firsts: dict[Form, tuple[Form, list[int]]] = {}
+    for heading, lines, cell in statements:
+        text = heading, tuple(lines)
         form = heading, tuple(AMOUNT.sub("", line) for line in lines)
-        alike.setdefault(form, ((heading, lines), []))[1].extend(cells)
-    shown = list(alike.values())[:MOST_GROUPS]
+        texts.setdefault(form, set()).add(text)
+        firsts.setdefault(form, (text, []))[1].append(cell)
+    differ = any(len(variants) > 1 for variants in texts.values())
     groups = [
-        _group(results, *statement, sorted(cells), len(cells_by_statement) > len(alike))
-        for statement, cells in shown
+        _group(results, *text, sorted(cells), differ)
+        for text, cells in list(firsts.values())[:MOST_GROUPS]
     ]
-    return VerdictGroups(tuple(groups), max(len(alike) - MOST_GROUPS, 0))
+    return VerdictGroups(tuple(groups), max(len(firsts) - MOST_GROUPS, 0))
 
 
 def _group(
