@@ -100,21 +100,21 @@ def draw_campaign(selection: Selection, path: str | Path | None = None) -> Figur
 
 def words(selection: Selection) -> str:
     """The picture for those who do not see it."""
-    told = [
+    caption = [
         f"{selection.criterion}, no more than {selection.budget}:"
-        f" chosen {_told(selection, selection.value)}"
+        f" chosen {_value_text(selection, selection.value)}"
     ]
     if not math.isnan(selection.bound):
-        told.append(f"bound of any choice {_told(selection, selection.bound)}")
+        caption.append(f"bound of any choice {_value_text(selection, selection.bound)}")
     if selection.drawn is not None:
-        told.append(f"{selection.drawn_words} {_told(selection, selection.drawn)}")
+        caption.append(f"{selection.drawn_words} {_value_text(selection, selection.drawn)}")
     if selection.target is not None:
-        told.append(f"target {_told(selection, selection.target)}")
+        caption.append(f"target {_value_text(selection, selection.target)}")
     offered = len(selection.pool.candidates)
-    return f"{', '.join(told)}; {len(selection.chosen)} chosen of {offered} candidates"
+    return f"{', '.join(caption)}; {len(selection.chosen)} chosen of {offered} candidates"
 
 
-def _told(selection: Selection, value: float) -> str:
+def _value_text(selection: Selection, value: float) -> str:
     if math.isinf(value):
         return "deficient"
     return number(value, 3) if selection.unit == "1" else f"{number(1e6 * value, 3)} µm"
@@ -133,8 +133,8 @@ class _Extent:
     of_budget: str
     factor: float
 
-    def of(self, what: Budget | Spent) -> float:
-        value = getattr(what, self.of_budget)
+    def amount(self, limit: Budget | Spent) -> float:
+        value = getattr(limit, self.of_budget)
         assert value is not None
         return float(value) / self.factor
 
@@ -155,7 +155,7 @@ class _Mark:
     marker: str
 
     @property
-    def told(self) -> str:
+    def text(self) -> str:
         return number(self.value, 3) if math.isfinite(self.value) else "deficient"
 
 
@@ -202,7 +202,7 @@ def _strip(axes: Axes, marks: Sequence[_Mark]) -> None:
             markeredgewidth=2.0 if is_inside and marker == "|" else 1.0,
             clip_on=False,
         )
-        _told_beside(axes, mark.told, k, high)
+        _write_beside(axes, mark.text, k, high)
     _plain_numbers(axes.xaxis, axes.get_xscale() == "log")
 
 
@@ -212,17 +212,17 @@ def _curve(axes: Axes, selection: Selection, marks: Sequence[_Mark]) -> None:
     from matplotlib.ticker import MaxNLocator
 
     extent, factor = _extent(selection.budget), _factor(selection)
-    points = sorted(selection.curve, key=lambda point: extent.of(point.budget))
-    x = np.array([extent.of(point.budget) for point in points])
+    points = sorted(selection.curve, key=lambda point: extent.amount(point.budget))
+    x = np.array([extent.amount(point.budget) for point in points])
     values = factor * np.array([point.value for point in points])
     bounds = factor * np.array([point.bound for point in points])
     by_name = {mark.name: mark for mark in marks}
-    here = extent.of(selection.budget)
-    drawn_at = here if selection.drawn_spent is None else extent.of(selection.drawn_spent)
+    here = extent.amount(selection.budget)
+    drawn_at = here if selection.drawn_spent is None else extent.amount(selection.drawn_spent)
 
     target = by_name.pop(TARGET, None)
-    known = [*values, *bounds, *(mark.value for mark in by_name.values())]
-    low, high = _limits(known, None if target is None else target.value)
+    finite_values = [*values, *bounds, *(mark.value for mark in by_name.values())]
+    low, high = _limits(finite_values, None if target is None else target.value)
     axes.set_yscale("log" if high > WIDE * low > 0.0 else "linear")
     axes.set_ylim(low, high)
     ends = np.array([*x, here, drawn_at])
@@ -231,9 +231,9 @@ def _curve(axes: Axes, selection: Selection, marks: Sequence[_Mark]) -> None:
     if not np.isnan(bounds).all():
         # What bounds a budget bounds smaller ones as well: between two of them the bound of the
         # larger holds.
-        at, step = np.repeat(x, 2)[:-1], np.repeat(bounds, 2)[1:]
-        axes.fill_between(at, low, step, color=MUTED, alpha=0.2, linewidth=0)
-        axes.plot(at, step, color=MUTED, linestyle=DASHES[1], linewidth=1.0, label=BOUND)
+        edges, steps = np.repeat(x, 2)[:-1], np.repeat(bounds, 2)[1:]
+        axes.fill_between(edges, low, steps, color=MUTED, alpha=0.2, linewidth=0)
+        axes.plot(edges, steps, color=MUTED, linestyle=DASHES[1], linewidth=1.0, label=BOUND)
         axes.plot(x, bounds, color=MUTED, linestyle="none", marker="_", markersize=9.0)
     axes.plot(
         x,
@@ -259,7 +259,7 @@ def _curve(axes: Axes, selection: Selection, marks: Sequence[_Mark]) -> None:
                 marker=mark.marker if is_known else "^",
                 markersize=9.0,
                 zorder=4,
-                label=f"{name}: {mark.told}",
+                label=f"{name}: {mark.text}",
             )
     if target is not None:
         if low <= target.value <= high:
@@ -269,7 +269,7 @@ def _curve(axes: Axes, selection: Selection, marks: Sequence[_Mark]) -> None:
             if low <= target.value <= high
             else f" ({'above' if target.value > high else 'below'})"
         )
-        axes.plot([], [], color=INK, linewidth=1.2, label=f"{TARGET}: {target.told}{beyond}")
+        axes.plot([], [], color=INK, linewidth=1.2, label=f"{TARGET}: {target.text}{beyond}")
     axes.set_xlabel(f"{extent.name} allowed")
     axes.xaxis.set_major_locator(
         MaxNLocator(nbins=8, integer=extent.name != "hours", steps=[1, 2, 5, 10])
@@ -281,10 +281,10 @@ def _curve(axes: Axes, selection: Selection, marks: Sequence[_Mark]) -> None:
 
 def _limits(values: Sequence[float], target: float | None) -> tuple[float, float]:
     """Ends of the axis: around what is finite, and the target unless it is far off."""
-    known = np.array([value for value in values if math.isfinite(value)] or [target or 1.0])
-    if target is not None and known.min() / FAR <= target <= known.max() * FAR:
-        known = np.append(known, target)
-    low, high = float(known.min()), float(known.max())
+    finite_values = np.array([value for value in values if math.isfinite(value)] or [target or 1.0])
+    if target is not None and finite_values.min() / FAR <= target <= finite_values.max() * FAR:
+        finite_values = np.append(finite_values, target)
+    low, high = float(finite_values.min()), float(finite_values.max())
     if high > WIDE * low > 0.0:
         return low / 1.25, high * 1.4
     margin = 0.15 * (high - low) or 0.2 * high
@@ -308,7 +308,7 @@ class _Row:
 
     mark: str
     name: str
-    told: str
+    text: str
     size: float | None
     colour: str
 
@@ -327,13 +327,13 @@ def _rows(selection: Selection) -> list[_Row]:
         )
     rows += [
         _Row(
-            _shown(_place(selection, one, numbers)),
-            selection.title_of(one),
+            _shown(_place(selection, candidate, numbers)),
+            selection.title_of(candidate),
             "read already",
             None,
-            _colour(_place(selection, one, numbers)),
+            _colour(_place(selection, candidate, numbers)),
         )
-        for one in selection.done[: max(MOST_CHOSEN - len(selection.gains), 0)]
+        for candidate in selection.done[: max(MOST_CHOSEN - len(selection.gains), 0)]
     ]
     left_out = [gain for gain in selection.left_out if not math.isnan(gain.relative)]
     if left_out:
@@ -346,13 +346,15 @@ def _rows(selection: Selection) -> list[_Row]:
 def _row(selection: Selection, gain: Gain, numbers: Mapping[str, int]) -> _Row:
     place = _place(selection, gain.candidate, numbers)
     size = None if math.isnan(gain.relative) else gain.relative
-    told = "–" if size is None else "needed" if math.isinf(size) else f"{number(100 * size, 2)} %"
-    return _Row(_shown(place), selection.title_of(gain.candidate), told, size, _colour(place))
+    size_text = (
+        "–" if size is None else "needed" if math.isinf(size) else f"{number(100 * size, 2)} %"
+    )
+    return _Row(_shown(place), selection.title_of(gain.candidate), size_text, size, _colour(place))
 
 
-def _place(selection: Selection, one: Candidate, numbers: Mapping[str, int]) -> int | None:
+def _place(selection: Selection, candidate: Candidate, numbers: Mapping[str, int]) -> int | None:
     """The number of a candidate in the drawing, by its short name if it has one."""
-    return numbers.get(selection.names.get(one.name, one.name))
+    return numbers.get(selection.names.get(candidate.name, candidate.name))
 
 
 def _shown(place: int | None) -> str:
@@ -366,8 +368,8 @@ def _colour(place: int | None) -> str:
 
 def _bars(axes: Axes, rows: Sequence[_Row]) -> None:
     """Bars behind the names; what is needed has one of full length and another pattern."""
-    known = np.array([row.size for row in rows if row.size is not None and math.isfinite(row.size)])
-    full = float(known.max(initial=0.0)) or 1.0
+    sizes = np.array([row.size for row in rows if row.size is not None and math.isfinite(row.size)])
+    full = float(sizes.max(initial=0.0)) or 1.0
     axes.set_xlim(0.0, 1.0)
     axes.set_ylim(max(len(rows), 1) - 0.5, -0.5)
     axes.set_axis_off()
@@ -383,14 +385,14 @@ def _bars(axes: Axes, rows: Sequence[_Row]) -> None:
                 hatch="//" if is_needed else None,
                 linewidth=0,
             )
-        is_candidate = bool(row.told)
+        is_candidate = bool(row.text)
         name = row.name if len(row.name) <= MOST_LETTERS else row.name[: MOST_LETTERS - 1] + "…"
         axes.text(0.008, k, name, va="center", fontsize=9.0, color=INK if is_candidate else MUTED)
-        _told_beside(axes, row.told, k, 1.0)
-        _told_beside(axes, row.mark, k, 0.0, -6.0)
+        _write_beside(axes, row.text, k, 1.0)
+        _write_beside(axes, row.mark, k, 0.0, -6.0)
 
 
-def _told_beside(
+def _write_beside(
     axes: Axes, text: str, row: int, x: float, points: float = VALUES - RIGHT + 2.0
 ) -> None:
     """A text that ends so many points to the right of a place."""

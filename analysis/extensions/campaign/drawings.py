@@ -43,7 +43,7 @@ def place_drawing(candidate: Candidate, experiment: Experiment) -> str:
     if to_left:
         points[:, 0] = width - points[:, 0]
     points = np.column_stack([left + points[:, 0], top + height - points[:, 1]])
-    read = np.isin(np.arange(len(points)), position.balls)
+    is_read = np.isin(np.arange(len(points)), position.balls)
     shown = (
         np.arange(len(points)) if len(points) <= MOST_BALLS else np.array(layout.corner_set or (0,))
     )
@@ -69,7 +69,7 @@ def place_drawing(candidate: Candidate, experiment: Experiment) -> str:
         ),
     ]
     for i in shown:
-        fill = "#222" if read[i] else "white"
+        fill = "#222" if is_read[i] else "white"
         radius = 3.2 if i == 0 else 1.8
         parts.append(
             f'<circle cx="{points[i, 0]:.1f}" cy="{points[i, 1]:.1f}" r="{radius}" fill="{fill}"'
@@ -89,9 +89,9 @@ def place_drawing(candidate: Candidate, experiment: Experiment) -> str:
         f'<text x="{x:.1f}" y="{y:.1f}" text-anchor="middle" fill="#555" transform="rotate(-90'
         f' {x:.1f} {y:.1f})">{up} →</text>'
     )
-    seen = f"seen from +{plane}" if d == 3 else "seen from above"
+    view = f"seen from +{plane}" if d == 3 else "seen from above"
     parts.append(
         f'<text x="{SIZE / 2:g}" y="{top - 6 - above:.1f}" text-anchor="middle"'
-        f' fill="#555">{seen}</text></svg>'
+        f' fill="#555">{view}</text></svg>'
     )
     return "".join(parts)

@@ -65,12 +65,16 @@ def parse_drift_size(texts: Sequence[str], experiment: Experiment) -> DriftSize:
     :raises QuantityError: a text is neither a length nor a ratio per time above zero.
     """
     size = DriftSize()
-    for one in experiment.influences:
-        if isinstance(one, DriftSettings):
-            for name, stated in (("point", one.axes), ("scale", one.scale)):
-                every = stated if isinstance(stated, tuple) else (stated,)
-                own = [getattr(each, "standard_uncertainty", None) or 0.0 for each in every]
-                size = replace(size, **{name: max(own)}) if max(own) > 0.0 else size
+    for influence in experiment.influences:
+        if isinstance(influence, DriftSettings):
+            for name, drifting in (("point", influence.axes), ("scale", influence.scale)):
+                every = drifting if isinstance(drifting, tuple) else (drifting,)
+                stated_sizes = [
+                    getattr(parameter, "standard_uncertainty", None) or 0.0 for parameter in every
+                ]
+                size = (
+                    replace(size, **{name: max(stated_sizes)}) if max(stated_sizes) > 0.0 else size
+                )
     for text in texts:
         size = replace(size, **drift_size(text))
     return size
@@ -85,17 +89,19 @@ def drift_size(text: str) -> dict[str, float]:
     ({'point': 5e-07}, {'scale': 2e-07})
     """
     try:
-        found = {"scale": parse_ratio_drift(text)}
+        sizes = {"scale": parse_ratio_drift(text)}
     except QuantityError:
-        found = {"point": parse_length_drift(text)}
-    if min(found.values()) <= 0.0:
+        sizes = {"point": parse_length_drift(text)}
+    if min(sizes.values()) <= 0.0:
         raise QuantityError(f'"{text}" must be above zero; write for example "0.5 um/h"')
-    return found
+    return sizes
 
 
 def is_of_plates(experiment: Experiment, positions: Iterable[Candidate]) -> bool:
     """Whether all positions are of plates."""
-    return all(experiment.artefacts[one.item.artefact].role == "plate" for one in positions)
+    return all(
+        experiment.artefacts[position.item.artefact].role == "plate" for position in positions
+    )
 
 
 @single_threaded
@@ -114,20 +120,22 @@ def drift_effect(
         or len(experiment.evaluation.points) == 1
     ):
         return DriftEffect(name, sheet.seconds, change, *[float("nan")] * 4)
-    found = {
-        known: effects_on_distances(
+    effects = {
+        is_drifting: effects_on_distances(
             lay_out(
                 in_time(
-                    replace(plain, influences=(*plain.influences, _drift(size if known else None))),
+                    replace(
+                        plain, influences=(*plain.influences, _drift(size if is_drifting else None))
+                    ),
                     sheet,
                     changes,
                 )
             ),
             experiment.dimension + 1,
         )
-        for known in (True, False)
+        for is_drifting in (True, False)
     }
-    uncertainty, bias, posterior = found[True]
+    uncertainty, bias, posterior = effects[True]
     spread = np.sqrt(uncertainty**2 - np.einsum("mi,ij,mj->m", bias, posterior, bias))
     scaled = np.abs(bias[np.isfinite(uncertainty)]) * np.array(
         [size.point] * (bias.shape[1] - 1) + [size.scale]
@@ -139,7 +147,7 @@ def drift_effect(
         float(scaled[:, :-1].max(initial=0.0)),
         float(scaled[:, -1].max(initial=0.0)),
         float(spread.mean()),
-        float(found[False][0].mean()),
+        float(effects[False][0].mean()),
     )
 
 
@@ -159,11 +167,15 @@ def effects_on_distances(design: Design, p: int) -> tuple[Array, Array, Array]:
     """Uncertainties (m,) of distances between evaluation points, what they change by per unit of
     each of the last p influence parameters (m, p), and the covariance (p, p) of these.
     """
-    at, every = linearise(design), evaluation_points(design)
+    linearisation, every = linearise(design), evaluation_points(design)
     chosen = np.unique(np.linspace(0, len(every.points) - 1, MOST_POINTS).round().astype(int))
     places = replace(every, points=every.points[chosen], probes=every.probes[chosen])
-    functions = linear_functions(at, Distances(places))
-    drifts = LinearFunctions(np.eye(len(at.layout))[at.layout.influences][-p:])
-    covariance = at.covariance(drifts, drifts)
-    bias = np.linalg.lstsq(covariance, at.covariance(drifts, functions), rcond=1e-12)[0].T
-    return at.uncertainty(functions), np.asarray(bias, float), covariance
+    functions = linear_functions(linearisation, Distances(places))
+    drifts = LinearFunctions(
+        np.eye(len(linearisation.layout))[linearisation.layout.influences][-p:]
+    )
+    covariance = linearisation.covariance(drifts, drifts)
+    bias = np.linalg.lstsq(covariance, linearisation.covariance(drifts, functions), rcond=1e-12)[
+        0
+    ].T
+    return linearisation.uncertainty(functions), np.asarray(bias, float), covariance

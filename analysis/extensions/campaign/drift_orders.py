@@ -64,17 +64,17 @@ class DriftOrders:
         """
         offers = _orders(experiment, pool, request, has_begun, chosen)
         wanted = request.order or LEAST_CHANGE_OVER.name
-        order = next(one for one in offers if one.name == wanted)
+        order = next(offer for offer in offers if offer.name == wanted)
         size = parse_drift_size(request.drift, experiment)
         effects = tuple(
             drift_effect(
                 experiment,
-                one.name,
-                run_sheet(chosen, pool.changes, order=one),
+                offer.name,
+                run_sheet(chosen, pool.changes, order=offer),
                 pool.changes,
                 size,
             )
-            for one in offers
+            for offer in offers
             if len(offers) > 1
         )
         return cls(order, size, effects)
@@ -83,7 +83,7 @@ class DriftOrders:
         """The size of the drift and its effects as plain data."""
         return {
             "drift": asdict(self.size),
-            "orders": [_order_data(one) for one in self.effects],
+            "orders": [_order_data(effect) for effect in self.effects],
         }
 
     def lines(self, campaign: Campaign) -> list[str]:
@@ -105,15 +105,15 @@ def _orders(
         raise _impossible(experiment, text)
     if has_begun:
         return [LEAST_CHANGE_OVER]
-    own = [one for one in chosen if isinstance(one.item, Position)]
-    found = [ReadingOrder(name, request.seed) for name in ORDERS if name != "least-drift"]
-    if is_of_plates(experiment, own):
+    positions = [candidate for candidate in chosen if isinstance(candidate.item, Position)]
+    orders = [ReadingOrder(name, request.seed) for name in ORDERS if name != "least-drift"]
+    if is_of_plates(experiment, positions):
         sequence = least_drift(experiment, chosen, pool.changes, request.seed)
-        return [*found, ReadingOrder("least-drift", request.seed, sequence)]
+        return [*orders, ReadingOrder("least-drift", request.seed, sequence)]
     if request.order == "least-drift":
         text = "has length standards, whose drift is not followed; ask for another --order"
         raise _impossible(experiment, text)
-    return found
+    return orders
 
 
 def _impossible(experiment: Experiment, text: str) -> ExperimentError:
@@ -162,7 +162,7 @@ def _micrometres(value: float) -> str:
 
 def _chosen_without_drift(campaign: Campaign) -> list[str]:
     """That the drift of the file had no part in the choice."""
-    drifts = [one for one in campaign.experiment.influences if one.in_order]
+    drifts = [influence for influence in campaign.experiment.influences if influence.in_order]
     if not drifts:
         return []
     return [

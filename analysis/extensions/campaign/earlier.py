@@ -28,16 +28,16 @@ def earlier_choice(chosen: Experiment, offered: Offer) -> tuple[int, ...]:
     """
     message = partial(Message, str(chosen.source), 0, 0, "positions")
     candidates = offered.candidates
-    rests = {one.rest for one in offered.interrupted}
+    rests = {interrupted.rest for interrupted in offered.interrupted}
     places = {
-        one.name: k
-        for k, one in enumerate(candidates)
-        if isinstance(one.item, Position) and k not in rests
+        candidate.name: k
+        for k, candidate in enumerate(candidates)
+        if isinstance(candidate.item, Position) and k not in rests
     }
     named = {
-        one.name: one.description if one.description in places else one.name
-        for one in chosen.positions
-        if one.name not in places
+        position.name: position.description if position.description in places else position.name
+        for position in chosen.positions
+        if position.name not in places
     }
     unknown = [name for name, meant in named.items() if meant not in places]
     if unknown:
@@ -46,46 +46,50 @@ def earlier_choice(chosen: Experiment, offered: Offer) -> tuple[int, ...]:
             for name in unknown
         )
     moved = [
-        one.name
-        for one in chosen.positions
-        if not _same_place(one, candidates[places[named.get(one.name, one.name)]].item)
+        position.name
+        for position in chosen.positions
+        if not _same_place(
+            position, candidates[places[named.get(position.name, position.name)]].item
+        )
     ]
     if moved:
-        told = "is elsewhere, or of another artefact, in the pool; give it another name"
-        raise ExperimentError(message(f'"{name}" {told}') for name in moved)
-    found = [
+        remedy = "is elsewhere, or of another artefact, in the pool; give it another name"
+        raise ExperimentError(message(f'"{name}" {remedy}') for name in moved)
+    starts = [
         _now(offered, places[named.get(position.name, position.name)], position)
         for position in chosen.positions
     ]
     for k, candidate in enumerate(candidates):
         item = candidate.item
         if not isinstance(item, Position) and any(
-            _equal(item, other) for other in chosen.calibration
+            _equal(item, calibration) for calibration in chosen.calibration
         ):
-            found.append(k)
-    return tuple(sorted(set(found)))
+            starts.append(k)
+    return tuple(sorted(set(starts)))
 
 
 def _now(offered: Offer, k: int, wanted: Position) -> int:
-    for one in offered.interrupted:
-        if one.part == k and wanted.count > offered.candidates[k].readings:
-            return one.again if one.rest is None else one.rest
+    for interrupted in offered.interrupted:
+        if interrupted.part == k and wanted.count > offered.candidates[k].readings:
+            return interrupted.again if interrupted.rest is None else interrupted.rest
     return k
 
 
-def _same_place(one: Position, other: object) -> bool:
+def _same_place(position: Position, earlier: object) -> bool:
     return (
-        isinstance(other, Position)
-        and one.artefact == other.artefact
-        and np.allclose(one.pose.rotation, other.pose.rotation, atol=1e-9)
-        and np.allclose(one.pose.origin, other.pose.origin, atol=1e-9)
+        isinstance(earlier, Position)
+        and position.artefact == earlier.artefact
+        and np.allclose(position.pose.rotation, earlier.pose.rotation, atol=1e-9)
+        and np.allclose(position.pose.origin, earlier.pose.origin, atol=1e-9)
     )
 
 
-def _equal(one: Calibration, other: Calibration) -> bool:
-    return type(one) is type(other) and all(
-        np.array_equal(_plain(getattr(one, field.name)), _plain(getattr(other, field.name)))
-        for field in fields(cast(Any, one))
+def _equal(calibration: Calibration, earlier: Calibration) -> bool:
+    return type(calibration) is type(earlier) and all(
+        np.array_equal(
+            _plain(getattr(calibration, field.name)), _plain(getattr(earlier, field.name))
+        )
+        for field in fields(cast(Any, calibration))
     )
 
 
@@ -98,7 +102,7 @@ def _plain(value: Any) -> Any:
 
 def begun(
     experiment: Experiment,
-    done: Path | GivenText | None = None,
+    readings_done: Path | GivenText | None = None,
     moved: bool = False,
     earlier: Path | None = None,
 ) -> tuple[Offer | None, tuple[int, ...] | None]:
@@ -121,14 +125,14 @@ def begun(
                 text = "the file has several variants; name a design that was chosen"
                 raise refused(earlier, text, "variants")
             before = variants[0]
-            names = names_of_plan(before, {one.name for one in pool.candidates})
+            names = names_of_plan(before, {candidate.name for candidate in pool.candidates})
     except ExperimentError as error:
         messages += error.messages
     offered = offer(pool, known_names=names)
     try:
-        if done is not None:
-            taken = done_candidates(done, experiment, names)
-            offered = offer(pool, taken, not moved, names)
+        if readings_done is not None:
+            candidates_read = done_candidates(readings_done, experiment, names)
+            offered = offer(pool, candidates_read, not moved, names)
     except ExperimentError as error:
         messages += error.messages
     try:

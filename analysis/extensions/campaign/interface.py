@@ -31,5 +31,5 @@ def sheet(experiment: Experiment | PathLike) -> Sheet:
 
     from .sheet import sheet_of
 
-    found = experiment_of(experiment)
-    return sheet_of(found if found is experiment else with_pool(found))
+    resolved = experiment_of(experiment)
+    return sheet_of(resolved if resolved is experiment else with_pool(resolved))

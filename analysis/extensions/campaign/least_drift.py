@@ -57,12 +57,12 @@ class ScaleByBlock(Influence):
             InfluenceParameter(name, "1", 0.0, 1e-6, 1.0) for name in (*names, "scale within")
         )
 
-    def shifts(self, at: Disturbed) -> tuple[Array, Array]:
+    def shifts(self, disturbed: Disturbed) -> tuple[Array, Array]:
         """What the scales say too much, by block and within."""
-        order = at.column("order").astype(np.int64)
+        order = disturbed.column("order").astype(np.int64)
         is_here = self.blocks.of_reading[order][:, None] == np.arange(len(self.blocks.weight))
         share = np.column_stack([is_here, self.blocks.within[order]])
-        return np.zeros(at.x.shape), at.x[:, :, None] * share[:, None, :]
+        return np.zeros(disturbed.x.shape), disturbed.x[:, :, None] * share[:, None, :]
 
 
 class ScaleByBlockSettings(InfluenceSettings):
@@ -98,11 +98,11 @@ class Blocks:
         """Hours of the middles of a position's blocks from its first reading on, where it is read
         with its probes in this order.
         """
-        own = np.flatnonzero(self.position == k)
-        order = np.argsort([list(probes).index(names[probe]) for probe in self.probe[own]])
-        length, found = self.length[own][order], np.empty(len(own))
-        found[order] = np.cumsum(length + change) - change - 0.5 * length
-        return found
+        indices = np.flatnonzero(self.position == k)
+        order = np.argsort([list(probes).index(names[probe]) for probe in self.probe[indices]])
+        length, middles = self.length[indices][order], np.empty(len(indices))
+        middles[order] = np.cumsum(length + change) - change - 0.5 * length
+        return middles
 
 
 def blocks(clock: Clock, readings: Readings) -> Blocks:
@@ -129,29 +129,32 @@ def least_drift(
     Up to `MOST_TRIED` all orders of positions and of probes within them are tried. Of more, two
     positions are exchanged, or the probes of one are read in another order, as long as that helps.
     """
-    own = [one for one in chosen if isinstance(one.item, Position)]
+    positions = [item for item in chosen if isinstance(item.item, Position)]
     settings = ScaleByBlockSettings(
-        reading=tuple(one.reading_seconds for one in own), probe_change=changes.probe
+        reading=tuple(item.reading_seconds for item in positions), probe_change=changes.probe
     )
     plain = without_drift(experiment)
     by_block = replace(plain, influences=(*plain.influences, settings))
     design = lay_out(with_chosen(by_block, chosen))
-    (scales,) = [one for one in design.influences if isinstance(one, ScaleByBlock)]
+    (scales,) = [item for item in design.influences if isinstance(item, ScaleByBlock)]
     uncertainty, effects, _ = effects_on_distances(design, len(scales.blocks.weight) + 1)
-    ways = _ways(own, scales.blocks, design.probes.names, changes)
+    ways = _ways(positions, scales.blocks, design.probes.names, changes)
     drift = _Drift(ways, scales.blocks.weight, effects[np.isfinite(uncertainty)])
-    options = [[way for way, (at, _) in enumerate(ways.each) if at == k] for k in range(len(own))]
-    if factorial(len(own)) * prod(map(len, options)) <= MOST_TRIED:
+    options = [
+        [way for way, (position, _) in enumerate(ways.each) if position == k]
+        for k in range(len(positions))
+    ]
+    if factorial(len(positions)) * prod(map(len, options)) <= MOST_TRIED:
         every = np.array(list(product(*options)), np.int64)
-        mixed = np.array(list(permutations(range(len(own)))), np.int64)
-        best, _ = drift.least(every[:, mixed].reshape(-1, len(own)))
+        mixed = np.array(list(permutations(range(len(positions)))), np.int64)
+        best, _ = drift.least(every[:, mixed].reshape(-1, len(positions)))
     else:
         generator = np.random.default_rng(np.random.SeedSequence(seed))
         orders = [
-            np.arange(len(own)),
-            *(generator.permutation(len(own)) for _ in range(STARTS - 1)),
+            np.arange(len(positions)),
+            *(generator.permutation(len(positions)) for _ in range(STARTS - 1)),
         ]
-        starts = [with_probes([own[k] for k in order], changes) for order in orders]
+        starts = [with_probes([positions[k] for k in order], changes) for order in orders]
         improved = [
             drift.improved(
                 [ways.each.index((k, probes)) for k, (_, probes) in zip(order, start, strict=True)],
@@ -160,7 +163,7 @@ def least_drift(
             for order, start in zip(orders, starts, strict=True)
         ]
         best, _ = drift.least(np.array(improved))
-    return tuple((own[k].name, probes) for k, probes in (ways.each[way] for way in best))
+    return tuple((positions[k].name, probes) for k, probes in (ways.each[way] for way in best))
 
 
 @dataclass(frozen=True, eq=False)
@@ -190,26 +193,30 @@ class _Ways:
 
 
 def _ways(
-    own: Sequence[Candidate], told: Blocks, names: Sequence[str], changes: ChangeTimes
+    candidates: Sequence[Candidate], blocks: Blocks, names: Sequence[str], changes: ChangeTimes
 ) -> _Ways:
     """All ways to read the positions that blocks are of."""
-    items = [one.item for one in own if isinstance(one.item, Position)]
-    each = [(k, probes) for k, item in enumerate(items) for probes in permutations(item.probes)]
-    middles = np.zeros((len(each), len(told.weight)))
-    is_own = told.position == np.array([k for k, _ in each])[:, None]
-    for row, (k, probes) in enumerate(each):
-        (first,) = first_readings(((own[k], probes),), changes)
+    items = [candidate.item for candidate in candidates if isinstance(candidate.item, Position)]
+    choices = [(k, probes) for k, item in enumerate(items) for probes in permutations(item.probes)]
+    middles = np.zeros((len(choices), len(blocks.weight)))
+    is_own = blocks.position == np.array([k for k, _ in choices])[:, None]
+    for row, (k, probes) in enumerate(choices):
+        (first,) = first_readings(((candidates[k], probes),), changes)
         # Probes of several groups stay in the order of the groups.
-        middle = told.middle[told.position == k]
+        middle = blocks.middle[blocks.position == k]
         if len(items[k].readings) == 1:
-            middle = told.hours(k, probes, names, changes.probe / HOUR)
+            middle = blocks.hours(k, probes, names, changes.probe / HOUR)
         middles[row, is_own[row]] = first / HOUR + middle
-    begun, ended = (np.array([probes[end] for _, probes in each]) for end in (0, -1))
-    place = np.unique([(one.item.artefact, one.plane) for one in own], axis=0, return_inverse=True)
-    at = place[1].ravel()[[k for k, _ in each]]
-    change = changes.plane * (at[:, None] != at) + changes.probe * (ended[:, None] != begun)
-    takes, change = np.array([own[k].seconds for k, _ in each]) / HOUR, change / HOUR
-    return _Ways(tuple(each), middles, is_own, takes, change)
+    begun, ended = (np.array([probes[end] for _, probes in choices]) for end in (0, -1))
+    place = np.unique(
+        [(candidate.item.artefact, candidate.plane) for candidate in candidates],
+        axis=0,
+        return_inverse=True,
+    )
+    planes = place[1].ravel()[[k for k, _ in choices]]
+    change = changes.plane * (planes[:, None] != planes) + changes.probe * (ended[:, None] != begun)
+    takes, change = np.array([candidates[k].seconds for k, _ in choices]) / HOUR, change / HOUR
+    return _Ways(tuple(choices), middles, is_own, takes, change)
 
 
 @dataclass(frozen=True, eq=False)
@@ -254,13 +261,13 @@ class _Drift:
         while True:
             near = [best]
             for i, j in combinations(range(len(best)), 2):
-                other = [*best]
-                other[i], other[j] = other[j], other[i]
-                near.append(other)
+                trial = [*best]
+                trial[i], trial[j] = trial[j], trial[i]
+                near.append(trial)
             for i, way in enumerate(best):
-                others = options[self.ways.each[way][0]]
-                near += [[*best[:i], other, *best[i + 1 :]] for other in others]
-            found, size = self.least(np.array(near))
+                alternatives = options[self.ways.each[way][0]]
+                near += [[*best[:i], alternative, *best[i + 1 :]] for alternative in alternatives]
+            best_near, size = self.least(np.array(near))
             if size >= least * (1.0 - GAIN):
                 return best
-            best, least = found, size
+            best, least = best_near, size

@@ -86,17 +86,17 @@ def run(options: Namespace) -> int:
         goal = parse_goal(options.goal, options.share)
         experiment = with_options(options, single(options, planning=True))
         if options.target is not None:
-            stated = parse_length_function(options.target)
-            target = Target(stated, experiment.coverage_factor)
+            length_function = parse_length_function(options.target)
+            target = Target(length_function, experiment.coverage_factor)
             experiment = replace(experiment, target_uncertainty=target)
         if options.watch is not None:
             return _watch(options, experiment, goal)
         sources = options.readings or named_sources(experiment)
-        found = _judged(options, experiment, goal, sources)
+        step = _judged(options, experiment, goal, sources)
     except (GoalError, QuantityError) as error:
         raise UsageError(error) from None
-    show(options, found)
-    return 0 if found.is_met else 1
+    show(options, step)
+    return 0 if step.is_met else 1
 
 
 def _judged(
@@ -107,10 +107,10 @@ def _judged(
     from .next_position import next_step
 
     with progress(options) as shown:
-        found = next_step(experiment, sources, goal, shown.show)
-    for note in found.notes:
+        step = next_step(experiment, sources, goal, shown.show)
+    for note in step.notes:
         complain(note)
-    return found
+    return step
 
 
 def _watch(options: Namespace, experiment: Experiment, goal: Goal) -> int:
@@ -131,16 +131,16 @@ def _watch(options: Namespace, experiment: Experiment, goal: Goal) -> int:
     try:
         for files in settled(options.watch, wait):
             try:
-                found = _judged(options, experiment, goal, [*options.readings, *files])
+                step = _judged(options, experiment, goal, [*options.readings, *files])
             except ExperimentError as error:
                 # It may be mended, or not yet be whole.
                 print_errors(error.messages, options)
                 continue
             if options.json:
-                print(json.dumps(found.to_dict(), allow_nan=False, ensure_ascii=False), flush=True)
+                print(json.dumps(step.to_dict(), allow_nan=False, ensure_ascii=False), flush=True)
             else:
-                print_lines(found.lines())
-            if found.is_met:
+                print_lines(step.lines())
+            if step.is_met:
                 return 0
     except KeyboardInterrupt:
         note(options, "stopped before the target was met")

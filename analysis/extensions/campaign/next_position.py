@@ -69,14 +69,14 @@ def next_step(
     names = _names_in_order(first, sources)
     chosen = with_positions(experiment, [possible[name] for name in names])
     observed = _observed(chosen, sources)
-    read = list(_read(chosen, observed))
+    positions_read = list(_positions_read(chosen, observed))
     fit, why = _fitted(chosen, observed)
-    found = NextStep(
+    step = NextStep(
         experiment.label,
         experiment.title,
         goal,
         tuple(names),
-        {one.position.name: one.missing for one in read if one.missing > 0},
+        {read.position.name: read.missing for read in positions_read if read.missing > 0},
         observed,
         fit,
         why,
@@ -84,31 +84,34 @@ def next_step(
     check_goal(goal, _planned(chosen, goal, 1.0))
     sigma = 1.0
     if fit is not None:
-        at = fit.functions.at
+        linearisation = fit.functions.at
         sigma, bound = sigmas(fit)
         if fit.campaigns is not None:
             experiment = with_sigmas(experiment, fit.campaigns.ratios)
-        judged = judge(goal, _uncertainty(at, experiment, goal, sigma))
+        judged = judge(goal, _uncertainty(linearisation, experiment, goal, sigma))
         is_sure = (
-            math.isfinite(bound) and judge(goal, _uncertainty(at, experiment, goal, bound)).is_met
+            math.isfinite(bound)
+            and judge(goal, _uncertainty(linearisation, experiment, goal, bound)).is_met
         )
         suspected = tuple(fit.diagnosis.words(observed.marks)) if fit.diagnosis else ()
-        found = replace(
-            found, sigma=sigma, bound=bound, now=judged, is_sure=is_sure, suspected=suspected
+        step = replace(
+            step, sigma=sigma, bound=bound, now=judged, is_sure=is_sure, suspected=suspected
         )
-    if found.is_met:
-        return found
-    additions = list(_additions(experiment, possible, read))
+    if step.is_met:
+        return step
+    additions = list(_additions(experiment, possible, positions_read))
     if len(additions) > MOST_OFFERED:
         points = experiment.evaluation.points[:RANKED_BY]
         fewer = replace(experiment, evaluation=replace(experiment.evaluation, points=points))
-        ranked = _judged(_additions(fewer, possible, read), len(additions), goal, sigma, report)
-        best = {one.name for one in ranked[:KEPT]} | set(found.missing)
-        additions = [one for one in additions if one[0] in best]
+        ranked = _judged(
+            _additions(fewer, possible, positions_read), len(additions), goal, sigma, report
+        )
+        best = {offer.name for offer in ranked[:KEPT]} | set(step.missing)
+        additions = [addition for addition in additions if addition[0] in best]
     offered = _judged(additions, len(additions), goal, sigma, report)
     # What nothing can be estimated without comes first.
-    offered.sort(key=lambda one: fit is None and one.name not in found.missing)
-    return replace(found, offered=tuple(offered))
+    offered.sort(key=lambda offer: fit is None and offer.name not in step.missing)
+    return replace(step, offered=tuple(offered))
 
 
 def _judged(
@@ -119,7 +122,7 @@ def _judged(
     for name, readings, more in counted(additions, "positions to come", count, report):
         planned = _planned(more, goal, sigma)
         offered.append(Offered(name, readings, judge(goal, planned), planned))
-    return sorted(offered, key=lambda one: one.order)
+    return sorted(offered, key=lambda offer: offer.order)
 
 
 def sigmas(fit: Fit) -> tuple[float, float]:
@@ -142,18 +145,18 @@ def sigmas(fit: Fit) -> tuple[float, float]:
 def possible_positions(experiment: Experiment) -> dict[str, Position]:
     """All positions that may be read, by name: the file's own, then those of its pool."""
     pool = () if experiment.pool is None else experiment.pool.candidates
-    candidates = (one.item for one in pool if isinstance(one.item, Position))
-    found = {one.name: one for one in (*experiment.positions, *candidates)}
-    if not found:
+    candidates = (candidate.item for candidate in pool if isinstance(candidate.item, Position))
+    positions = {candidate.name: candidate for candidate in (*experiment.positions, *candidates)}
+    if not positions:
         raise refused(experiment.source, "has no positions and no pool of them", "positions")
-    return found
+    return positions
 
 
 def with_positions(experiment: Experiment, positions: Sequence[Position]) -> Experiment:
     """The experiment with these positions alone, and what belongs to them."""
-    found = placed_only(replace(experiment, positions=tuple(positions)))
+    chosen = placed_only(replace(experiment, positions=tuple(positions)))
     # What the rest leaves open is nothing that the file has to expect.
-    return replace(found, expected_rank_deficiency=None)
+    return replace(chosen, expected_rank_deficiency=None)
 
 
 def _observed(experiment: Experiment, sources: Sequence[Source]) -> ObservedReadings:
@@ -177,11 +180,11 @@ def _names_in_order(observed: ObservedReadings, sources: Sequence[Source]) -> li
     return sorted(begun, key=lambda name: begun[name])
 
 
-def _read(experiment: Experiment, observed: ObservedReadings) -> Iterator[ReadPosition]:
+def _positions_read(experiment: Experiment, observed: ObservedReadings) -> Iterator[ReadPosition]:
     design = observed.design
     for k, position in enumerate(experiment.positions):
-        taken = groups_taken(design, k, experiment, position)
-        yield ReadPosition(replace(position, readings=taken), position)
+        groups = groups_taken(design, k, experiment, position)
+        yield ReadPosition(replace(position, readings=groups), position)
 
 
 def _fitted(experiment: Experiment, observed: ObservedReadings) -> tuple[Fit | None, str]:
@@ -191,10 +194,10 @@ def _fitted(experiment: Experiment, observed: ObservedReadings) -> tuple[Fit | N
     if len(unread):
         balls = listing(design.ball_label(int(ball)) for ball in unread)
         return None, f"balls not read yet: {balls}"
-    found = fit_observed(experiment, observed)
-    if not found.converged:
-        return None, found.complaint
-    return found, ""
+    fitted = fit_observed(experiment, observed)
+    if not fitted.converged:
+        return None, fitted.complaint
+    return fitted, ""
 
 
 def _symbols(goal: Goal) -> set[str]:
@@ -203,10 +206,12 @@ def _symbols(goal: Goal) -> set[str]:
 
 
 def _uncertainty(
-    at: Linearisation, experiment: Experiment, goal: Goal, sigma: float
+    linearisation: Linearisation, experiment: Experiment, goal: Goal, sigma: float
 ) -> PlannedUncertainty:
     target = experiment.target_uncertainty
-    return PlannedUncertainty(at.deficiency, uncertainties(at, sigma, target, _symbols(goal)))
+    return PlannedUncertainty(
+        linearisation.deficiency, uncertainties(linearisation, sigma, target, _symbols(goal))
+    )
 
 
 def _planned(experiment: Experiment, goal: Goal, sigma: float) -> PlannedUncertainty:
@@ -214,7 +219,7 @@ def _planned(experiment: Experiment, goal: Goal, sigma: float) -> PlannedUncerta
 
 
 def _additions(
-    experiment: Experiment, possible: Mapping[str, Position], read: Sequence[ReadPosition]
+    experiment: Experiment, possible: Mapping[str, Position], read_positions: Sequence[ReadPosition]
 ) -> Iterator[Addition]:
     """Positions that can be read next, by name with the number of their readings, and the
     experiment with what has been read and each.
@@ -222,26 +227,29 @@ def _additions(
     What was interrupted may be completed. Of candidates of which only some may be read, none is
     offered when as many have been.
     """
-    taken = {one.position.name: one for one in read}
-    closed = set() if experiment.pool is None else _closed(experiment.pool, set(taken))
+    by_name = {earlier.position.name: earlier for earlier in read_positions}
+    closed = set() if experiment.pool is None else _closed(experiment.pool, set(by_name))
     for name, position in possible.items():
-        if name in closed and name not in taken:
+        if name in closed and name not in by_name:
             continue
-        count, positions = position.count, [one.position for one in read]
-        if name in taken:
-            count = taken[name].missing
-            positions = [one.whole if one.position.name == name else one.position for one in read]
+        count, positions = position.count, [earlier.position for earlier in read_positions]
+        if name in by_name:
+            count = by_name[name].missing
+            positions = [
+                earlier.whole if earlier.position.name == name else earlier.position
+                for earlier in read_positions
+            ]
         else:
             positions.append(position)
         if count > 0:
             yield name, count, with_positions(experiment, positions)
 
 
-def _closed(pool: Pool, taken: set[str]) -> set[str]:
+def _closed(pool: Pool, names_read: set[str]) -> set[str]:
     """Candidates of groups of which as many have been read as may be."""
-    found: set[str] = set()
+    closed: set[str] = set()
     for limit in pool.at_most:
         members = {pool.candidates[k].name for k in limit.members}
-        if len(members & taken) >= limit.count:
-            found |= members
-    return found
+        if len(members & names_read) >= limit.count:
+            closed |= members
+    return closed

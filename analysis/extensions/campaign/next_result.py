@@ -84,15 +84,15 @@ class NextStep(Result):
     def lines(self) -> list[str]:
         """The answer first, then what it rests on."""
         count, planned = len(self.read), self.next
-        told = [
+        lines = [
             f"{number_of(count, 'position')} read, last {self.read[-1]}; {self._answer()}",
             *self._missing(),
             *self.observed.redone,
-            *self._known(),
+            *self._sigma_lines(),
         ]
         if planned is not None:
-            told.append(f"with {planned.name}: {planned.then.words}")
-        return told
+            lines.append(f"with {planned.name}: {planned.then.words}")
+        return lines
 
     def _missing(self) -> list[str]:
         """How many planned readings each position lacks."""
@@ -101,19 +101,19 @@ class NextStep(Result):
         named = listing(f"{name} {count}" for name, count in self.missing.items())
         return [f"readings missing in positions read ({sum(self.missing.values())}): {named}"]
 
-    def _known(self) -> list[str]:
+    def _sigma_lines(self) -> list[str]:
         if self.fit is None or self.now is None:
             return [f"nothing can be estimated yet ({self.why})"]
         freedom = self.fit.sum_freedom
         if freedom <= 0:
-            known = "sigma unknown, as nothing is read redundantly"
+            sigma_text = "sigma unknown, as nothing is read redundantly"
         else:
-            found = math.sqrt(self.fit.sum_of_squares / freedom)
-            known = f"sigma {number(found, 3)} of {freedom_words(freedom)}"
+            sigma = math.sqrt(self.fit.sum_of_squares / freedom)
+            sigma_text = f"sigma {number(sigma, 3)} of {freedom_words(freedom)}"
         shown = [f"suspected: {words}" for words in self.suspected] or ["nothing suspected"]
         lengths = self.fit.quantities.get("U6")
         reached = [self.now.words, *([] if lengths is None else self._maximum())]
-        return [known, *shown, "; ".join(reached)]
+        return [sigma_text, *shown, "; ".join(reached)]
 
     def _maximum(self) -> list[str]:
         """The largest U6, where the goal does not tell it."""
@@ -134,16 +134,16 @@ class NextStep(Result):
         if self.is_met:
             assert self.fit is not None
             by_itself = not can_stretch(self.fit.design, self.fit.solution.state)
-            own = (
+            limitation = (
                 " by the machine's own scales, which nothing here vouches for" if by_itself else ""
             )
-            return f"target met{own}: stop"
+            return f"target met{limitation}: stop"
         reason = self._reason()
         if self.next is None:
             return f"{reason}; no position is left to read"
-        one = self.next
-        more = "rest of " if one.name in self.read else ""
-        return f"{reason}; next: {more}{one.name} ({one.readings} readings)"
+        addition = self.next
+        more = "rest of " if addition.name in self.read else ""
+        return f"{reason}; next: {more}{addition.name} ({addition.readings} readings)"
 
     def _reason(self) -> str:
         if self.now is None or not self.now.is_met:
@@ -160,7 +160,9 @@ class NextStep(Result):
     @property
     def notes(self) -> tuple[str, ...]:
         cautions = () if self.fit is None else (self.fit.untested,)
-        doubts = (f"warning: {one}" for one in (*self.observed.doubts, *cautions) if one)
+        doubts = (
+            f"warning: {caution}" for caution in (*self.observed.doubts, *cautions) if caution
+        )
         return (*self.observed.table_notes, *doubts)
 
     def data(self) -> dict[str, Any]:

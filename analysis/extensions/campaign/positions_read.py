@@ -49,21 +49,21 @@ def done_candidates(
     candidates = experiment.pool.candidates
     places = {c.name: k for k, c in enumerate(candidates) if isinstance(c.item, Position)}
     planned = {short: name for name, short in (names or {}).items()}
-    known = {"position": tuple(places), "probe": tuple(experiment.probes)}
+    names_by_column = {"position": tuple(places), "probe": tuple(experiment.probes)}
     settings, d = experiment.readings, experiment.dimension
     # Where decimals could be thousands, the whole is refused when it is read below.
-    in_plane = any(one.reads == "in plane" for one in experiment.artefacts.values())
+    in_plane = any(artefact.reads == "in plane" for artefact in experiment.artefacts.values())
     empty = AXIS_NAMES[:d] if in_plane else ()
-    rows = named_rows(path, known, settings, d, empty)
+    rows = named_rows(path, names_by_column, settings, d, empty)
     messages: dict[str, Message] = {}
-    found: dict[str, int] = {}
+    counts: dict[str, int] = {}
     name = ""
     for row in rows:
         name = row.texts[0]
         meant = _meant(name, planned)
         base = places.get(meant, places.get(base_name(meant)))
         if base is not None:
-            found[name] = base
+            counts[name] = base
         elif name not in messages:
             text = f'no position "{name}" in the file or its pool; {hint(name, places)}'
             if not planned and SHORT.fullmatch(name):
@@ -71,16 +71,16 @@ def done_candidates(
             messages[name] = row.mark.message("", text)
     if messages:
         raise ExperimentError(list(messages.values()))
-    drawn = [renamed(candidates[base], own) for own, base in found.items()]
+    drawn = [renamed(candidates[base], own_name) for own_name, base in counts.items()]
     chosen = lay_out(with_chosen(experiment, drawn))
     design = read_readings(path, chosen, every_ball=False, settings=settings).design
     result = []
-    for number, (as_read, base) in enumerate(zip(drawn, found.values(), strict=True)):
-        own = _meant(as_read.name, planned)
-        candidate = renamed(candidates[base], own)
+    for number, (as_read, base) in enumerate(zip(drawn, counts.values(), strict=True)):
+        own_name = _meant(as_read.name, planned)
+        candidate = renamed(candidates[base], own_name)
         item = position_of(candidate)
-        taken = groups_taken(design, number, experiment, item)
-        result.append(_set_up(experiment, candidate, base, taken, as_read.name == name))
+        groups = groups_taken(design, number, experiment, item)
+        result.append(_set_up(experiment, candidate, base, groups, as_read.name == name))
     return tuple(result)
 
 
@@ -98,24 +98,28 @@ def groups_taken(
     """Readings in a position, by its `place` in a design, as groups of those of equal uncertainty
     and repeats.
     """
-    own = design.readings.select(np.flatnonzero(design.readings.position == place))
+    own_readings = design.readings.select(np.flatnonzero(design.readings.position == place))
     first = int(design.balls.of(design.artefacts.names.index(item.artefact))[0])
     probes, groups = design.probes.names, []
     names = experiment.layouts[item.artefact].names
     by_probe: dict[tuple[str, tuple[float, ...] | None], dict[int, int]] = {}
-    for i in range(len(own)):
-        stated = None if own.uncertainty is None else tuple(own.uncertainty[i].tolist())
-        balls = by_probe.setdefault((probes[own.probe[i]], stated), {})
-        ball = int(own.ball[i]) - first
-        balls[ball] = balls.get(ball, 0) + int(own.repeats[i])
+    for i in range(len(own_readings)):
+        deviations = (
+            None
+            if own_readings.uncertainty is None
+            else tuple(own_readings.uncertainty[i].tolist())
+        )
+        balls = by_probe.setdefault((probes[own_readings.probe[i]], deviations), {})
+        ball = int(own_readings.ball[i]) - first
+        balls[ball] = balls.get(ball, 0) + int(own_readings.repeats[i])
     same: dict[tuple[tuple[float, ...] | None, int, tuple[int, ...]], list[str]] = {}
-    for (probe, stated), balls in by_probe.items():
+    for (probe, deviations), balls in by_probe.items():
         for repeats in sorted(set(balls.values())):
             read_so = tuple(sorted(ball for ball, count in balls.items() if count == repeats))
-            same.setdefault((stated, repeats, read_so), []).append(probe)
-    for (stated, repeats, read_so), with_probes in same.items():
-        uncertainty = None if stated is None else np.array(stated)
-        if stated == tuple(experiment.machine.repeatability.tolist()):
+            same.setdefault((deviations, repeats, read_so), []).append(probe)
+    for (deviations, repeats, read_so), with_probes in same.items():
+        uncertainty = None if deviations is None else np.array(deviations)
+        if deviations == tuple(experiment.machine.repeatability.tolist()):
             uncertainty = None
         groups.append(
             ReadingGroup(
@@ -133,45 +137,49 @@ def _set_up(
     experiment: Experiment,
     candidate: Candidate,
     base: int,
-    taken: tuple[ReadingGroup, ...],
+    groups_read: tuple[ReadingGroup, ...],
     is_last: bool,
 ) -> SetUp:
     assert experiment.pool is not None
     item = position_of(candidate)
     planned = item.readings
-    missing = tuple(_missing(planned, taken, experiment.layouts[item.artefact].names))
-    read = candidate if not missing and _same(taken, planned) else _with_readings(candidate, taken)
+    missing = tuple(_missing(planned, groups_read, experiment.layouts[item.artefact].names))
+    position_read = (
+        candidate
+        if not missing and _same(groups_read, planned)
+        else _with_readings(candidate, groups_read)
+    )
     if not missing:
-        return SetUp(base, read, read, None, is_last)
+        return SetUp(base, position_read, position_read, None, is_last)
     whole = (
         candidate
-        if _same((*taken, *missing), planned)
-        else _with_readings(candidate, (*taken, *missing))
+        if _same((*groups_read, *missing), planned)
+        else _with_readings(candidate, (*groups_read, *missing))
     )
-    rest = _with_readings(candidate, missing)
-    changes = (len(position_of(rest).probes) - 1) * experiment.pool.changes.probe
-    seconds = rest.readings * candidate.reading_seconds + changes
-    rest = replace(rest, name=f"{REST}{candidate.name}", seconds=seconds, drawn=False)
-    return SetUp(base, read, whole, rest, is_last)
+    remainder = _with_readings(candidate, missing)
+    changes = (len(position_of(remainder).probes) - 1) * experiment.pool.changes.probe
+    seconds = remainder.readings * candidate.reading_seconds + changes
+    remainder = replace(remainder, name=f"{REST}{candidate.name}", seconds=seconds, drawn=False)
+    return SetUp(base, position_read, whole, remainder, is_last)
 
 
 def _missing(
-    planned: Sequence[ReadingGroup], taken: Sequence[ReadingGroup], names: Sequence[str]
+    planned: Sequence[ReadingGroup], groups_read: Sequence[ReadingGroup], names: Sequence[str]
 ) -> Iterator[ReadingGroup]:
     """What of the planned readings has not been taken, whatever their uncertainty; balls left alike
     make a group.
     """
-    left = _amounts(taken)
+    amounts_left = _amounts(groups_read)
     for group in planned:
         alike: dict[tuple[int, tuple[int, ...]], list[str]] = {}
         for probe in group.probes:
             by_count: dict[int, list[int]] = {}
             for ball in group.ball_indices.tolist():
-                done = min(left.get((ball, probe), 0), group.repeats)
-                if done:
-                    left[ball, probe] -= done
-                if done < group.repeats:
-                    by_count.setdefault(group.repeats - done, []).append(ball)
+                repeats_done = min(amounts_left.get((ball, probe), 0), group.repeats)
+                if repeats_done:
+                    amounts_left[ball, probe] -= repeats_done
+                if repeats_done < group.repeats:
+                    by_count.setdefault(group.repeats - repeats_done, []).append(ball)
             for count, balls in by_count.items():
                 alike.setdefault((count, tuple(balls)), []).append(probe)
         for (count, chosen), probes in alike.items():
@@ -186,41 +194,43 @@ def _missing(
 
 def _amounts(readings: Sequence[ReadingGroup]) -> Amounts:
     """How often each ball is read with each probe."""
-    found: Amounts = {}
+    amounts: Amounts = {}
     for group in readings:
         for pair in product(group.ball_indices.tolist(), group.probes):
-            found[pair] = found.get(pair, 0) + group.repeats
-    return found
+            amounts[pair] = amounts.get(pair, 0) + group.repeats
+    return amounts
 
 
-def _same(one: Sequence[ReadingGroup], other: Sequence[ReadingGroup]) -> bool:
+def _same(first: Sequence[ReadingGroup], second: Sequence[ReadingGroup]) -> bool:
     """Whether both read the same balls as often with the same probes and uncertainties."""
 
     def by_uncertainty(groups: Sequence[ReadingGroup]) -> dict[tuple[float, ...] | None, Amounts]:
         kinds: dict[tuple[float, ...] | None, list[ReadingGroup]] = {}
         for group in groups:
-            stated = group.standard_uncertainty
-            kinds.setdefault(None if stated is None else tuple(stated.tolist()), []).append(group)
-        return {stated: _amounts(some) for stated, some in kinds.items()}
+            uncertainty = group.standard_uncertainty
+            kinds.setdefault(
+                None if uncertainty is None else tuple(uncertainty.tolist()), []
+            ).append(group)
+        return {uncertainty: _amounts(some) for uncertainty, some in kinds.items()}
 
-    return by_uncertainty(one) == by_uncertainty(other)
+    return by_uncertainty(first) == by_uncertainty(second)
 
 
 def _with_readings(candidate: Candidate, readings: tuple[ReadingGroup, ...]) -> Candidate:
     """A position with these readings, and what a file says of it."""
-    said = {key: value for key, value in candidate.settings.items() if key not in GROUP}
+    settings = {key: value for key, value in candidate.settings.items() if key not in GROUP}
     groups = []
-    for one in readings:
+    for reading in readings:
         group: dict[str, Any] = {
-            "probes": list(one.probes),
-            "balls": list(one.balls),
-            "repeats": one.repeats,
+            "probes": list(reading.probes),
+            "balls": list(reading.balls),
+            "repeats": reading.repeats,
         }
-        if one.standard_uncertainty is not None:
-            group["standard_uncertainty"] = _exactly(one.standard_uncertainty)
+        if reading.standard_uncertainty is not None:
+            group["standard_uncertainty"] = _exactly(reading.standard_uncertainty)
         groups.append(group)
     item = replace(position_of(candidate), readings=readings)
-    return replace(candidate, item=item, settings={**said, "readings": groups})
+    return replace(candidate, item=item, settings={**settings, "readings": groups})
 
 
 def _exactly(lengths: Array) -> str | list[str]:

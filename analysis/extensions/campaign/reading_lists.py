@@ -60,7 +60,7 @@ def planned_readings(sheet: RunSheet, experiment: Experiment) -> list[PlannedRea
 
     :raises ExperimentError: two of them would have the same name as features.
     """
-    found: list[PlannedReading] = []
+    planned: list[PlannedReading] = []
     meant: dict[str, tuple[str, str, str]] = {}
     for step in sheet.steps:
         item = step.candidate.item
@@ -70,13 +70,17 @@ def planned_readings(sheet: RunSheet, experiment: Experiment) -> list[PlannedRea
             for ball, k, repeats in balls:
                 key = step.name, ball, probe
                 name = feature_name(*key)
-                other = meant.setdefault(name.casefold(), key)
-                if other != key:
-                    both = " and ".join(f'"{", ".join(one)}"' for one in (other, key))
-                    text = f"{both} would both be the feature {name}; rename one of them"
+                first_key = meant.setdefault(name.casefold(), key)
+                if first_key != key:
+                    names = " and ".join(
+                        f'"{", ".join(key_names)}"' for key_names in (first_key, key)
+                    )
+                    text = f"{names} would both be the feature {name}; rename one of them"
                     raise refused(experiment.source, text, "positions")
-                found += [PlannedReading(*key, name, centres[k, : experiment.dimension])] * repeats
-    return found
+                planned += [
+                    PlannedReading(*key, name, centres[k, : experiment.dimension])
+                ] * repeats
+    return planned
 
 
 def feature_name(position: str, ball: str, probe: str) -> str:
@@ -103,8 +107,8 @@ def template_csv(readings: Sequence[PlannedReading], experiment: Experiment) -> 
         )
         blank += [name for name in named if name not in blank]
     writer.writerow(["position", "ball", "probe", *blank])
-    for one in readings:
-        writer.writerow([one.position, one.ball, one.probe, *[""] * len(blank)])
+    for reading in readings:
+        writer.writerow([reading.position, reading.ball, reading.probe, *[""] * len(blank)])
     return out.getvalue()
 
 
@@ -114,9 +118,9 @@ def points_csv(readings: Sequence[PlannedReading], dimension: int) -> str:
     writer = CsvWriter(out)
     nominal = [f"nominal_{axis}_mm" for axis in AXES[:dimension]]
     writer.writerow(["feature", "position", "ball", "probe", *nominal])
-    for one in readings:
-        numbers = [f"{1e3 * value:.4f}" for value in one.centre]
-        writer.writerow([one.feature, one.position, one.ball, one.probe, *numbers])
+    for reading in readings:
+        numbers = [f"{1e3 * value:.4f}" for value in reading.centre]
+        writer.writerow([reading.feature, reading.position, reading.ball, reading.probe, *numbers])
     return out.getvalue()
 
 
@@ -129,9 +133,9 @@ def points_dmis(
     `styli` are the probes' offsets (3,) by name. There are no moves between balls: what is in the
     way there only the machine's programmer knows.
     """
-    said = re.sub(r"[^ -~]|'", "-", in_one_line(title))
+    title_text = re.sub(r"[^ -~]|'", "-", in_one_line(title))
     lines = [
-        f"DMISMN/'{said}',05.2",
+        f"DMISMN/'{title_text}',05.2",
         "UNITS/MM,ANGDEC",
         "D(MCS)=DATSET/MCS",
         "MODE/PROG,MAN",
@@ -139,18 +143,18 @@ def points_dmis(
         "$$ No moves between balls and no alignment: add both before this runs anywhere.",
     ]
     selected, defined = "", set[str]()
-    for one in readings:
-        if one.probe != selected:
-            selected = one.probe
+    for reading in readings:
+        if reading.probe != selected:
+            selected = reading.probe
             lines.append(f"SNSLCT/SA({UNUSUAL.sub('-', selected)})")
-        if one.feature not in defined:
-            defined.add(one.feature)
-            sphere = f"{_numbers(1e3 * one.centre)},{1e3 * diameter:.4f}"
-            lines.append(f"F({one.feature})=FEAT/SPHERE,OUTER,CART,{sphere}")
-        normals = _normals(styli[one.probe])
-        lines.append(f"MEAS/SPHERE,F({one.feature}),{len(normals)}")
+        if reading.feature not in defined:
+            defined.add(reading.feature)
+            sphere = f"{_numbers(1e3 * reading.centre)},{1e3 * diameter:.4f}"
+            lines.append(f"F({reading.feature})=FEAT/SPHERE,OUTER,CART,{sphere}")
+        normals = _normals(styli[reading.probe])
+        lines.append(f"MEAS/SPHERE,F({reading.feature}),{len(normals)}")
         for normal in normals:
-            place = _numbers(1e3 * (one.centre + 0.5 * diameter * normal))
+            place = _numbers(1e3 * (reading.centre + 0.5 * diameter * normal))
             lines.append(f"PTMEAS/CART,{place},{_numbers(normal, 6)}")
         lines.append("ENDMES")
     return "\n".join([*lines, "ENDFIL", ""])

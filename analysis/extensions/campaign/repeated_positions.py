@@ -26,36 +26,42 @@ def without_redone(
     with the position.
     """
     planned = _planned(design)
-    kept: dict[str, list[int]] = {}
+    rows_by_position: dict[str, list[int]] = {}
     left_out: dict[str, int] = {}
     repeated: dict[str, int] = {}
     runs = groupby(range(len(rows)), lambda i: (rows[i].mark.file, rows[i].texts[0]))
     for (_, position), members in runs:
-        own: dict[Names, list[int]] = {}
+        rows_by_reading: dict[Names, list[int]] = {}
         for i in members:
-            own.setdefault(rows[i].texts, []).append(i)
-        for texts, found in own.items():
-            surplus = len(found) - planned[texts]
+            rows_by_reading.setdefault(rows[i].texts, []).append(i)
+        for texts, members_of_reading in rows_by_reading.items():
+            surplus = len(members_of_reading) - planned[texts]
             if surplus > 0:
                 repeated[position] = repeated.get(position, 0) + surplus
-                del found[:surplus]
-        earlier = kept.get(position, [])
+                del members_of_reading[:surplus]
+        earlier = rows_by_position.get(position, [])
         count = Counter(rows[i].texts for i in earlier)
-        if any(0 < count[texts] > planned[texts] - len(found) for texts, found in own.items()):
+        if any(
+            0 < count[texts] > planned[texts] - len(members_of_reading)
+            for texts, members_of_reading in rows_by_reading.items()
+        ):
             left_out[position] = left_out.get(position, 0) + len(earlier)
             earlier = []
-        kept[position] = [*earlier, *(i for found in own.values() for i in found)]
-    told = [
+        rows_by_position[position] = [
+            *earlier,
+            *(i for members_of_reading in rows_by_reading.values() for i in members_of_reading),
+        ]
+    notes = [
         f"{position} was read again: {number_of(count, 'reading')} taken before are left out"
         for position, count in left_out.items()
     ]
-    told += [
+    notes += [
         f"{position}: of {number_of(count, 'reading')} {'that are' if count > 1 else 'that is'}"
         " repeated the last counts"
         for position, count in repeated.items()
     ]
-    chosen = sorted(i for members in kept.values() for i in members)
-    return tuple(rows[i] for i in chosen), tuple(told)
+    chosen = sorted(i for members in rows_by_position.values() for i in members)
+    return tuple(rows[i] for i in chosen), tuple(notes)
 
 
 def _planned(design: Design) -> Counter[Names]:
@@ -63,11 +69,11 @@ def _planned(design: Design) -> Counter[Names]:
     is not planned.
     """
     readings = design.readings.expanded()
-    found: Counter[Names] = _AtLeastOnce(
+    planned: Counter[Names] = _AtLeastOnce(
         (design.positions.names[k], design.balls.names[ball], design.probes.names[probe])
         for k, ball, probe in reading_keys(readings)
     )
-    return found
+    return planned
 
 
 class _AtLeastOnce(Counter[Names]):

@@ -98,13 +98,17 @@ class Sheet(Result):
 
 def sheet_of(experiment: Experiment) -> Sheet:
     """The run sheet of an experiment as it is, in the order of its positions."""
-    said = to_python(experiment.tree)
-    stated = said.get("positions", ()) if isinstance(said, Mapping) else ()
-    by_name = {str(one["name"]): one for one in stated}
+    tree = to_python(experiment.tree)
+    positions = tree.get("positions", ()) if isinstance(tree, Mapping) else ()
+    by_name = {str(settings["name"]): settings for settings in positions}
     steps: list[Step] = []
     before: tuple[Candidate, tuple[str, ...]] | None = None
     pool, start = experiment.pool, 0.0
-    timed = {} if pool is None else {one.name: one.seconds for one in pool.candidates if one.drawn}
+    timed = (
+        {}
+        if pool is None
+        else {candidate.name: candidate.seconds for candidate in pool.candidates if candidate.drawn}
+    )
     changes = ChangeTimes(0.0, 0.0) if pool is None else pool.changes
     for position in experiment.positions:
         settings = by_name.get(position.name) or _settings(position, experiment)

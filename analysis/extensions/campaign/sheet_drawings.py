@@ -88,7 +88,7 @@ def volume_drawing(design: Design, names: Mapping[str, str]) -> str:
     scale = min((VOLUME - 2 * MARGIN) / float(size[0]), 0.75 * VOLUME / (float(size[1]) or 1.0))
     width, height = scale * size + 2 * MARGIN
 
-    def at(points: Array) -> Array:
+    def to_page(points: Array) -> Array:
         return on_paper(points, lower, scale, MARGIN, height)
 
     parts = [
@@ -98,14 +98,17 @@ def volume_drawing(design: Design, names: Mapping[str, str]) -> str:
     ]
     for edge, is_hidden in zip(drawn.box.edges, drawn.box.hidden, strict=True):
         dashes = ' stroke-dasharray="3 4"' if is_hidden else ""
-        parts.append(_line(at(edge), GREY, dashes))
-    parts += [_position(place, at(place.outline), at(place.balls[:1])[0]) for place in drawn.places]
-    parts += _axes(drawn.box, at)
+        parts.append(_line(to_page(edge), GREY, dashes))
+    parts += [
+        _position(place, to_page(place.outline), to_page(place.balls[:1])[0])
+        for place in drawn.places
+    ]
+    parts += _axes(drawn.box, to_page)
     # No name covers the dot of a first ball.
-    taken = [at(place.balls[:1])[0] for place in drawn.places]
-    for place in sorted(drawn.places, key=lambda one: one.number):
-        outline = at(place.outline)
-        parts.append(_label(names[place.name], outline, taken, _colour(place)))
+    first_balls = [to_page(place.balls[:1])[0] for place in drawn.places]
+    for place in sorted(drawn.places, key=lambda place: place.number):
+        outline = to_page(place.outline)
+        parts.append(_label(names[place.name], outline, first_balls, _colour(place)))
     return "".join([*parts, "</svg>"])
 
 
@@ -126,17 +129,23 @@ def _colour(place: DrawnPosition) -> str:
     return SERIES[(place.number - 1) % len(SERIES)]
 
 
-def _label(name: str, outline: Array, taken: list[Array], colour: str) -> str:
+def _label(name: str, outline: Array, points: list[Array], colour: str) -> str:
     """A position's name at the corner, or middle of a side, that is furthest from other names."""
     centre = outline.mean(axis=0)
     places = np.concatenate([outline, 0.5 * (outline + np.roll(outline, 1, axis=0))])
     places = centre + 0.86 * (places - centre)
     apart = [
-        min((float(np.hypot(*((at - other) * [1.0, 2.0]))) for other in taken), default=0.0)
-        for at in places
+        min(
+            (
+                float(np.hypot(*((place - points_of_place) * [1.0, 2.0])))
+                for points_of_place in points
+            ),
+            default=0.0,
+        )
+        for place in places
     ]
     x, y = places[int(np.argmax(apart))]
-    taken.append(np.array([x, y]))
+    points.append(np.array([x, y]))
     width = 7.4 * len(name) + 8.0
     return (
         f'<rect x="{x - width / 2:.1f}" y="{y - 9:.1f}" width="{width:.1f}" height="18" rx="3"'
@@ -145,23 +154,23 @@ def _label(name: str, outline: Array, taken: list[Array], colour: str) -> str:
     )
 
 
-def _axes(box: Box, at: object) -> list[str]:
+def _axes(box: Box, to_page: object) -> list[str]:
     """Names of the axes with the co-ordinates of the volume's ends in millimetres."""
-    assert callable(at)
+    assert callable(to_page)
     parts = []
-    middle = at(box.edges.reshape(-1, 2)).mean(axis=0)
+    middle = to_page(box.edges.reshape(-1, 2)).mean(axis=0)
     for name, ends, low, high in box.axes:
-        one, other = at(ends)
-        along = (other - one) / (float(np.linalg.norm(other - one)) or 1.0)
+        start, end = to_page(ends)
+        along = (end - start) / (float(np.linalg.norm(end - start)) or 1.0)
         away = np.array([-along[1], along[0]])
-        if away @ (0.5 * (one + other) - middle) < 0.0:
+        if away @ (0.5 * (start + end) - middle) < 0.0:
             away = -away
         for share, text in (
             (0.04, f"{1e3 * low:.5g}"),
             (0.5, f"{name}, mm"),
             (0.96, f"{1e3 * high:.5g}"),
         ):
-            x, y = one + share * (other - one) + 15.0 * away
+            x, y = start + share * (end - start) + 15.0 * away
             parts.append(_text(x, y + 4.0, text, 11.0, INK if share == 0.5 else GREY))
     return parts
 

@@ -48,7 +48,7 @@ def sheet_text(sheet: RunSheet, experiment: Experiment, title: str) -> str:
         if step.done:
             continue
         lines += ["", in_one_line(f"[ ] {number} {step.title}")]
-        lines += [in_one_line(f"    {key}: {said}") for key, said in set_up_rows(step, experiment)]
+        lines += [in_one_line(f"    {key}: {text}") for key, text in set_up_rows(step, experiment)]
         for probe, boxes in _boxes(step):
             lines += [in_one_line(f"    with {probe}:"), *_wrapped(boxes)]
         lines.append("    " + "  ".join(f"{name} {BLANK}" for name in NOTES))
@@ -100,9 +100,22 @@ def sheet_csv(sheet: RunSheet) -> str:
                 *(minutes if sheet.timed else ("", "", "")),
             )
         )
-    for one in sheet.calibration:
-        cells = ["", "", one.name, "", one.item.artefact, "", "calibration", "", "", 0, "", 0]
-        writer.writerow([*cells, f"{one.seconds / 60.0:.10g}", ""])
+    for calibration in sheet.calibration:
+        cells = [
+            "",
+            "",
+            calibration.name,
+            "",
+            calibration.item.artefact,
+            "",
+            "calibration",
+            "",
+            "",
+            0,
+            "",
+            0,
+        ]
+        writer.writerow([*cells, f"{calibration.seconds / 60.0:.10g}", ""])
     return out.getvalue()
 
 
@@ -122,13 +135,15 @@ def sheet_markdown(sheet: RunSheet, experiment: Experiment, title: str) -> str:
         rows.append([str(number), *(times(step) if sheet.timed else ()), *cells])
     lines += _table(rows)
     if sheet.calibration:
-        items = [[one.name, price(one.seconds)] for one in sheet.calibration]
+        items = [
+            [calibration.name, price(calibration.seconds)] for calibration in sheet.calibration
+        ]
         lines += ["", *_table([["calibration", "price"], *items])]
     for number, step in enumerate(sheet.steps, 1):
         if step.done:
             continue
         lines += ["", f"## ☐ {number}. {_cell(step.title)}", ""]
-        lines += [f"- {key}: {_cell(said)}" for key, said in set_up_rows(step, experiment)]
+        lines += [f"- {key}: {_cell(text)}" for key, text in set_up_rows(step, experiment)]
         for probe, boxes in _boxes(step):
             marks = ", ".join(_cell(box.replace("[ ]", "☐")) for box in boxes)
             lines += ["", f"With {_cell(probe)}: {marks}"]

@@ -37,7 +37,7 @@ def known_fields(experiment: Experiment) -> dict[str, str]:
     """What the head of a sheet says already."""
     machine, volume = experiment.machine, experiment.machine.volume
     size = " x ".join(f"{1e3 * length:.6g}" for length in volume.size)
-    noise = sorted({f"{1e6 * one:.4g}" for one in machine.repeatability}, key=float)
+    noise = sorted({f"{1e6 * deviation:.4g}" for deviation in machine.repeatability}, key=float)
     variant = f", {experiment.name}" if experiment.name else ""
     return {
         "file": f"{experiment.source.name}{variant}",
@@ -83,15 +83,15 @@ def stylus_rows(sheet: RunSheet, experiment: Experiment) -> list[list[str]]:
     """A table of the styli with a line of headings; offsets in millimetres, and the angles of an
     articulating head if any probe has some.
     """
-    found = styli(sheet, experiment)
-    has_head = any(one.angles is not None for one in found)
+    table = styli(sheet, experiment)
+    has_head = any(stylus.angles is not None for stylus in table)
     axes = [f"{axis}, mm" for axis in "xyz"[: experiment.dimension]]
     has_angles = experiment.dimension == 3
     heads = [*(["A", "B"] if has_head else []), *(["from -z", "from +x"] if has_angles else [])]
     rows = [["probe", *axes, *heads]]
-    for one in found:
-        lengths = [f"{1e3 * length:.6g}" for length in one.offset]
-        angles = [degrees(angle) for angle in one.angles or (np.nan, np.nan)] if has_head else []
-        angles += [degrees(one.from_down), degrees(one.around)] if has_angles else []
-        rows.append([one.name, *lengths, *angles])
+    for stylus in table:
+        lengths = [f"{1e3 * length:.6g}" for length in stylus.offset]
+        angles = [degrees(angle) for angle in stylus.angles or (np.nan, np.nan)] if has_head else []
+        angles += [degrees(stylus.from_down), degrees(stylus.around)] if has_angles else []
+        rows.append([stylus.name, *lengths, *angles])
     return rows

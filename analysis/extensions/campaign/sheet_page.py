@@ -97,8 +97,8 @@ def sheet_page(sheet: RunSheet, experiment: Experiment, title: str) -> str:
     parts += [_step(number, step, sheet, experiment) for number, step in enumerate(sheet.steps, 1)]
     if sheet.calibration:
         items = [
-            f"<td>{escaped(one.name)}</td><td>{price(one.seconds)}</td>"
-            for one in sheet.calibration
+            f"<td>{escaped(calibration.name)}</td><td>{price(calibration.seconds)}</td>"
+            for calibration in sheet.calibration
         ]
         rows = "".join(f"<tr>{item}</tr>" for item in items)
         parts.append(
@@ -115,14 +115,16 @@ def sheet_page(sheet: RunSheet, experiment: Experiment, title: str) -> str:
 def _page_margins(title: str) -> str:
     """The title and the page's number in the margin of each page that is printed."""
     # Anything but plain letters might end the text or the style that it stands in.
-    said = "".join(
-        one if one.isascii() and one.isalnum() or one == " " else f"\\{ord(one):x} "
-        for one in title[:80]
+    title_text = "".join(
+        character
+        if character.isascii() and character.isalnum() or character == " "
+        else f"\\{ord(character):x} "
+        for character in title[:80]
     )
     style = "font: 9pt sans-serif; color: #555;"
     return (
         "@page { size: A4; margin: 14mm 14mm 16mm;\n"
-        f'  @bottom-left {{ content: "{said}"; {style} }}\n'
+        f'  @bottom-left {{ content: "{title_text}"; {style} }}\n'
         f'  @bottom-right {{ content: "page " counter(page) " of " counter(pages); {style} }} }}\n'
     )
 
@@ -139,10 +141,10 @@ def _order(sheet: RunSheet) -> str:
     heads = ["", "position", "probes", "readings", *(["start", "min"] if sheet.timed else [])]
     rows = []
     for number, step in enumerate(sheet.steps, 1):
-        said = f"<br>{escaped(step.description)}" if step.description else ""
+        description = f"<br>{escaped(step.description)}" if step.description else ""
         cells = [
             f'<td class="number">{number}</td>',
-            f"<td><b>{escaped(step.name)}</b>{said}</td>",
+            f"<td><b>{escaped(step.name)}</b>{description}</td>",
             f"<td>{escaped(', '.join(step.probes))}</td>",
             f'<td class="number">{step.readings}</td>',
         ]
@@ -192,8 +194,8 @@ def _pictures(sheet: RunSheet, experiment: Experiment) -> str:
     figures = []
     todo = [step for step in sheet.steps if not step.done]
     for name in dict.fromkeys(step.artefact for step in todo):
-        own = next(step for step in todo if step.artefact == name)
-        order = [k for _, balls in list(sequence(own))[:1] for _, k, _ in balls]
+        first_step = next(step for step in todo if step.artefact == name)
+        order = [k for _, balls in list(sequence(first_step))[:1] for _, k, _ in balls]
         figures.append(
             f"<figure>{artefact_drawing(name, experiment.layouts[name], order)}"
             f"<figcaption>{escaped(name)}, seen from the side that its z points to; the line is the"
@@ -203,7 +205,7 @@ def _pictures(sheet: RunSheet, experiment: Experiment) -> str:
     pictures = (
         f'<h2>Artefacts</h2><div class="pictures">{"".join(figures)}</div>' if figures else ""
     )
-    positions = [one for one in sheet.written if isinstance(one.item, Position)]
+    positions = [picture for picture in sheet.written if isinstance(picture.item, Position)]
     if not positions:
         return pictures
     # Where things stand does not depend on what disturbs their readings.
@@ -226,9 +228,9 @@ def _numbered(layout: BallLayout) -> str:
 
 
 def _step(number: int, step: Step, sheet: RunSheet, experiment: Experiment) -> str:
-    said = f" <small>{escaped(step.description)}</small>" if step.description else ""
+    description = f" <small>{escaped(step.description)}</small>" if step.description else ""
     checked = " checked" if step.done else ""
-    told = "done" if step.done else "start {}, {} min".format(*times(step)) if sheet.timed else ""
+    state = "done" if step.done else "start {}, {} min".format(*times(step)) if sheet.timed else ""
     change = (
         f'<p class="change">First change {escaped(step.change)}'
         f"{f' ({price(step.change_seconds)})' if sheet.timed else ''}</p>"
@@ -247,7 +249,8 @@ def _step(number: int, step: Step, sheet: RunSheet, experiment: Experiment) -> s
     return (
         f'<section class="{kind}"><div class="head">'
         f'<input type="checkbox" class="tick" aria-label="position {number} done"{checked}>'
-        f'<h2>{number}. {escaped(step.name)}{said}</h2><div class="time">{told}</div></div>{change}'
+        f"<h2>{number}. {escaped(step.name)}{description}</h2>"
+        f'<div class="time">{state}</div></div>{change}'
         f"{body}</section>"
     )
 

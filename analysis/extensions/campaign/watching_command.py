@@ -20,29 +20,29 @@ def settled(folder: Path, wait: Callable[[], object]) -> Iterator[list[Path]]:
     :raises OSError: the folder cannot be read.
     """
     before: dict[Path, tuple[int, int]] = {}
-    told: dict[Path, tuple[int, int]] = {}
+    sizes: dict[Path, tuple[int, int]] = {}
     while True:
         now = _tables(folder)
-        whole = {path: one for path, one in now.items() if before.get(path) == one}
-        if whole and whole != told:
-            told = whole
+        whole = {path: stamp for path, stamp in now.items() if before.get(path) == stamp}
+        if whole and whole != sizes:
+            sizes = whole
             yield sorted(whole, key=lambda path: (whole[path][0], path.name))
         before = now
         wait()
 
 
 def _tables(folder: Path) -> dict[Path, tuple[int, int]]:
-    found = {}
+    tables = {}
     with os.scandir(folder) as entries:
         for entry in entries:
             path = Path(entry.path)
             if path.suffix.lower() not in TABLES or path.name.startswith((".", "~")):
                 continue
             try:
-                known = entry.stat()
+                status = entry.stat()
             except FileNotFoundError:
                 # Gone, or renamed, since the folder was listed.
                 continue
-            if known.st_size and entry.is_file():
-                found[path] = known.st_mtime_ns, known.st_size
-    return found
+            if status.st_size and entry.is_file():
+                tables[path] = status.st_mtime_ns, status.st_size
+    return tables

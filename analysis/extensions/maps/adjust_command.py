@@ -98,20 +98,20 @@ def run(options: Namespace) -> int:
         return 1
     second = None
     if options.after:
-        second, other = _second(options)
+        second, second_map = _second(options)
         if second is None:
             return 1
-        complaint |= other
+        complaint |= second_map
     try:
-        found = adjusted_machine(first.title, first, changes, second, options.uncertainty)
+        adjusted = adjusted_machine(first.title, first, changes, second, options.uncertainty)
     except ValueError as error:
         raise UsageError(error) from None
     if options.output:
-        predicted = found.predicted_map
+        predicted = adjusted.predicted_map
         write_noted(options, {options.output: lambda path: write_map(predicted, path)})
-    show(options, found)
-    warn(found.notes)
-    return 1 if complaint or (found.difference is not None and not found.is_within) else 0
+    show(options, adjusted)
+    warn(adjusted.notes)
+    return 1 if complaint or (adjusted.difference is not None and not adjusted.is_within) else 0
 
 
 def _second(options: Namespace) -> tuple[FittedMap | None, bool]:

@@ -66,24 +66,26 @@ def machine_lines(lower: Array, upper: Array) -> tuple[MachineLine, ...]:
     def part(end: Array, start: Array, weight: Array) -> Any:
         return tuple(end.tolist()), tuple(start.tolist()), tuple(weight.tolist())
 
-    found = []
+    lines = []
     for i in range(d):
         name = f"scale {AXIS_NAMES[i]}"
-        found.append(MachineLine(name, "scale", "1", (part(ends[i], lower, unit[i] / size[i]),)))
+        lines.append(MachineLine(name, "scale", "1", (part(ends[i], lower, unit[i] / size[i]),)))
     for i, j in combinations(range(d), 2):
         # An axis that leans towards the other makes the angle smaller.
-        both = (
+        departures = (
             part(ends[j], lower, -unit[i] / size[j]),
             part(ends[i], lower, -unit[j] / size[i]),
         )
-        found.append(MachineLine(f"angle {AXIS_NAMES[i]}{AXIS_NAMES[j]}", "angle", "rad", both))
+        lines.append(
+            MachineLine(f"angle {AXIS_NAMES[i]}{AXIS_NAMES[j]}", "angle", "rad", departures)
+        )
     for signs in product((True, False), repeat=d - 1):
         ups = np.array([True, *signs])
         start, end = np.where(ups, lower, upper), np.where(ups, upper, lower)
         along = (end - start) / np.linalg.norm(end - start)
         name = "diagonal " + "".join("+" if up else "-" for up in ups)
-        found.append(MachineLine(name, "diagonal", "m", (part(end, start, along),)))
-    return tuple(found)
+        lines.append(MachineLine(name, "diagonal", "m", (part(end, start, along),)))
+    return tuple(lines)
 
 
 @dataclass(frozen=True)
@@ -99,9 +101,11 @@ def line_values(fitted: FittedMap, lines: Sequence[MachineLine]) -> tuple[Array,
     """Figures (m,) of a fitted machine and a square root (m, r) of their covariance, NaN where
     undetermined.
     """
-    weights = np.array([part[2] for one in lines for part in one.parts])
-    owner = np.array([k for k, one in enumerate(lines) for _ in one.parts])
-    points = np.array([point for one in lines for part in one.parts for point in part[:2]])
+    weights = np.array([part[2] for machine_line in lines for part in machine_line.parts])
+    owner = np.array([k for k, machine_line in enumerate(lines) for _ in machine_line.parts])
+    points = np.array(
+        [point for machine_line in lines for part in machine_line.parts for point in part[:2]]
+    )
     places, rows = corrected(fitted, points)
     drawn = drawn_rows(fitted, points)
 
@@ -133,8 +137,8 @@ def adjusted_map(
         step[: len(values)] = share * (moved - values)
         covariance += np.outer(step, step)
         values = moved
-    told = "; ".join(change.words for change in changes)
-    title = f"{fitted.title}, as predicted after adjustment: {told}"
+    change_words = "; ".join(change.words for change in changes)
+    title = f"{fitted.title}, as predicted after adjustment: {change_words}"
     return replace(fitted, title=title, values=values, covariance=covariance, date=None)
 
 
@@ -156,22 +160,22 @@ def _followed(fitted: FittedMap, values: Array, change: MachineChange) -> Array:
     wanted = wanted + fitted.model.error(points, values, offsets)
     scale = fitted.scale[: len(values)]
     motions = rigid_motions(points - lower).reshape(points.size, -1)
-    found, motion, left = values, np.zeros(motions.shape[1]), np.zeros(points.size)
+    state, motion, residual = values, np.zeros(motions.shape[1]), np.zeros(points.size)
     for _ in range(4):
-        have = fitted.model.error(points, found, offsets).ravel() + motions @ motion
-        left = wanted.ravel() - have
-        jacobian = fitted.model.jacobian(points, found, offsets).reshape(points.size, -1)
+        have = fitted.model.error(points, state, offsets).ravel() + motions @ motion
+        residual = wanted.ravel() - have
+        jacobian = fitted.model.jacobian(points, state, offsets).reshape(points.size, -1)
         columns = np.concatenate([jacobian * scale, motions], axis=1)
-        step = np.linalg.lstsq(columns, left, rcond=1e-12)[0]
-        found, motion = found + scale * step[: len(values)], motion + step[len(values) :]
-        left = left - columns @ step
+        step = np.linalg.lstsq(columns, residual, rcond=1e-12)[0]
+        state, motion = state + scale * step[: len(values)], motion + step[len(values) :]
+        residual = residual - columns @ step
     largest = abs(change.amount) * float((upper - lower).max())
-    if np.abs(left).max() > LEFT_OUT * largest:
+    if np.abs(residual).max() > LEFT_OUT * largest:
         raise ValueError(
             f"{change.words}: the error model cannot follow that, since it has no such error; fit"
             " with a model that has"
         )
-    return found
+    return state
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -200,10 +204,10 @@ class AdjustedMachine(Result):
     def normalised_errors(self) -> Array:
         """E_n (m,) of the figures; NaN where one is undetermined or exactly known."""
         errors = []
-        for predicted, found in zip(self.predicted, self.found or (), strict=False):
-            u = np.hypot(predicted.standard_uncertainty, found.standard_uncertainty)
+        for predicted, actual in zip(self.predicted, self.found or (), strict=False):
+            u = np.hypot(predicted.standard_uncertainty, actual.standard_uncertainty)
             is_known = u > ROUNDING
-            apart = found.value - predicted.value
+            apart = actual.value - predicted.value
             errors.append(apart / (self.coverage_factor * u) if is_known else np.nan)
         return np.array(errors or [np.nan] * len(self.lines_of_machine))
 
@@ -232,8 +236,8 @@ class AdjustedMachine(Result):
         heads += [] if self.found is None else ["found", f"U (k = {k})", "E_n"]
         rows = [[*heads, "unit"]]
         errors = self.normalised_errors
-        for i, one in enumerate(self.lines_of_machine):
-            shown = {"rad": ARCSECOND, "1": 1e-6, "m": 1e-6}[one.unit]
+        for i, line in enumerate(self.lines_of_machine):
+            shown = {"rad": ARCSECOND, "1": 1e-6, "m": 1e-6}[line.unit]
             pairs = [self.before[i], self.predicted[i], *([self.found[i]] if self.found else [])]
             cells = [
                 cell
@@ -244,16 +248,16 @@ class AdjustedMachine(Result):
                 )
             ]
             cells += [] if self.found is None else [_shown(float(errors[i]), "-")]
-            unit = {"rad": "arcsec", "1": "µm/m", "m": "µm"}[one.unit]
-            rows.append([one.name, *cells, unit])
+            unit = {"rad": "arcsec", "1": "µm/m", "m": "µm"}[line.unit]
+            rows.append([line.name, *cells, unit])
         table = aligned(rows, [False, *[True] * (len(heads) - 1), False])
-        said = [
+        legend = [
             "(errors of scales: true length less reading; of angles: excess over 90 deg; of"
             " diagonals of the volume, + upwards and - downwards along x, y, z: true length less"
             " reading)"
         ]
-        changes = [one.words for one in self.changes]
-        return [*changes, *self.verdicts, "", *table, *said, "", self.headline()]
+        changes = [change.words for change in self.changes]
+        return [*changes, *self.verdicts, "", *table, *legend, "", self.headline()]
 
     def to_dict(self) -> dict[str, Any]:
         errors = self.normalised_errors
@@ -261,24 +265,24 @@ class AdjustedMachine(Result):
             "title": self.title,
             "changes": [
                 {
-                    "axis": AXIS_NAMES[one.axis],
-                    "amount": one.amount,
-                    "unit": "1" if one.towards is None else "rad",
-                    "towards": None if one.towards is None else AXIS_NAMES[one.towards],
-                    "words": one.words,
+                    "axis": AXIS_NAMES[change.axis],
+                    "amount": change.amount,
+                    "unit": "1" if change.towards is None else "rad",
+                    "towards": None if change.towards is None else AXIS_NAMES[change.towards],
+                    "words": change.words,
                 }
-                for one in self.changes
+                for change in self.changes
             ],
             "coverage_factor": self.coverage_factor,
             "quantities": {
-                one.name: {
-                    "unit": one.unit,
+                line.name: {
+                    "unit": line.unit,
                     "before": _data(self.before[i]),
                     "predicted": _data(self.predicted[i]),
                     **({} if self.found is None else {"found": _data(self.found[i])}),
                     "normalised_error": finite(float(errors[i])),
                 }
-                for i, one in enumerate(self.lines_of_machine)
+                for i, line in enumerate(self.lines_of_machine)
             },
             "within": self.is_within,
             "difference": None if self.difference is None else self.difference.to_dict(),
@@ -291,8 +295,8 @@ class AdjustedMachine(Result):
         nothing, errors = LineValue(np.nan, np.nan), self.normalised_errors
         return [
             {
-                "quantity": one.name,
-                "unit": one.unit,
+                "quantity": line.name,
+                "unit": line.unit,
                 "before": self.before[i].value,
                 "u before": self.before[i].standard_uncertainty,
                 "predicted": self.predicted[i].value,
@@ -301,7 +305,7 @@ class AdjustedMachine(Result):
                 "u found": (self.found[i] if self.found else nothing).standard_uncertainty,
                 "E_n": float(errors[i]),
             }
-            for i, one in enumerate(self.lines_of_machine)
+            for i, line in enumerate(self.lines_of_machine)
         ]
 
 
@@ -309,8 +313,8 @@ def _shown(value: float, otherwise: str = "undetermined") -> str:
     return otherwise if np.isnan(value) else number(value)
 
 
-def _data(one: LineValue) -> dict[str, Any]:
-    return {"value": finite(one.value), "standard_uncertainty": finite(one.standard_uncertainty)}
+def _data(line: LineValue) -> dict[str, Any]:
+    return {"value": finite(line.value), "standard_uncertainty": finite(line.standard_uncertainty)}
 
 
 def adjusted_machine(
@@ -333,15 +337,17 @@ def adjusted_machine(
             "the second campaign has readings of the first, from before the changes; name what was"
             " read after them, and nothing else"
         )
-    corners, other = (np.array(one.volume.corners) for one in (fitted, second or fitted))
-    if corners.shape != other.shape or not np.allclose(corners, other):
+    corners, to_corners = (
+        np.array(fitted_map.volume.corners) for fitted_map in (fitted, second or fitted)
+    )
+    if corners.shape != to_corners.shape or not np.allclose(corners, to_corners):
         raise ValueError("the second campaign is about another volume; compare maps of the same")
     lower, upper = corners
     lines = machine_lines(lower, upper)
     after = adjusted_map(fitted, changes, share)
     k = fitted.coverage_factor
     before, predicted = line_values(fitted, lines), line_values(after, lines)
-    found = None if second is None else line_values(second, lines)
+    measured = None if second is None else line_values(second, lines)
     difference = None
     if second is not None:
         # The changes' own uncertainty counts as part of the first campaign's, which is no smaller.
@@ -353,32 +359,38 @@ def adjusted_machine(
         lines,
         _listed(before),
         _listed(predicted),
-        None if found is None else _listed(found),
+        None if measured is None else _listed(measured),
         difference,
         k,
         after,
         _doubts(fitted, second),
         tuple(
-            verdict_line(one.lack_of_fit, which)
-            for which, one in zip(CAMPAIGNS, (fitted, second), strict=True)
-            if one is not None
+            verdict_line(fitted_map.lack_of_fit, campaign)
+            for campaign, fitted_map in zip(CAMPAIGNS, (fitted, second), strict=True)
+            if fitted_map is not None
         ),
     )
 
 
-def _listed(found: tuple[Array, Array]) -> tuple[LineValue, ...]:
-    values, root = found
+def _listed(figures: tuple[Array, Array]) -> tuple[LineValue, ...]:
+    values, root = figures
     u = np.linalg.norm(root, axis=1)
-    return tuple(LineValue(*one) for one in zip(values.tolist(), u.tolist(), strict=True))
+    return tuple(LineValue(*pair) for pair in zip(values.tolist(), u.tolist(), strict=True))
 
 
 def _doubts(*maps: FittedMap | None) -> tuple[str, ...]:
-    told = []
-    for which, one in zip(CAMPAIGNS, maps, strict=True):
-        if one is None:
+    doubts = []
+    for campaign, fitted_map in zip(CAMPAIGNS, maps, strict=True):
+        if fitted_map is None:
             continue
-        told.append(one.known_lack_of_fit.caution.replace("the map", which, 1))
-        if one.sigma_is_estimated:
-            remedy = f"a factor of {coverage_factor(one.degrees_of_freedom):.3g} would give 95 %"
-            told.append(few_degrees_of_freedom(one.degrees_of_freedom, f"sigma of {which}", remedy))
-    return tuple(filter(None, told))
+        doubts.append(fitted_map.known_lack_of_fit.caution.replace("the map", campaign, 1))
+        if fitted_map.sigma_is_estimated:
+            remedy = (
+                f"a factor of {coverage_factor(fitted_map.degrees_of_freedom):.3g} would give 95 %"
+            )
+            doubts.append(
+                few_degrees_of_freedom(
+                    fitted_map.degrees_of_freedom, f"sigma of {campaign}", remedy
+                )
+            )
+    return tuple(filter(None, doubts))

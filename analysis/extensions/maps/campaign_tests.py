@@ -81,8 +81,8 @@ def with_common(roots: Roots, common: Array, scatters: SigmaPair) -> Roots:
     variance belongs to either campaign.
     """
     first, second = (
-        np.hstack([root, one.sigma * np.sqrt(0.5) * common])
-        for root, one in zip(roots, scatters, strict=True)
+        np.hstack([root, scatter.sigma * np.sqrt(0.5) * common])
+        for root, scatter in zip(roots, scatters, strict=True)
     )
     return first, second
 
@@ -100,7 +100,7 @@ def joint_difference(
     size = np.linalg.norm(alone, axis=1)
     is_uncertain = size > HELD * size.max(initial=0.0)
     size = size[is_uncertain]
-    scaled, *parts = (one[is_uncertain] / size[:, None] for one in (alone, *roots))
+    scaled, *parts = (array[is_uncertain] / size[:, None] for array in (alone, *roots))
     basis = orthonormal(scaled)
     if not basis.shape[1]:
         return None
@@ -114,7 +114,7 @@ def joint_difference(
     spread, directions = np.linalg.eigh(first @ first.T + second @ second.T)
     is_fixed = spread <= FIXED**2
     fixed = directions[:, is_fixed]
-    left = size * (basis @ (triangle.T @ (fixed @ (fixed.T @ difference))))
+    fixed_differences = size * (basis @ (triangle.T @ (fixed @ (fixed.T @ difference))))
     to_unit = (directions[:, ~is_fixed] / np.sqrt(spread[~is_fixed])).T
     if not len(to_unit):
         return None
@@ -126,7 +126,7 @@ def joint_difference(
         float(welch(shares.mean(), scatters)),
         joint_chance(squares, shares, scatters),
         int(is_fixed.sum()),
-        float(np.abs(left).max()),
+        float(np.abs(fixed_differences).max()),
     )
 
 
@@ -143,7 +143,7 @@ def joint_chance(squares: Array, shares: Array, scatters: SigmaPair) -> float:
     from scipy.special import chdtrc, fdtrc
 
     count = len(squares)
-    if all(np.isinf(one.degrees_of_freedom) for one in scatters):
+    if all(np.isinf(scatter.degrees_of_freedom) for scatter in scatters):
         return float(chdtrc(count, squares.sum()))
     grid, quantiles = _quantiles(count, *_freedom(scatters))
     of_first, deviations, weights, total = _ratios(shares, scatters)
@@ -170,9 +170,9 @@ def single_chances(limit: float, shares: Array, scatters: SigmaPair) -> Array:
 
 def welch(share: Array | float, scatters: SigmaPair) -> Array:
     """Effective degrees of freedom of a variance of which the first campaign has a share."""
-    one, other = (scatter.degrees_of_freedom for scatter in scatters)
+    first, second = (scatter.degrees_of_freedom for scatter in scatters)
     with np.errstate(divide="ignore"):
-        return np.asarray(1.0 / (np.square(share) / one + np.square(1.0 - share) / other))
+        return np.asarray(1.0 / (np.square(share) / first + np.square(1.0 - share) / second))
 
 
 def _ratios(shares: Array, scatters: SigmaPair) -> tuple[Array, Array, Array, float]:
@@ -180,39 +180,39 @@ def _ratios(shares: Array, scatters: SigmaPair) -> tuple[Array, Array, Array, fl
     shares of the first campaign (k, n), the variances of differences over what they are estimated
     as (k, n), weights (k,) of the nodes, and the degrees of freedom of both together.
     """
-    one, other = _freedom(scatters)
-    part, weights = _nodes(one, other)
-    total = one + other
-    sigma = total * part / one, total * (1.0 - part) / other
-    own = shares / scatters[0].sigma ** 2, (1.0 - shares) / scatters[1].sigma ** 2
-    true = own[0] / (own[0] + own[1])
+    first, second = _freedom(scatters)
+    part, weights = _nodes(first, second)
+    total = first + second
+    sigma = total * part / first, total * (1.0 - part) / second
+    parts = shares / scatters[0].sigma ** 2, (1.0 - shares) / scatters[1].sigma ** 2
+    true = parts[0] / (parts[0] + parts[1])
     estimated = sigma[0] * true + sigma[1] * (1.0 - true)
     return sigma[0] * true / estimated, 1.0 / estimated, weights, total
 
 
 def _freedom(scatters: SigmaPair) -> tuple[float, float]:
-    one, other = (min(scatter.degrees_of_freedom, MANY) for scatter in scatters)
-    return one, other
+    first, second = (min(scatter.degrees_of_freedom, MANY) for scatter in scatters)
+    return first, second
 
 
 @lru_cache(maxsize=16)
-def _nodes(one: float, other: float) -> tuple[Array, Array]:
+def _nodes(first: float, second: float) -> tuple[Array, Array]:
     """Parts (k, 1) of the first campaign in the residual sum of squares of both, and weights."""
     from scipy.special import betaincinv
 
     places, weights = np.polynomial.legendre.leggauss(NODES)
-    return betaincinv(0.5 * one, 0.5 * other, 0.5 * (1.0 + places))[:, None], 0.5 * weights
+    return betaincinv(0.5 * first, 0.5 * second, 0.5 * (1.0 + places))[:, None], 0.5 * weights
 
 
 @lru_cache(maxsize=256)
-def _quantiles(count: int, one: float, other: float) -> tuple[Array, Array]:
+def _quantiles(count: int, first: float, second: float) -> tuple[Array, Array]:
     """Shares of the first campaign, and Fisher's quantile of so many differences at each, by which
     a sum of squares is larger for a scatter of few degrees of freedom.
     """
     from scipy.special import betaincinv
 
     shares = np.linspace(0.0, 1.0, SHARES)
-    freedom = 0.5 * welch(shares, (EstimatedSigma(1.0, one), EstimatedSigma(1.0, other)))
+    freedom = 0.5 * welch(shares, (EstimatedSigma(1.0, first), EstimatedSigma(1.0, second)))
     return shares, freedom * (1.0 / betaincinv(freedom, 0.5 * count, LEVEL) - 1.0)
 
 

@@ -63,12 +63,13 @@ class MappedValues:
     def without(self, basis: Array) -> MappedValues:
         """These less their parts in a space of changes of orthonormal columns (m, k)."""
 
-        def rest(some: Array) -> Array:
+        def remainder(some: Array) -> Array:
             return np.asarray(some - basis @ (basis.T @ some))
 
         # Twice, because the second pass takes out what rounding left of a large part in the first.
         values, root, null, shared = (
-            rest(rest(one)) for one in (self.values, self.root, self.null, self.shared)
+            remainder(remainder(array))
+            for array in (self.values, self.root, self.null, self.shared)
         )
         return MappedValues(values, root, null, self.size, shared)
 
@@ -130,7 +131,7 @@ class ComparedMap:
         rows = self.rows(points, offset)
         drawn = self.model.jacobian(points, np.zeros(len(self.values)), offsets)
         drawn = drawn.reshape(rows.shape)
-        effects = [one.effect for one in self.model.parameters]
+        effects = [parameter.effect for parameter in self.model.parameters]
         return MappedValues(
             (self.model.error(points, self.values, offsets) - offsets).ravel(),
             rows @ self.root,
@@ -150,15 +151,17 @@ class ComparedMap:
         lines = self.model.lines(function, t) if isinstance(self.model, HasLines) else ()
         if len(lines) != 1:
             return None
-        own = [k for k, one in enumerate(self.model.parameters) if one.function == function]
+        columns_of_function = [
+            k for k, parameter in enumerate(self.model.parameters) if parameter.function == function
+        ]
         basis = lines[0].basis
-        effects = np.array([self.model.parameters[k].effect for k in own])
+        effects = np.array([self.model.parameters[k].effect for k in columns_of_function])
         return MappedValues(
-            basis @ self.values[own],
-            basis @ self.root[own],
-            basis @ self.undetermined[own],
+            basis @ self.values[columns_of_function],
+            basis @ self.root[columns_of_function],
+            basis @ self.undetermined[columns_of_function],
             np.linalg.norm(basis / effects, axis=1),
-            basis @ self.shared[own],
+            basis @ self.shared[columns_of_function],
         )
 
     @cached_property
@@ -166,10 +169,10 @@ class ComparedMap:
         """Motions of the frame, and turns of the probe, that conditions of the model's frame take
         out: none of its parameters can make them.
         """
-        return self._held()
+        return self._held_motions()
 
     @single_threaded
-    def _held(self) -> tuple[str, ...]:
+    def _held_motions(self) -> tuple[str, ...]:
         d, volume = self.dimension, self.volume
         generator = np.random.default_rng(np.random.SeedSequence(0))
         count = POINTS + len(self.values)
@@ -181,9 +184,9 @@ class ComparedMap:
         columns = self.model.jacobian(x, np.zeros(len(self.values)), offsets).reshape(x.size, -1)
         size = np.linalg.norm(columns, axis=0)
         columns = columns / np.where(size > 0.0, size, 1.0)
-        left = wanted - columns @ np.linalg.lstsq(columns, wanted, rcond=1e-12)[0]
+        residual = wanted - columns @ np.linalg.lstsq(columns, wanted, rcond=1e-12)[0]
         names = (*MOTIONS[d], *(f"{name} of the probe" for name in MOTIONS[d][d:]))
-        missing = np.linalg.norm(left, axis=0) > CONTAINED
+        missing = np.linalg.norm(residual, axis=0) > CONTAINED
         return tuple(name for name, is_held in zip(names, missing, strict=True) if is_held)
 
 
@@ -195,21 +198,21 @@ def without_shared(root: Array, absorbed: Array | None) -> tuple[Array, Array]:
     if absorbed is None:
         return root, np.zeros((len(root), 0))
     _, sizes, axes = np.linalg.svd(absorbed, full_matrices=False)
-    kept = np.sqrt(np.maximum(1.0 - sizes**2, 0.0))
-    return root - (root @ axes.T * (1.0 - kept)) @ axes, root @ absorbed.T
+    remaining = np.sqrt(np.maximum(1.0 - sizes**2, 0.0))
+    return root - (root @ axes.T * (1.0 - remaining)) @ axes, root @ absorbed.T
 
 
 def in_common(first: ComparedMap, second: ComparedMap) -> InCommon:
     """What two maps have of each other's readings, which fits compare one by one."""
-    found = readings_in_common(first.data, second.data)
-    one, other = first.fit, second.fit
-    if found == "same" or one is None or other is None:
-        return found
-    read = same_readings(one.observed, other.observed)
-    knows_alike = maps_known(one.experiment) == maps_known(other.experiment)
-    if read == "same":
+    overlap = readings_in_common(first.data, second.data)
+    first_fit, second_fit = first.fit, second.fit
+    if overlap == "same" or first_fit is None or second_fit is None:
+        return overlap
+    of_readings = same_readings(first_fit.observed, second_fit.observed)
+    knows_alike = maps_known(first_fit.experiment) == maps_known(second_fit.experiment)
+    if of_readings == "same":
         return "same" if knows_alike else "some"
-    return "some" if "some" in (found, read) else "none"
+    return "some" if "some" in (overlap, of_readings) else "none"
 
 
 def positions_in_common(first: ComparedMap, second: ComparedMap) -> tuple[str, ...]:
@@ -217,16 +220,16 @@ def positions_in_common(first: ComparedMap, second: ComparedMap) -> tuple[str, .
     many they are.
     """
     if first.fit is not None and second.fit is not None:
-        read = same_positions(first.fit.observed, second.fit.observed)
-        if read:
-            return read
+        positions = same_positions(first.fit.observed, second.fit.observed)
+        if positions:
+            return positions
     if first.data is None or second.data is None:
         return ()
     common = first.data.common(second.data)
     for fit in filter(None, (second.fit, first.fit)):
         prints = position_fingerprints(fit.observed)
         if common <= set(prints.values()):
-            return tuple(name for name, one in prints.items() if one in common)
+            return tuple(name for name, fingerprint in prints.items() if fingerprint in common)
     return (number_of(len(common), "position"),) if common else ()
 
 
@@ -235,13 +238,13 @@ def motions(points: Array) -> Array:
     shifts in metres, turns about the origin in radians.
     """
     n, d = points.shape
-    found = np.zeros((n, d, pose_size(d)))
-    found[:, range(d), range(d)] = 1.0
+    columns = np.zeros((n, d, pose_size(d)))
+    columns[:, range(d), range(d)] = 1.0
     if d == 3:
-        found[:, :, d:] = cross_matrices(points)
+        columns[:, :, d:] = cross_matrices(points)
     else:
-        found[:, 0, d], found[:, 1, d] = -points[:, 1], points[:, 0]
-    return found
+        columns[:, 0, d], columns[:, 1, d] = -points[:, 1], points[:, 0]
+    return columns
 
 
 def map_of_fit(fit: Fit, label: str = "", date: str | None = None) -> ComparedMap:
@@ -249,21 +252,21 @@ def map_of_fit(fit: Fit, label: str = "", date: str | None = None) -> ComparedMa
 
     :raises ValueError: the fit has not converged.
     """
-    at = fit.functions.at
-    design, own = at.design, at.layout.model
+    linearisation = fit.functions.at
+    design, model_columns = linearisation.design, linearisation.layout.model
     # Such as those of maps that are prior knowledge.
     doubts = () if fit.experiment is None else fit.experiment.doubts
     return ComparedMap(
         label or fit.label,
         fit.title,
         design.model,
-        at.state.a,
-        fit.sigma * at.shared[own],
-        at.shared_null[own],
-        np.zeros((len(at.state.a), 0)),
+        linearisation.state.a,
+        fit.sigma * linearisation.shared[model_columns],
+        linearisation.shared_null[model_columns],
+        np.zeros((len(linearisation.state.a), 0)),
         fit.degrees_of_freedom if fit.sigma_is_estimated else np.inf,
         design.machine.volume,
-        dict(zip(design.probes.names, at.state.probes, strict=True)),
+        dict(zip(design.probes.names, linearisation.state.probes, strict=True)),
         design.probes.names[design.evaluation.probe],
         date,
         fit,
@@ -289,10 +292,10 @@ def expected_map(
     """
     described = Volumetric(machine)
     model: ErrorModel = described.truth.model
-    known, deviations = described.lasting
-    names = [one.name for one in model.parameters]
+    temperature, deviations = described.lasting
+    names = [parameter.name for parameter in model.parameters]
     root = np.zeros((len(names), len(deviations)))
-    for k, (field, deviation) in enumerate(zip(known.fields, deviations, strict=True)):
+    for k, (field, deviation) in enumerate(zip(temperature.fields, deviations, strict=True)):
         root[names.index(field.name), k] = deviation
     lower, upper = np.array(machine.lower), np.array(machine.upper)
     if dimension == 2:

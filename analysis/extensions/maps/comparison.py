@@ -84,8 +84,13 @@ class MapComparison:
     @property
     def groups(self) -> tuple[FigureGroup, ...]:
         """All figures, in the order in which they are told."""
-        of_functions = (one.figures for one in self.functions)
-        return (*self.lengths, self.places, *of_functions, *(one.figures for one in self.plates))
+        of_functions = (compared_part.figures for compared_part in self.functions)
+        return (
+            *self.lengths,
+            self.places,
+            *of_functions,
+            *(compared_part.figures for compared_part in self.plates),
+        )
 
 
 class NotComparableError(ValueError):
@@ -110,58 +115,62 @@ def compared(
     scatters = first.scatter, second.scatter
     k = settings.coverage_factor
 
-    def at(points: Array, offset: Array) -> ValueDifference:
-        one, other = (each.displacements(points, offset) for each in (first, second))
-        return ValueDifference(one, other, scatters)
+    def difference_at(points: Array, offset: Array) -> ValueDifference:
+        mapped_first, mapped_second = (
+            side.displacements(points, offset) for side in (first, second)
+        )
+        return ValueDifference(mapped_first, mapped_second, scatters)
 
     reference = even_grid(volume.lower, volume.upper, [settings.grid] * len(volume.lower))
     points = settings.points if isinstance(settings.points, np.ndarray) else reference
     _refuse_outside(points, volume)
-    found, offset = at(points, offsets[probe]), offsets[probe]
+    difference, offset = difference_at(points, offsets[probe]), offsets[probe]
     # The motion is that of the volume, wherever points were asked for.
     middle = reference.mean(axis=0)
     moving = motions(reference - middle).reshape(reference.size, -1)
     to_motion = np.asarray(np.linalg.pinv(moving))
-    motion = at(reference, offset).by(to_motion)
+    motion = difference_at(reference, offset).by(to_motion)
     if points is reference:
-        left = found.without(orthonormal(moving))
+        remainder = difference.without(orthonormal(moving))
     else:
         there = motions(points - middle).reshape(points.size, -1)
         less = np.concatenate([np.eye(points.size), -there @ to_motion], axis=1)
-        left = at(np.concatenate([points, reference]), offset).by(less)
+        remainder = difference_at(np.concatenate([points, reference]), offset).by(less)
     names = tuple(
         f"{axis} at {place}" for place in map(_place, points) for axis in AXIS_NAMES[: len(middle)]
     )
     corners = even_grid(volume.lower, volume.upper, [2] * len(volume.lower))
-    of_corners = at(corners, offset)
+    of_corners = difference_at(corners, offset)
     lengths = [
         _lengths(of_corners, corners, kind, pairs, (first, second), k)
         for kind, pairs in _of_corners(corners)
     ]
     pairs = np.array(list(combinations(range(len(points)), 2)), np.int64).reshape(-1, 2)
     pairs = pairs[(points[pairs[:, 0]] != points[pairs[:, 1]]).any(axis=1)]
-    what = "lengths through the volume" if settings.points is None else "lengths between the points"
-    lengths.append(_lengths(found, points, what, pairs, (first, second), k))
+    kind_of_lengths = (
+        "lengths through the volume" if settings.points is None else "lengths between the points"
+    )
+    lengths.append(_lengths(difference, points, kind_of_lengths, pairs, (first, second), k))
     functions, why = _functions(first, second, k)
-    count = max(LEAST_POINTS, *(len(one.values) for one in (first, second)))
+    count = max(LEAST_POINTS, *(len(side.values) for side in (first, second)))
     return MapComparison(
         volume,
         probe,
         points,
         FrameMotion(MOTIONS[len(middle)], motion.values, motion.standard_uncertainties()),
         tuple(lengths),
-        left.group("errors at points of the volume", "m", names, k),
+        remainder.group("errors at points of the volume", "m", names, k),
         functions,
         why,
         plate_differences(first, second, k),
-        _whole(at, volume, offsets, count),
+        _whole(difference_at, volume, offsets, count),
     )
 
 
 def _linearised_alike(first: ComparedMap, second: ComparedMap) -> tuple[ComparedMap, ComparedMap]:
     """Both maps with derivatives at the same parameters, where they have the same."""
-    both = [[(p.name, p.effect) for p in one.model.parameters] for one in (first, second)]
-    if type(first.model) is not type(second.model) or both[0] != both[1]:
+    effects = [[(p.name, p.effect) for p in side.model.parameters] for side in (first, second)]
+    if type(first.model) is not type(second.model) or effects[0] != effects[1]:
         return first, second
     about = 0.5 * (first.values + second.values)
     return replace(first, about=about), replace(second, about=about)
@@ -183,24 +192,24 @@ def _offsets(
     An offset of the first map serves for both: it is shifted by less than matters wherever probes
     were qualified anew.
     """
-    has = [one for one in (first, second) if not one.is_expected]
+    has = [side for side in (first, second) if not side.is_expected]
     if not has:
         # Two described machines: the reference point itself.
         return "", {"": np.zeros(first.dimension)}
     offsets = {
         name: offset
         for name, offset in has[0].offsets.items()
-        if all(name in one.offsets for one in has)
+        if all(name in side.offsets for side in has)
     }
     if probe is None:
-        ranked = [one.probe for one in has if one.probe in offsets] or list(offsets)
+        ranked = [side.probe for side in has if side.probe in offsets] or list(offsets)
         if not ranked:
-            text = ", ".join(f"{one.label} has {', '.join(one.offsets)}" for one in has)
+            text = ", ".join(f"{side.label} has {', '.join(side.offsets)}" for side in has)
             raise NotComparableError(f"the maps have no probe of the same name: {text}")
         probe = ranked[0]
     if probe not in offsets:
-        known = ", ".join(offsets) or "none"
-        raise NotComparableError(f'no probe "{probe}" in both maps; in both: {known}')
+        names = ", ".join(offsets) or "none"
+        raise NotComparableError(f'no probe "{probe}" in both maps; in both: {names}')
     return probe, offsets
 
 
@@ -233,7 +242,7 @@ def _of_corners(corners: Array) -> Iterator[tuple[str, Integers]]:
 
 
 def _lengths(
-    found: ValueDifference,
+    difference: ValueDifference,
     points: Array,
     kind: str,
     pairs: Integers,
@@ -252,9 +261,9 @@ def _lengths(
     matrix[rows, pairs[:, 0]] = -apart / length[:, None]
     names = tuple(f"{_place(points[i])} to {_place(points[j])}" for i, j in pairs.tolist())
     first, second = (
-        0.0 if one.stated is None else np.square(one.stated.at(length)) for one in maps
+        0.0 if side.stated is None else np.square(side.stated.at(length)) for side in maps
     )
-    return found.by(matrix.reshape(len(pairs), -1)).group(
+    return difference.by(matrix.reshape(len(pairs), -1)).group(
         kind, "m", names, coverage_factor, (first, second)
     )
 
@@ -264,44 +273,46 @@ def _functions(
 ) -> tuple[tuple[FunctionDifference, ...], str]:
     """Error functions that both maps have, or why they are not compared."""
     names = [
-        list(dict.fromkeys(p.function for p in one.model.parameters)) for one in (first, second)
+        list(dict.fromkeys(p.function for p in line.model.parameters)) for line in (first, second)
     ]
-    if not all(isinstance(one.model, HasLines) for one in (first, second)):
+    if not all(isinstance(side.model, HasLines) for side in (first, second)):
         return (), "a model without error functions of one variable"
     if not _have_same_functions(first.model, second.model) or set(names[0]) != set(names[1]):
         return (), "the models, or the conditions of their frames, differ"
-    found = []
+    differences = []
     scatters = first.scatter, second.scatter
     dense = np.linspace(0.0, 1.0, 4 * max(len(first.values), 8))
     for name in names[0]:
         parameter = next(p for p in first.model.parameters if p.function == name)
         is_number = sum(p.function == name for p in first.model.parameters) == 1
-        whole, others = (one.line(name, dense) for one in (first, second))
+        first_dense, second_dense = (side.line(name, dense) for side in (first, second))
         # Along the whole axis: a straightness is zero at both ends.
         constant = is_number and all(
-            one is not None and float(np.ptp(one.values)) == 0.0 for one in (whole, others)
+            line is not None and float(np.ptp(line.values)) == 0.0
+            for line in (first_dense, second_dense)
         )
         t = np.array([1.0]) if constant else PLACES
-        one, other = (each.line(name, t) for each in (first, second))
-        if one is None or other is None or whole is None or others is None:
+        first_line, second_line = (side.line(name, t) for side in (first, second))
+        if first_line is None or second_line is None or first_dense is None or second_dense is None:
             continue
         words = (name,) if constant else tuple(f"{name} at {100 * place:.0f} %" for place in t)
-        figures = ValueDifference(one, other, scatters).group(
+        figures = ValueDifference(first_line, second_line, scatters).group(
             name, parameter.unit, words, coverage_factor
         )
-        test = ValueDifference(whole, others, scatters).joint_test(name)
-        found.append(FunctionDifference(name, parameter.meaning, figures, test))
-    return tuple(found), "" if found else "the models have no error functions of one variable"
+        test = ValueDifference(first_dense, second_dense, scatters).joint_test(name)
+        differences.append(FunctionDifference(name, parameter.meaning, figures, test))
+    why = "" if differences else "the models have no error functions of one variable"
+    return tuple(differences), why
 
 
-def _have_same_functions(one: ErrorModel, other: ErrorModel) -> bool:
+def _have_same_functions(model: ErrorModel, other_model: ErrorModel) -> bool:
     """Whether error functions of the same name are the same in both models: in the same frame and
     volume, whatever their numbers of coefficients.
     """
-    if type(one) is not type(other):
+    if type(model) is not type(other_model):
         return False
     for name in SAME:
-        ours, theirs = getattr(one, name, None), getattr(other, name, None)
+        ours, theirs = getattr(model, name, None), getattr(other_model, name, None)
         is_same = ours == theirs
         if isinstance(ours, ErrorModel) and isinstance(theirs, ErrorModel):
             is_same = _have_same_functions(ours, theirs)
@@ -310,14 +321,16 @@ def _have_same_functions(one: ErrorModel, other: ErrorModel) -> bool:
     return True
 
 
-def _whole(at: Any, volume: Volume, offsets: dict[str, Array], count: int) -> JointTest | None:
+def _whole(
+    difference_at: Any, volume: Volume, offsets: dict[str, Array], count: int
+) -> JointTest | None:
     """The test of errors through the volume with all common probes together, whatever the frame
     and the offsets of the probes.
     """
     d = len(volume.lower)
     generator = np.random.default_rng(np.random.SeedSequence(1))
     points = generator.uniform(volume.lower, volume.upper, (count, d))
-    parts = [at(points, offset) for offset in offsets.values()]
+    parts = [difference_at(points, offset) for offset in offsets.values()]
     moving = motions(points - points.mean(axis=0)).reshape(points.size, -1)
     free = np.zeros((len(parts), points.size, moving.shape[1] + d * (len(parts) - 1)))
     free[:, :, : moving.shape[1]] = moving
@@ -326,13 +339,13 @@ def _whole(at: Any, volume: Volume, offsets: dict[str, Array], count: int) -> Jo
         free[k, :, start : start + d] = np.tile(np.eye(d), (count, 1))
     basis = orthonormal(free.reshape(-1, free.shape[2]))
     joined = [
-        type(one)(
+        type(values)(
             *(
                 np.concatenate([getattr(getattr(part, side), name) for part in parts])
                 for name in ("values", "root", "null", "size", "shared")
             )
         )
-        for side, one in (("first", parts[0].first), ("second", parts[0].second))
+        for side, values in (("first", parts[0].first), ("second", parts[0].second))
     ]
-    found = ValueDifference(joined[0], joined[1], parts[0].scatters)
-    return found.without(basis).joint_test("errors through the volume")
+    joined_difference = ValueDifference(joined[0], joined[1], parts[0].scatters)
+    return joined_difference.without(basis).joint_test("errors through the volume")

@@ -46,12 +46,12 @@ def run(options: Namespace) -> int:
 
     from .converted_map import convert
 
-    found = convert(fitted_map(options.map), options.to, options.map.stem)
+    conversion = convert(fitted_map(options.map), options.to, options.map.stem)
     if options.output:
-        write(options, {options.output: lambda path: write_map(found.map, path)})
-    show(options, found)
-    for note in found.notes:
+        write(options, {options.output: lambda path: write_map(conversion.map, path)})
+    show(options, conversion)
+    for note in conversion.notes:
         complain(note)
-    if not found.is_exact:
+    if not conversion.is_exact:
         complain("the new error model cannot follow the old one exactly; see the residuals")
-    return 0 if found.is_exact else 1
+    return 0 if conversion.is_exact else 1

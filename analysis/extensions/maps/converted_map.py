@@ -55,9 +55,13 @@ class ConvertedMap(Result):
         converted = self.conversion.converted
         name = f"conversion from {self.old.settings['kind']}"
         residual = 0.0 if self.is_exact else self.residual[0]
-        one = LeftOut(name, CONVERSION, "m", residual, None)
-        earlier = (other for other in converted.left_out if other.kind != CONVERSION)
-        return replace(converted, left_out=(*earlier, one))
+        conversion_residual = LeftOut(name, CONVERSION, "m", residual, None)
+        earlier = (
+            earlier_residual
+            for earlier_residual in converted.left_out
+            if earlier_residual.kind != CONVERSION
+        )
+        return replace(converted, left_out=(*earlier, conversion_residual))
 
     @property
     def residual(self) -> tuple[float, float]:
@@ -107,7 +111,7 @@ class ConvertedMap(Result):
         if self.is_exact:
             lines.append("the new error model does all that the old one did")
         else:
-            largest, rms = (number(1e6 * one, 3) for one in self.residual)
+            largest, rms = (number(1e6 * length, 3) for length in self.residual)
             places = self.points_searched.places
             lines.append(
                 "the new error model cannot follow the old one exactly: corrected points differ by"
@@ -115,7 +119,7 @@ class ConvertedMap(Result):
                 " points on a grid with corners and edges and at random, with the probes of the map"
                 " and tips along each axis; uncertainties do not contain that"
             )
-        largest, rms = (number(1e6 * one, 3) for one in self.lengths)
+        largest, rms = (number(1e6 * length, 3) for length in self.lengths)
         beside = (
             "lengths are undetermined"
             if self.length_uncertainty is None
@@ -129,7 +133,7 @@ class ConvertedMap(Result):
         )
         if np.abs(self.conversion.motion).max() > EXACT:
             d = old.dimension
-            shift, turn = (np.abs(one).max() for one in np.split(self.conversion.motion, [d]))
+            shift, turn = (np.abs(part).max() for part in np.split(self.conversion.motion, [d]))
             lines.append(
                 "between the frames of the two models lies a rigid motion, which changes no length:"
                 f" a shift of {number(1e6 * float(shift), 3)} µm and a turn of"
@@ -163,8 +167,10 @@ class ConvertedMap(Result):
         new, u = self.map, self.map.standard_uncertainties()
         values = np.where(np.isnan(u), np.nan, new.estimates).tolist()
         return [
-            ParameterEstimate(one.name, value, uncertainty, one.unit)
-            for one, value, uncertainty in zip(new.parameters, values, u.tolist(), strict=True)
+            ParameterEstimate(parameter.name, value, uncertainty, parameter.unit)
+            for parameter, value, uncertainty in zip(
+                new.parameters, values, u.tolist(), strict=True
+            )
         ]
 
 
@@ -183,7 +189,7 @@ def convert(fitted: FittedMap, to: str, label: str) -> ConvertedMap:
     :raises ExperimentError: it states none.
     """
     target = stated_model(to, fitted.volume, "--to")
-    found = converted(fitted, target.model, target.settings, FRAMES[target.kind])
+    conversion = converted(fitted, target.model, target.settings, FRAMES[target.kind])
     generator = np.random.default_rng(np.random.SeedSequence(1))
     points = fitted.volume.lower + fitted.volume.size * generator.random((POINTS, fitted.dimension))
     old, root = corrected_with_root(fitted, points)
@@ -191,15 +197,15 @@ def convert(fitted: FittedMap, to: str, label: str) -> ConvertedMap:
     unit = old[first] - old[second]
     unit /= np.linalg.norm(unit, axis=1)[:, None]
     u = np.linalg.norm(np.einsum("md,mdr->mr", unit, root[first] - root[second]), axis=1)
-    known = bool(np.isfinite(u).all())
+    is_determined = bool(np.isfinite(u).all())
     probes = np.unique(fitted.probes.offsets, axis=0)
     return ConvertedMap(
         label,
         fitted,
-        found,
-        largest_at_points(found.differences, fitted.volume, found.tips),
+        conversion,
+        largest_at_points(conversion.differences, fitted.volume, conversion.tips),
         largest_of_lengths(
-            _corrections(fitted), _corrections(found.converted), fitted.volume, probes
+            _corrections(fitted), _corrections(conversion.converted), fitted.volume, probes
         ),
-        float(np.sqrt((u**2).mean())) if known else None,
+        float(np.sqrt((u**2).mean())) if is_determined else None,
     )

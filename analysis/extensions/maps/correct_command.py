@@ -118,38 +118,38 @@ def run(options: Namespace) -> int:
     if probe not in names:
         raise UsageError(f'--probe: no probe "{probe}" in the map; {hint(probe, names)}')
     offsets = fitted.drawn_offsets if options.coordinates == CENTRES else None
-    given = read_points(options.points, names, probe, fitted.volume, offsets)
-    if options.covariance and given.points.size > MOST_CO_ORDINATES:
-        text = f"--covariance of {given.points.size} co-ordinates is too large; at most"
+    scales = read_points(options.points, names, probe, fitted.volume, offsets)
+    if options.covariance and scales.points.size > MOST_CO_ORDINATES:
+        text = f"--covariance of {scales.points.size} co-ordinates is too large; at most"
         raise UsageError(f"{text} {MOST_CO_ORDINATES} are possible: correct fewer points at once")
     try:
-        found = correction(
+        corrected = correction(
             fitted,
-            given,
-            _wanted(options, fitted, given),
+            scales,
+            _wanted(options, fitted, scales),
             options.coverage_factor,
             options.with_repeatability,
         )
     except ValueError as error:
         raise UsageError(error) from None
-    contents: dict[Path | None, Writer] = {options.output: text_writer(found.write_points)}
-    contents[options.covariance] = text_writer(found.write_covariance)
+    contents: dict[Path | None, Writer] = {options.output: text_writer(corrected.write_points)}
+    contents[options.covariance] = text_writer(corrected.write_covariance)
     write(options, contents)
-    show(options, found)
-    warn(found.warnings)
-    return 1 if found.is_open else 0
+    show(options, corrected)
+    warn(corrected.warnings)
+    return 1 if corrected.is_open else 0
 
 
-def _wanted(options: Namespace, fitted: FittedMap, given: GivenPoints) -> Tasks:
+def _wanted(options: Namespace, fitted: FittedMap, scale_points: GivenPoints) -> Tasks:
     """The lengths that the options ask for."""
     from ballplate.simulator.experiment import load
 
     from .selected_lengths import between_listed, between_named, tasks_of_experiment
 
-    found = between_named(given, [(first, second) for first, second in options.length])
+    tasks = between_named(scale_points, [(first, second) for first, second in options.length])
     if options.lengths:
-        found = found.beside(between_listed(given, options.lengths))
+        tasks = tasks.beside(between_listed(scale_points, options.lengths))
     if options.tasks:
         for experiment in load(options.tasks):
-            found = found.beside(tasks_of_experiment(fitted, experiment))
-    return found
+            tasks = tasks.beside(tasks_of_experiment(fitted, experiment))
+    return tasks

@@ -51,8 +51,8 @@ def _rows(
         by_offset = offset_sensitivity(fitted.model, points, a, offsets)
         columns = fitted.offset_columns[indices]
         for axis in range(fitted.dimension):
-            own = np.flatnonzero(columns[:, axis] >= 0)
-            rows[own, :, columns[own, axis]] = by_offset[own, :, axis]
+            free = np.flatnonzero(columns[:, axis] >= 0)
+            rows[free, :, columns[free, axis]] = by_offset[free, :, axis]
     return rows
 
 
@@ -65,8 +65,8 @@ def tips(fitted: FittedMap, points: Array, probes: Integers | int | None = None)
 
 def probe_indices(fitted: FittedMap, count: int, probes: Integers | int | None = None) -> Integers:
     """Indices (count,) of probes, by default all of them that of the map."""
-    given = fitted.probes.names.index(fitted.probe) if probes is None else probes
-    return np.broadcast_to(np.asarray(given, np.int64), count)
+    indices = fitted.probes.names.index(fitted.probe) if probes is None else probes
+    return np.broadcast_to(np.asarray(indices, np.int64), count)
 
 
 @single_threaded
@@ -76,10 +76,10 @@ def corrected_with_root(
     """Corrected points (n, d) and a square root (n, d, r) of their joint covariance, in metres; NaN
     where a co-ordinate is undetermined.
     """
-    found = list(_in_parts(fitted, points, probe_indices(fitted, len(points), probes)))
-    if not found:
+    parts = list(_in_parts(fitted, points, probe_indices(fitted, len(points), probes)))
+    if not parts:
         return np.zeros(points.shape), np.zeros((*points.shape, fitted.root.shape[1]))
-    places, roots = zip(*found, strict=True)
+    places, roots = zip(*parts, strict=True)
     return np.concatenate(places), np.concatenate(roots)
 
 

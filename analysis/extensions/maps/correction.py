@@ -99,7 +99,7 @@ class Correction(Result):
     @property
     def is_open(self) -> bool:
         """Whether a co-ordinate or a length is undetermined."""
-        lengths = [one.standard_uncertainty for one in self.lengths]
+        lengths = [length.standard_uncertainty for length in self.lengths]
         return bool(np.isnan(self.points).any() or np.isnan(lengths).any())
 
     def covariance(self) -> Array:
@@ -125,47 +125,49 @@ class Correction(Result):
         count = number_of(len(self.points), "point")
         if np.isnan(u).all():
             return f"{count}, undetermined"
-        told = f", {open_} of them undetermined" if open_ else ""
+        missing = f", {open_} of them undetermined" if open_ else ""
         largest = float(np.nanmax(u))
-        return f"{count}{told}; U = {self.coverage_factor:g} u = {number(1e6 * largest)} µm at most"
+        u_text = f"U = {self.coverage_factor:g} u = {number(1e6 * largest)} µm at most"
+        return f"{count}{missing}; {u_text}"
 
     @property
     def warnings(self) -> tuple[str, ...]:
         """What a user of the points has to know: extrapolation, few degrees of freedom, what is not
         applied.
         """
-        fitted, found = self.fitted, [self.fitted.known_lack_of_fit.caution]
+        fitted, cautions = self.fitted, [self.fitted.known_lack_of_fit.caution]
         outside = np.flatnonzero(self.outside)
         if len(outside):
             words = listing((self.given.name(int(i)) for i in outside), 3)
-            found.append(
+            cautions.append(
                 f"{len(outside)} of {len(self.points)} points lie outside the volume of the map,"
                 f" where it is extrapolated and its uncertainty need not hold: {words}"
             )
         if fitted.without_scatter:
-            found.append(
+            cautions.append(
                 "the readings of the map agree with its model but for rounding, as computed ones"
                 " do: its uncertainties are zero, too, and cannot be relied on"
             )
         if fitted.sigma_is_estimated:
             remedy = f"expanded uncertainties with k = {self.coverage_factor:g} may be too small"
             freedom = fitted.degrees_of_freedom
-            found.append(few_degrees_of_freedom(freedom, "sigma", remedy))
+            cautions.append(few_degrees_of_freedom(freedom, "sigma", remedy))
         if not stretches(fitted.model, fitted.volume, fitted.values):
-            found.append(OWN_SCALES)
+            cautions.append(OWN_SCALES)
         if fitted.left_out:
-            found.append(left_out_words(fitted))
-        return tuple(filter(None, found))
+            cautions.append(left_out_words(fitted))
+        return tuple(filter(None, cautions))
 
     def lines(self) -> list[str]:
         fitted, k = self.fitted, self.coverage_factor
         how = "estimated" if fitted.sigma_is_estimated else "as given"
-        of = f" of {fitted.date}" if fitted.date else ""
+        dated = f" of {fitted.date}" if fitted.date else ""
         scatter = "with" if self.scatter else "without"
         lines = [
             f"{fitted.title}: {self.headline()}",
-            f"map{of}: sigma {fitted.sigma:.4g} ({how}), {freedom_words(fitted.degrees_of_freedom)}"
-            f"; U = {k:g} u, {scatter} the scatter of the readings that are corrected",
+            f"map{dated}: sigma {fitted.sigma:.4g} ({how}),"
+            f" {freedom_words(fitted.degrees_of_freedom)}; U = {k:g} u, {scatter} the scatter of"
+            " the readings that are corrected",
             verdict_line(fitted.lack_of_fit),
             "a correction is added to what the scales say with the stated offset of the probe; the"
             " error of indication has the opposite sign",
@@ -176,11 +178,11 @@ class Correction(Result):
         return [*lines, "", *self._length_table()] if self.lengths else lines
 
     def _temperature_lines(self) -> list[str]:
-        stated = self.fitted.temperatures
-        if not stated:
+        temperatures = self.fitted.temperatures
+        if not temperatures:
             return []
-        told = ", ".join(f"{word} {value:.4g} °C" for word, value in stated.items())
-        return [f"temperatures of the campaign: {told}; corrected for none of the points"]
+        words = ", ".join(f"{word} {value:.4g} °C" for word, value in temperatures.items())
+        return [f"temperatures of the campaign: {words}; corrected for none of the points"]
 
     def _columns(self, most: int | None = None) -> dict[str, Any]:
         """The columns of the first points."""
@@ -194,24 +196,26 @@ class Correction(Result):
 
     def _point_table(self) -> list[str]:
         u = by_axis("U {}, µm", self.expanded_uncertainties[:SHOWN], 3)
-        found = table_lines(self._columns(SHOWN) | u, unknown="undetermined")
+        table = table_lines(self._columns(SHOWN) | u, unknown="undetermined")
         more = len(self.points) - SHOWN
-        return [*found, f"(and {more} more points, which -o writes)"] if more > 0 else found
+        return [*table, f"(and {more} more points, which -o writes)"] if more > 0 else table
 
     def _length_table(self) -> list[str]:
         k, u = self.coverage_factor, "standard_uncertainty"
         columns = {
             "length": "name",
             "corrected, mm": ("value", u),
-            "correction, µm": (lambda one: one.value - one.read, u),
-            "U, µm": (lambda one: k * one.standard_uncertainty, 3),
-            "k": (lambda one: k, "{:g}".format),
+            "correction, µm": (lambda length: length.value - length.read, u),
+            "U, µm": (lambda length: k * length.standard_uncertainty, 3),
+            "k": (lambda length: k, "{:g}".format),
             "within target": "is_met",
         }
-        without = None if any(one.target is not None for one in self.lengths) else "within target"
-        found = table_lines(columns, self.lengths[:SHOWN], without, "undetermined")
+        without = (
+            None if any(length.target is not None for length in self.lengths) else "within target"
+        )
+        table = table_lines(columns, self.lengths[:SHOWN], without, "undetermined")
         more = len(self.lengths) - SHOWN
-        return [*found, f"(and {more} more lengths, which --json has)"] if more > 0 else found
+        return [*table, f"(and {more} more lengths, which --json has)"] if more > 0 else table
 
     def write_points(self, stream: TextIO) -> None:
         """Write the points as a CSV file, in units that its columns name; what is undetermined is
@@ -234,7 +238,13 @@ class Correction(Result):
             [1e3 * self.points, 1e6 * self.corrections, 1e6 * self.expanded_uncertainties], axis=1
         )
         names = self._columns()
-        yield ["name", "probe", *(one.format(a) for one in heads for a in axes), "k", "outside"]
+        yield [
+            "name",
+            "probe",
+            *(template.format(a) for template in heads for a in axes),
+            "k",
+            "outside",
+        ]
         for name, probe, row, is_outside in zip(
             names["point"], names["probe"], _cells(numbers), self.outside, strict=True
         ):
@@ -264,12 +274,12 @@ class Correction(Result):
             ),
             "lengths": [
                 {
-                    **picked(one, "name", "value"),
-                    "correction": one.value - one.read,
-                    "standard_uncertainty": one.standard_uncertainty,
-                    "within_target": one.is_met,
+                    **picked(length, "name", "value"),
+                    "correction": length.value - length.read,
+                    "standard_uncertainty": length.standard_uncertainty,
+                    "within_target": length.is_met,
                 }
-                for one in self.lengths
+                for length in self.lengths
             ],
             "warnings": list(self.warnings),
         }
@@ -308,16 +318,16 @@ def correction(
     places, blocks = corrected_with_blocks(fitted, given.points, given.probes)
     blocks = blocks + np.diag((scatter * fitted.repeatability) ** 2)
     places = np.where(np.isnan(np.diagonal(blocks, axis1=1, axis2=2)), np.nan, places)
-    found: tuple[CorrectedLength, ...] = ()
+    corrected_lengths: tuple[CorrectedLength, ...] = ()
     if lengths is not None and len(lengths.names):
         ends = lengths.points.reshape(-1, fitted.dimension)
         pairs = np.arange(len(ends)).reshape(-1, 2)
         mapped = mapped_lengths(fitted, ends, lengths.probes.ravel(), pairs, scatter)
         values = np.where(np.isnan(mapped.standard_uncertainties), np.nan, mapped.values)
         uncertainties = mapped.standard_uncertainties.tolist()
-        found = tuple(
-            CorrectedLength(*one)
-            for one in zip(
+        corrected_lengths = tuple(
+            CorrectedLength(*figures)
+            for figures in zip(
                 lengths.names,
                 mapped.read.tolist(),
                 values.tolist(),
@@ -327,4 +337,4 @@ def correction(
             )
         )
     factor = coverage_factor or fitted.coverage_factor
-    return Correction(fitted, given, places, blocks, found, factor, scatter)
+    return Correction(fitted, given, places, blocks, corrected_lengths, factor, scatter)

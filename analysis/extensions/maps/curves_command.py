@@ -57,10 +57,10 @@ def add_options(parser: ArgumentParser) -> None:
 
 
 def _points(text: str) -> int:
-    found = count(text)
-    if not 2 <= found <= MOST_POSITIONS:
-        raise ArgumentTypeError(f"a line has 2 to {MOST_POSITIONS} positions, not {found}")
-    return found
+    positions = count(text)
+    if not 2 <= positions <= MOST_POSITIONS:
+        raise ArgumentTypeError(f"a line has 2 to {MOST_POSITIONS} positions, not {positions}")
+    return positions
 
 
 def run(options: Namespace) -> int:
@@ -70,23 +70,23 @@ def run(options: Namespace) -> int:
 
     fitted = fitted_map(options.file)
     try:
-        found = error_curves(fitted, options.file.stem, options.error, options.points or POSITIONS)
+        curves = error_curves(fitted, options.file.stem, options.error, options.points or POSITIONS)
     except ValueError as error:
         raise UsageError(error) from None
-    show_errors(options, found, found.plot)
+    show_errors(options, curves, curves.plot)
     return 0
 
 
 def show_errors(
-    options: Namespace, found: MachineErrors | FittedErrorMap | ErrorCurves, draw: Writer
+    options: Namespace, errors: MachineErrors | FittedErrorMap | ErrorCurves, draw: Writer
 ) -> None:
     """Say what is to be known of errors, draw them, and print them in the form asked for."""
-    for note in found.notes:
+    for note in errors.notes:
         complain(note)
     # Before anything is printed that nobody may read to its end.
     if options.plot is not None:
         write_picture(options, draw)
     if options.format == "json":
-        print_json([found.to_dict()])
+        print_json([errors.to_dict()])
     else:
-        print_lines(found.lines() if options.format == "text" else list(found.point_lines()))
+        print_lines(errors.lines() if options.format == "text" else list(errors.point_lines()))

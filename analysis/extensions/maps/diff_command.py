@@ -108,10 +108,10 @@ def add_options(parser: ArgumentParser) -> None:
 
 
 def _grid(text: str) -> int:
-    found = whole(text, LEAST)
-    if found > MOST:
-        raise ArgumentTypeError(f"a grid has {LEAST} to {MOST} points along an axis, not {found}")
-    return found
+    points = whole(text, LEAST)
+    if points > MOST:
+        raise ArgumentTypeError(f"a grid has {LEAST} to {MOST} points along an axis, not {points}")
+    return points
 
 
 def run(options: Namespace) -> int:
@@ -126,25 +126,25 @@ def run(options: Namespace) -> int:
 
     k = options.coverage_factor
     try:
-        stated = None
+        standard = None
         if options.stated is not None:
-            stated = Target(parse_length_function(options.stated), k).standard
+            standard = Target(parse_length_function(options.stated), k).standard
         first, second = (
             options.files
             if options.readings is None
             else map(fit_of_file, options.files, options.readings)
         )
-        found = map_difference(
+        difference = map_difference(
             (first, second),
             ComparisonSettings(k, options.grid, options.points, options.probe),
             options.shared is not None,
-            stated,
+            standard,
             (options.dates[0], options.dates[1]),
         )
     except (NotComparableError, NothingSharedError, QuantityError) as error:
         raise UsageError(error) from None
-    write(options, {options.output: found.to_csv, options.plot: found.plot})
-    show(options, found)
-    for note in found.notes:
+    write(options, {options.output: difference.to_csv, options.plot: difference.plot})
+    show(options, difference)
+    for note in difference.notes:
         complain(note)
-    return 1 if options.fail and found.is_changed is not False else 0
+    return 1 if options.fail and difference.is_changed is not False else 0

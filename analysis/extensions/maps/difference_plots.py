@@ -38,7 +38,9 @@ LONGEST = 0.15
 LEAST_END, MOST_MARKS = 2.0, 400
 
 
-def draw_difference(found: MapComparison, words: str, path: str | Path | None = None) -> Figure:
+def draw_difference(
+    comparison: MapComparison, words: str, path: str | Path | None = None
+) -> Figure:
     """The difference at points of the volume, those of |E_n| > 1 in a colour, and |E_n| of all
     figures in rows; it is written to the path, if there is one.
 
@@ -46,40 +48,40 @@ def draw_difference(found: MapComparison, words: str, path: str | Path | None = 
     :raises ValueError: the name ends in none of the kinds of pictures.
     :raises OSError: the file cannot be written.
     """
-    groups = [one for one in found.groups if one.count]
+    groups = [group for group in comparison.groups if group.count]
     rows = ROW * len(groups) + BELOW + ABOVE
     with drawing(SCENE + rows, WIDTH) as figure:
         scene = placed_axes(figure, 0.0, rows, WIDTH, SCENE - 24.0)
         scene.set_axis_off()
         scene.set_aspect("equal")
-        _vectors(scene, found)
+        _vectors(scene, comparison)
         axes = placed_axes(figure, LEFT, BELOW, WIDTH - LEFT - RIGHT, rows - BELOW - ABOVE)
         _rows(axes, groups)
         return save(figure, path, words)
 
 
-def _vectors(axes: Axes, found: MapComparison) -> None:
-    points, d = found.points, len(found.volume.lower)
+def _vectors(axes: Axes, comparison: MapComparison) -> None:
+    points, d = comparison.points, len(comparison.volume.lower)
     view, _ = projection(d)
-    volume = box(found.volume.lower, found.volume.upper)
+    volume = box(comparison.volume.lower, comparison.volume.upper)
     draw_box(axes, volume)
-    moved = found.places.differences.reshape(points.shape)
-    is_open = np.isnan(found.places.standard_uncertainties).reshape(points.shape).any(axis=1)
-    changed = (np.abs(np.nan_to_num(found.places.normalised)) > 1.0).reshape(points.shape)
+    moved = comparison.places.differences.reshape(points.shape)
+    is_open = np.isnan(comparison.places.standard_uncertainties).reshape(points.shape).any(axis=1)
+    changed = (np.abs(np.nan_to_num(comparison.places.normalised)) > 1.0).reshape(points.shape)
     is_changed = changed.any(axis=1) & ~is_open
     longest = float(np.linalg.norm(moved[~is_open], axis=1).max(initial=0.0))
-    size = float(found.volume.size.max())
+    size = float(comparison.volume.size.max())
     times = round_number(LONGEST * size / longest) if longest else 1.0
     starts, tips = points @ view.T, (points + times * moved) @ view.T
-    for which, colour, marker, label in (
+    for is_shown, colour, marker, label in (
         (~is_changed & ~is_open, MUTED, "o", "|E_n| ≤ 1"),
         (is_changed, SERIES[1], "s", "|E_n| > 1 along an axis"),
     ):
-        if which.any():
+        if is_shown.any():
             sticks(
                 axes,
-                starts[which],
-                tips[which],
+                starts[is_shown],
+                tips[is_shown],
                 color=colour,
                 marker=marker,
                 markersize=3.0,
@@ -94,23 +96,25 @@ def _vectors(axes: Axes, found: MapComparison) -> None:
     axes.set_ylim(low[1] - 0.22 * size, high[1] + 0.06 * size)
     legend_above(axes, 3)
     length = round_number(longest or 1e-6)
-    told = f"{1e6 * length:g} µm, magnified {times:,.0f} times; the frame's motion is taken out"
-    scale_bar(axes, length * times, 0.03, told)
+    scale_words = (
+        f"{1e6 * length:g} µm, magnified {times:,.0f} times; the frame's motion is taken out"
+    )
+    scale_bar(axes, length * times, 0.03, scale_words)
 
 
 def _rows(axes: Axes, groups: list[FigureGroup]) -> None:
     """A row for each group: |E_n| of its figures, those above 1 in a colour."""
     largest = LEAST_END
-    for k, one in enumerate(groups):
-        values = np.sort(np.abs(one.normalised[one.is_compared]))[::-1]
+    for k, group in enumerate(groups):
+        values = np.sort(np.abs(group.normalised[group.is_compared]))[::-1]
         largest = max(largest, float(values[0]))
         # The largest of many, and every so many of the others.
         step = -(-len(values) // MOST_MARKS)
         shown = np.concatenate([values[:1], values[1::step]])
-        for which, colour in ((shown <= 1.0, MUTED), (shown > 1.0, SERIES[1])):
+        for is_shown, colour in ((shown <= 1.0, MUTED), (shown > 1.0, SERIES[1])):
             axes.plot(
-                shown[which],
-                np.full(int(which.sum()), -k),
+                shown[is_shown],
+                np.full(int(is_shown.sum()), -k),
                 color=colour,
                 marker="|",
                 markersize=8.0,
@@ -119,7 +123,7 @@ def _rows(axes: Axes, groups: list[FigureGroup]) -> None:
     axes.axvline(1.0, color=INK, linewidth=1.0, linestyle="--")
     axes.set_xlim(0.0, 1.05 * float(comparable(largest)))
     axes.set_ylim(0.6 - len(groups), 0.6)
-    axes.set_yticks([-k for k in range(len(groups))], [_short(one.kind) for one in groups])
+    axes.set_yticks([-k for k in range(len(groups))], [_short(group.kind) for group in groups])
     axes.grid(True, axis="x")
     axes.set_xlabel("|E_n|; about one in twenty exceeds 1 by chance")
 

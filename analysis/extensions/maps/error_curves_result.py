@@ -54,67 +54,73 @@ class ErrorCurves(Result):
         return self.fitted.coverage_factor
 
     def headline(self) -> str:
-        names = dict.fromkeys(one.name for one in self.functions.curves)
+        names = dict.fromkeys(curve.name for curve in self.functions.curves)
         square = len(self.functions.squareness)
         words = f"{len(names)} error functions, {square} squareness errors"
-        open_ = {one.name for one in self.functions.curves if one.is_undetermined}
+        open_ = {curve.name for curve in self.functions.curves if curve.is_undetermined}
         return f"{words}, {len(open_)} functions undetermined" if open_ else words
 
     def lines(self) -> list[str]:
-        found, lines = self.functions, head_lines(self.label, self.fitted)
+        functions, lines = self.functions, head_lines(self.label, self.fitted)
         lines[-1] += ", at each position by itself"
-        if found.curves:
-            lines += ["", *_curve_table(found.curves, self.k)]
-        if found.squareness:
-            lines += ["", *_angle_table(found.squareness, self.k)]
-        if found.numbers:
-            lines += ["", *_number_table(found.numbers, self.k)]
+        if functions.curves:
+            lines += ["", *_curve_table(functions.curves, self.k)]
+        if functions.squareness:
+            lines += ["", *_angle_table(functions.squareness, self.k)]
+        if functions.numbers:
+            lines += ["", *_number_table(functions.numbers, self.k)]
         return lines
 
     def data(self) -> dict[str, Any]:
-        found = map_data(self.label, self.fitted)
-        found["functions"] = [
+        data = map_data(self.label, self.fitted)
+        data["functions"] = [
             {
-                "error": one.name,
-                **picked(one, "meaning", "unit"),
-                "line": one.line or None,
-                "axis": None if one.axis is None else AXIS_NAMES[one.axis],
-                "position": one.positions,
-                "value": one.values,
-                "expanded_uncertainty": self.k * one.uncertainties,
+                "error": error.name,
+                **picked(error, "meaning", "unit"),
+                "line": error.line or None,
+                "axis": None if error.axis is None else AXIS_NAMES[error.axis],
+                "position": error.positions,
+                "value": error.values,
+                "expanded_uncertainty": self.k * error.uncertainties,
             }
-            for one in self.functions.curves
+            for error in self.functions.curves
         ]
         for key in ("squareness", "numbers"):
-            found[key] = [
+            data[key] = [
                 {
-                    "error": one.name,
-                    **picked(one, "meaning", "unit", "value"),
-                    "expanded_uncertainty": self.k * one.standard_uncertainty,
-                    "source": one.source,
+                    "error": error.name,
+                    **picked(error, "meaning", "unit", "value"),
+                    "expanded_uncertainty": self.k * error.standard_uncertainty,
+                    "source": error.source,
                 }
-                for one in getattr(self.functions, key)
+                for error in getattr(self.functions, key)
             ]
-        return found | {"warnings": self.warnings}
+        return data | {"warnings": self.warnings}
 
     def rows(self) -> list[dict[str, Any]]:
         """One row for each position of each curve, then one for each number; in metres, radians and
         ratios.
         """
         rows = [
-            _row(one.name, one.line, x, value, self.k * u, self.k, one.unit)
-            for one in self.functions.curves
+            _row(error.name, error.line, x, value, self.k * u, self.k, error.unit)
+            for error in self.functions.curves
             for x, value, u in zip(
-                *(part.tolist() for part in (one.positions, one.values, one.uncertainties)),
+                *(part.tolist() for part in (error.positions, error.values, error.uncertainties)),
                 strict=True,
             )
         ]
         numbers = (*self.functions.squareness, *self.functions.numbers)
         return rows + [
             _row(
-                one.name, "", np.nan, one.value, self.k * one.standard_uncertainty, self.k, one.unit
+                error.name,
+                "",
+                np.nan,
+                error.value,
+                self.k * error.standard_uncertainty,
+                self.k,
+                error.unit,
             )
-            for one in numbers
+            for error in numbers
         ]
 
     def point_lines(self) -> Iterator[str]:
@@ -124,13 +130,15 @@ class ErrorCurves(Result):
         writer.writerow(HEADS)
         for row in self.rows():
             along = row["position"] * (1.0 if self._is_fraction(row) else 1e3)
-            cells = [_cell(one) for one in (along, 1e6 * row["value"], 1e6 * row["U"])]
+            cells = [_cell(value) for value in (along, 1e6 * row["value"], 1e6 * row["U"])]
             unit = ascii_units(SHOWN[row["unit"]])
             writer.writerow([row["error"], row["line"], *cells, f"{self.k:g}", unit])
         yield from text.getvalue().splitlines()
 
     def _is_fraction(self, row: dict[str, Any]) -> bool:
-        return any(one.axis is None for one in self.functions.curves if one.name == row["error"])
+        return any(
+            curve.axis is None for curve in self.functions.curves if curve.name == row["error"]
+        )
 
     @property
     def warnings(self) -> tuple[str, ...]:
@@ -175,26 +183,30 @@ def _cell(value: float) -> str:
 def _curve_table(curves: Sequence[FunctionCurve], k: float) -> list[str]:
     """A line for each curve: where it runs, its least and largest value, and its largest U."""
     heads = ["error", "", "along", "from, mm", "to, mm", "least", "largest", "largest U", "unit"]
-    rows, told, left = [heads], dict[str, int](), 0
-    for one in curves:
-        told[one.name] = told.get(one.name, 0) + 1
-        if told[one.name] > MOST_LINES:
-            left += 1
+    rows, line_counts, omitted = [heads], dict[str, int](), 0
+    for curve in curves:
+        line_counts[curve.name] = line_counts.get(curve.name, 0) + 1
+        if line_counts[curve.name] > MOST_LINES:
+            omitted += 1
             continue
-        along = one.line.removeprefix("along ")
+        along = curve.line.removeprefix("along ")
         ends = ["", ""]
-        if one.axis is not None:
-            along = along or AXIS_NAMES[one.axis].upper()
-            ends = [f"{1e3 * x:.6g}" for x in (one.positions[0], one.positions[-1])]
+        if curve.axis is not None:
+            along = along or AXIS_NAMES[curve.axis].upper()
+            ends = [f"{1e3 * x:.6g}" for x in (curve.positions[0], curve.positions[-1])]
         values = [UNDETERMINED, "", ""]
-        if not one.is_undetermined:
-            ranges = np.nanmin(one.values), np.nanmax(one.values), k * np.nanmax(one.uncertainties)
+        if not curve.is_undetermined:
+            ranges = (
+                np.nanmin(curve.values),
+                np.nanmax(curve.values),
+                k * np.nanmax(curve.uncertainties),
+            )
             values = [number(1e6 * float(value), 4) for value in ranges]
-            if np.isnan(one.uncertainties).any():
+            if np.isnan(curve.uncertainties).any():
                 values[2] += " in part"
-        rows.append([one.name, one.meaning, along, *ends, *values, SHOWN[one.unit]])
+        rows.append([curve.name, curve.meaning, along, *ends, *values, SHOWN[curve.unit]])
     right = [False, False, False, True, True, True, True, True, False]
-    more = [f"({left} more lines are in --format csv and --json)"] if left else []
+    more = [f"({omitted} more lines are in --format csv and --json)"] if omitted else []
     return [*aligned(rows, right), *more]
 
 
@@ -204,9 +216,9 @@ def _angle_table(numbers: Sequence[EstimatedNumber], k: float) -> list[str]:
         ("squareness", "name"),
         ("", "meaning"),
         ("µrad", ("value", "standard_uncertainty")),
-        ("U", (lambda one: k * one.standard_uncertainty, expanded)),
+        ("U", (lambda estimate: k * estimate.standard_uncertainty, expanded)),
         ("arcsec", ("value", "standard_uncertainty")),
-        ("U", (lambda one: k * one.standard_uncertainty / (1e6 * ARCSECOND), expanded)),
+        ("U", (lambda estimate: k * estimate.standard_uncertainty / (1e6 * ARCSECOND), expanded)),
         ("", "source"),
     ]
     return table_lines(columns, numbers, unknown=UNDETERMINED)
@@ -217,7 +229,7 @@ def _number_table(numbers: Sequence[EstimatedNumber], k: float) -> list[str]:
         "error": "name",
         "": "meaning",
         "value": ("value", "standard_uncertainty"),
-        "U": (lambda one: k * one.standard_uncertainty, expanded),
+        "U": (lambda estimate: k * estimate.standard_uncertainty, expanded),
         "unit": "unit",
     }
     return table_lines(columns, numbers, unknown=UNDETERMINED)

@@ -77,32 +77,38 @@ def error_functions(
     """
     curves: list[FunctionCurve] = []
     numbers: list[EstimatedNumber] = []
-    functions = dict.fromkeys(one.function for one in fitted.model.parameters)
+    functions = dict.fromkeys(error.function for error in fitted.model.parameters)
     for name in functions:
         own_curves = list(_curves(fitted, name, positions))
         curves += own_curves
         numbers += [] if own_curves else _numbers(fitted, name)
-    own = {one.name for one in numbers}
-    square = [one for one in numbers if one.name in SQUARENESS_ERRORS]
-    square += [one for one in _by_ends(fitted) if one.name not in own]
-    others = [one for one in numbers if one.name not in SQUARENESS_ERRORS]
-    known = [*functions, *(one.name for one in square), *(one.name for one in others)]
+    own_names = {error.name for error in numbers}
+    square = [error for error in numbers if error.name in SQUARENESS_ERRORS]
+    square += [error for error in _by_ends(fitted) if error.name not in own_names]
+    other_numbers = [error for error in numbers if error.name not in SQUARENESS_ERRORS]
+    known_names = [
+        *functions,
+        *(error.name for error in square),
+        *(error.name for error in other_numbers),
+    ]
     for name in names:
-        if name not in known:
-            raise ValueError(f'the map has no error "{name}"; {hint(name, dict.fromkeys(known))}')
+        if name not in known_names:
+            raise ValueError(
+                f'the map has no error "{name}"; {hint(name, dict.fromkeys(known_names))}'
+            )
 
     def chosen(some: Sequence[EstimatedNumber]) -> tuple[EstimatedNumber, ...]:
-        return tuple(one for one in some if not names or one.name in names)
+        return tuple(error for error in some if not names or error.name in names)
 
     return ErrorFunctions(
-        tuple(one for one in curves if not names or one.name in names),
+        tuple(error for error in curves if not names or error.name in names),
         chosen(square),
-        chosen(others),
+        chosen(other_numbers),
     )
 
 
 def _columns(fitted: FittedMap, name: str) -> list[int]:
-    return [k for k, one in enumerate(fitted.model.parameters) if one.function == name]
+    return [k for k, parameter in enumerate(fitted.model.parameters) if parameter.function == name]
 
 
 def _curves(fitted: FittedMap, name: str, positions: int) -> Iterator[FunctionCurve]:
@@ -121,17 +127,17 @@ def _curves(fitted: FittedMap, name: str, positions: int) -> Iterator[FunctionCu
         u = fitted.standard_uncertainties(rows)
         values = np.where(np.isnan(u), np.nan, rows[:, columns] @ fitted.values[columns])
         where = t if line.axis is None else lower[line.axis] + t * size[line.axis]
-        told = name, parameter.meaning, parameter.unit, line.words, line.axis
-        yield FunctionCurve(*told, where, values, u)
+        description = name, parameter.meaning, parameter.unit, line.words, line.axis
+        yield FunctionCurve(*description, where, values, u)
 
 
 def _numbers(fitted: FittedMap, name: str) -> Iterator[EstimatedNumber]:
     """The parameters of a function that is no curve."""
     for k in _columns(fitted, name):
-        one = fitted.model.parameters[k]
+        parameter = fitted.model.parameters[k]
         u = float(fitted.standard_uncertainties(np.eye(len(fitted.scale))[k]))
         value = float("nan") if np.isnan(u) else float(fitted.values[k])
-        yield EstimatedNumber(one.name, one.meaning, one.unit, value, u)
+        yield EstimatedNumber(parameter.name, parameter.meaning, parameter.unit, value, u)
 
 
 def _by_ends(fitted: FittedMap) -> Iterator[EstimatedNumber]:
@@ -139,26 +145,33 @@ def _by_ends(fitted: FittedMap) -> Iterator[EstimatedNumber]:
     machine's own point; those that the model holds at zero are left out.
     """
     volume, d = fitted.volume, fitted.dimension
-    for one in SQUARENESS_ERRORS.values():
-        if d == 2 and not one.in_plane:
+    for squareness in SQUARENESS_ERRORS.values():
+        if d == 2 and not squareness.in_plane:
             continue
         points = np.tile(volume.lower, (3, 1))
-        points[1, one.axis], points[2, one.to] = volume.upper[one.axis], volume.upper[one.to]
+        points[1, squareness.axis], points[2, squareness.to] = (
+            volume.upper[squareness.axis],
+            volume.upper[squareness.to],
+        )
         none = np.zeros_like(points)
-        value = _angle(one, fitted.model.error(points, fitted.values, none), volume.size)
+        value = _angle(squareness, fitted.model.error(points, fitted.values, none), volume.size)
         rows = np.zeros((2, len(fitted.scale)))
         for row, a in zip(rows, (fitted.values, np.zeros_like(fitted.values)), strict=True):
             slopes = fitted.model.jacobian(points, a, none)
-            row[: len(a)] = _angle(one, slopes, volume.size)
+            row[: len(a)] = _angle(squareness, slopes, volume.size)
         u = float(fitted.standard_uncertainties(*rows))
         if np.isnan(u):
-            yield EstimatedNumber(one.name, one.meaning, "rad", np.nan, np.nan, OF_ENDS)
+            yield EstimatedNumber(
+                squareness.name, squareness.meaning, "rad", np.nan, np.nan, OF_ENDS
+            )
         elif u > 0.0 or value:
-            yield EstimatedNumber(one.name, one.meaning, "rad", float(value), u, OF_ENDS)
+            yield EstimatedNumber(
+                squareness.name, squareness.meaning, "rad", float(value), u, OF_ENDS
+            )
 
 
-def _angle(one: SquarenessError, errors: Array, size: Array) -> Array:
+def _angle(squareness: SquarenessError, errors: Array, size: Array) -> Array:
     """The turn of an axis, from errors (3, d, ...) at the corner and at the ends of both edges."""
-    of_axis = (errors[1, one.to] - errors[0, one.to]) / size[one.axis]
-    of_other = (errors[2, one.axis] - errors[0, one.axis]) / size[one.to]
-    return np.asarray(one.sign * (of_axis + of_other))
+    of_axis = (errors[1, squareness.to] - errors[0, squareness.to]) / size[squareness.axis]
+    of_other = (errors[2, squareness.axis] - errors[0, squareness.axis]) / size[squareness.to]
+    return np.asarray(squareness.sign * (of_axis + of_other))

@@ -46,7 +46,7 @@ def fit_of_file(path: Path, readings: Path | None = None) -> Fit:
         raise refused(path, text, "readings")
     files = [experiment.source.parent / name for name in named] if readings is None else [readings]
     observed = read_readings(files, lay_out(experiment), settings=experiment.readings)
-    found = fit(experiment, observed)
-    if not found.converged:
-        raise experiment.refused((), found.complaint)
-    return found
+    fitted = fit(experiment, observed)
+    if not fitted.converged:
+        raise experiment.refused((), fitted.complaint)
+    return fitted

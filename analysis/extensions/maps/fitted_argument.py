@@ -26,7 +26,7 @@ def fitted_map(path: Path) -> FittedMap:
 
     if kind_of_file(path) != "experiment":
         return read_map(path)
-    found = fit_of_file(path)
-    for remark in found.notes:
+    fitted = fit_of_file(path)
+    for remark in fitted.notes:
         complain(remark)
-    return found.to_map()
+    return fitted.to_map()

@@ -68,12 +68,12 @@ class ErrorRows:
 def rows_of_errors(fitted: FittedMap, points: Array, probes: Probed) -> ErrorRows:
     """Derivatives (m, d, b) of errors at points (m, d) with probes of indices (m,), or of one."""
     columns = fitted.offset_columns[probe_indices(fitted, len(points), probes)]
-    which, axis = np.nonzero(columns >= 0)
+    indices, axis = np.nonzero(columns >= 0)
     _, rows = corrected(fitted, points, probes)
     drawn = drawn_rows(fitted, points, probes)
-    for one in (rows,) if drawn is None else (rows, drawn):
+    for array in (rows,) if drawn is None else (rows, drawn):
         # The offset itself is no error of the machine; what the rotations make of it is.
-        one[which, axis, columns[which, axis]] -= 1.0
+        array[indices, axis, columns[indices, axis]] -= 1.0
     return ErrorRows(rows, drawn)
 
 
@@ -89,8 +89,8 @@ def fitted_errors(fitted: FittedMap, points: Array, probes: Probed) -> FittedErr
     uncertainties = np.zeros(points.shape)
     for start in range(0, len(points), POINTS_AT_ONCE):
         some = slice(start, start + POINTS_AT_ONCE)
-        found = rows_of_errors(fitted, points[some], _part(probes, some))
-        uncertainties[some] = found.uncertainties(fitted)
+        rows = rows_of_errors(fitted, points[some], _part(probes, some))
+        uncertainties[some] = rows.uncertainties(fitted)
     errors = np.where(np.isnan(uncertainties), np.nan, errors_of(fitted, points, probes))
     return FittedErrors(points, errors, uncertainties)
 
@@ -151,8 +151,8 @@ def drawn_errors(
     errors = np.zeros((draws.count, *points.shape))
     for start in range(0, len(points), POINTS_AT_ONCE):
         some = slice(start, start + POINTS_AT_ONCE)
-        found = rows_of_errors(fitted, points[some], _part(probes, some))
-        errors[:, some] = np.tensordot(deviations, found.rows, axes=(1, 2))
+        error_rows = rows_of_errors(fitted, points[some], _part(probes, some))
+        errors[:, some] = np.tensordot(deviations, error_rows.rows, axes=(1, 2))
     errors += fitted_errors(fitted, points, probes).errors
     lengths = fitted_lengths(fitted, places, probe).errors
     rows = length_rows(fitted, places, probe).rows

@@ -56,17 +56,17 @@ if TYPE_CHECKING:
 
 def map_cautions(fitted: FittedMap) -> tuple[str, ...]:
     """What is to be known of all uncertainties of a map."""
-    found = [fitted.known_lack_of_fit.caution]
+    cautions = [fitted.known_lack_of_fit.caution]
     if fitted.sigma_is_estimated:
         remedy = "with few, take a larger coverage factor"
-        found.append(few_degrees_of_freedom(fitted.degrees_of_freedom, "sigma", remedy))
+        cautions.append(few_degrees_of_freedom(fitted.degrees_of_freedom, "sigma", remedy))
     if fitted.left_out:
-        found.append(left_out_words(fitted))
+        cautions.append(left_out_words(fitted))
     count = fitted.undetermined.shape[1]
     if count:
         words = f"{number_of(count, 'direction')} of the parameters"
-        found.append(f"the readings left {words} undetermined; what these change is not stated")
-    return tuple(filter(None, found))
+        cautions.append(f"the readings left {words} undetermined; what these change is not stated")
+    return tuple(filter(None, cautions))
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -96,11 +96,15 @@ class FittedErrorMap(Result):
 
     def headline(self) -> str:
         resultant = self.errors.resultant
-        known = resultant[~np.isnan(resultant)]
+        determined = resultant[~np.isnan(resultant)]
         words = f"{len(resultant)} points"
-        if len(known) < len(resultant):
-            words += f", {len(resultant) - len(known)} undetermined"
-        return f"{words}, resultant {1e6 * known.max():.4g} µm at most" if len(known) else words
+        if len(determined) < len(resultant):
+            words += f", {len(resultant) - len(determined)} undetermined"
+        return (
+            f"{words}, resultant {1e6 * determined.max():.4g} µm at most"
+            if len(determined)
+            else words
+        )
 
     @cached_property
     def budget(self) -> tuple[PartBudget, ...]:
@@ -112,10 +116,10 @@ class FittedErrorMap(Result):
     def lines(self) -> list[str]:
         fitted = self.fitted
         lines = head_lines(self.label, fitted, self.probe)
-        others = np.unique(self.probes[self.probes != self.probe])
-        if len(others):
-            told = ", ".join(fitted.probes.names[k] for k in others)
-            lines.append(f"points that the table has with other probes: {told}")
+        other_probes = np.unique(self.probes[self.probes != self.probe])
+        if len(other_probes):
+            probe_names = ", ".join(fitted.probes.names[k] for k in other_probes)
+            lines.append(f"points that the table has with other probes: {probe_names}")
         lines += ["", *length_lines(self.lengths, self.places.names, fitted.coverage_factor)]
         lines += [
             "",
@@ -129,39 +133,39 @@ class FittedErrorMap(Result):
 
     def data(self) -> dict[str, Any]:
         fitted, k = self.fitted, self.fitted.coverage_factor
-        found = map_data(self.label, fitted, self.probe)
-        ends, found_errors = self.lengths, self.errors
-        found["lengths"] = records(
+        data = map_data(self.label, fitted, self.probe)
+        ends, errors = self.lengths, self.errors
+        data["lengths"] = records(
             name=self.places.names,
             **{"from": ends.starts, "to": ends.ends},
             length=ends.nominal,
             error=ends.errors,
             expanded_uncertainty=k * ends.uncertainties,
         )
-        found[self.places.kind] = records(
+        data[self.places.kind] = records(
             **self._of_table(),
-            position=found_errors.points,
-            error=found_errors.errors,
-            expanded_uncertainty=k * found_errors.uncertainties,
-            resultant=found_errors.resultant,
+            position=errors.points,
+            error=errors.errors,
+            expanded_uncertainty=k * errors.uncertainties,
+            resultant=errors.resultant,
         )
         if self.realisations is not None:
-            found["realisations"] = self.realisations.to_dict()
+            data["realisations"] = self.realisations.to_dict()
         if self.with_budget:
-            found["budget"] = budget_data(self.budget, k)
-        return found | {"warnings": self.warnings}
+            data["budget"] = budget_data(self.budget, k)
+        return data | {"warnings": self.warnings}
 
     def columns(self) -> tuple[Columns, Sequence[Any]]:
         """One row for each point, in metres."""
-        found, k = self.errors, self.fitted.coverage_factor
+        errors, k = self.errors, self.fitted.coverage_factor
         columns = {
             **self._of_table(),
-            **by_axis("{}, mm", found.points),
-            **by_axis("error {}, µm", found.errors),
-            **by_axis("U {}, µm", k * found.uncertainties),
-            "resultant, µm": found.resultant,
-            "k": [k] * len(found.points),
-            "unit": ["m"] * len(found.points),
+            **by_axis("{}, mm", errors.points),
+            **by_axis("error {}, µm", errors.errors),
+            **by_axis("U {}, µm", k * errors.uncertainties),
+            "resultant, µm": errors.resultant,
+            "k": [k] * len(errors.points),
+            "unit": ["m"] * len(errors.points),
         }
         return columns, ()
 
@@ -199,26 +203,32 @@ class FittedErrorMap(Result):
         :raises ImportError: matplotlib is missing.
         :raises ValueError: the path ends in something else, or nothing is determined.
         """
-        k, given = self.fitted.coverage_factor, self.errors
-        if np.isnan(given.resultant).all():
+        k, errors_at_points = self.fitted.coverage_factor, self.errors
+        if np.isnan(errors_at_points.resultant).all():
             raise ValueError("all errors are undetermined; leave the picture out")
-        found = VolumetricErrors(given.points, given.errors, given.uncertainties)
+        shown = VolumetricErrors(
+            errors_at_points.points, errors_at_points.errors, errors_at_points.uncertainties
+        )
         if self.places.kind == "line":
-            return draw_line(found, path, k, f"U, k = {k:g}", "correction")
+            return draw_line(shown, path, k, f"U, k = {k:g}", "correction")
         ends, u = self.lengths, np.full(len(self.lengths.nominal), np.nan)
         if self.places.kind == "grid" and self.fitted.dimension == 3:
             lengths = LengthErrors(
-                *(one[:4] for one in (ends.starts, ends.ends, ends.nominal, ends.errors, u))
+                *(array[:4] for array in (ends.starts, ends.ends, ends.nominal, ends.errors, u))
             )
             x, y, z = self.places.counts
-            return draw_grid(found, lengths, (x, y, z), magnification, path)
-        known = ~np.isnan(given.resultant)
+            return draw_grid(shown, lengths, (x, y, z), magnification, path)
+        is_determined = ~np.isnan(errors_at_points.resultant)
         view, edges = np.eye(2), None
         if self.fitted.dimension == 3:
             view, towards = projection(3)
             volume = self.fitted.volume
             edges = box_edges(volume.lower, volume.upper, towards)[0] @ view.T
-        vectors = Vectors("", given.points[known] @ view.T, given.errors[known] @ view.T)
+        vectors = Vectors(
+            "",
+            errors_at_points.points[is_determined] @ view.T,
+            errors_at_points.errors[is_determined] @ view.T,
+        )
         return draw_vectors((vectors,), f"{self.title}: corrections", path, edges, "errors")
 
 
@@ -243,13 +253,13 @@ def fitted_map_errors(
     index = names.index(chosen)
     places = map_places(fitted.volume, asked, names, chosen)
     if tasks is not None:
-        own = np.full((len(places.names), 2), index)
+        own_probes = np.full((len(places.names), 2), index)
         places = replace(
             places,
             starts=np.concatenate([places.starts, tasks.points[:, 0]]),
             ends=np.concatenate([places.ends, tasks.points[:, 1]]),
             names=places.names + tasks.names,
-            length_probes=np.concatenate([own, tasks.probes]),
+            length_probes=np.concatenate([own_probes, tasks.probes]),
         )
     probes = np.full(len(places.points), index) if places.probes is None else places.probes
     return FittedErrorMap(

@@ -32,7 +32,7 @@ def head_lines(label: str, fitted: FittedMap, probe: int | None = None) -> list[
 
 def map_data(label: str, fitted: FittedMap, probe: int | None = None) -> dict[str, Any]:
     """The same as plain data."""
-    found: dict[str, Any] = {
+    data: dict[str, Any] = {
         "map": label,
         "title": fitted.title,
         "convention": CONVENTION,
@@ -41,11 +41,11 @@ def map_data(label: str, fitted: FittedMap, probe: int | None = None) -> dict[st
         "lack_of_fit": verdict_data(fitted.lack_of_fit),
     }
     if probe is not None:
-        found["probe"] = {
+        data["probe"] = {
             "name": fitted.probes.names[probe],
             "offset": fitted.probes.offsets[probe],
         }
-    return found
+    return data
 
 
 def length_lines(lengths: FittedLengths, names: Sequence[str], factor: float) -> list[str]:
@@ -66,51 +66,61 @@ def expanded(uncertainty: float) -> str:
     return number(0.0 if uncertainty < ROUNDING else 1e6 * uncertainty, 3)
 
 
-def error_lines(found: FittedErrors, factor: float, names: Sequence[str] = ()) -> list[str]:
+def error_lines(errors: FittedErrors, factor: float, names: Sequence[str] = ()) -> list[str]:
     """Errors point by point with their uncertainties, and the largest; points may have names."""
-    u, columns = found.uncertainties, list[tuple[str, Any]]()
+    u, columns = errors.uncertainties, list[tuple[str, Any]]()
     columns += [("point", list(names))] if names else []
-    columns += by_axis("{}, mm", found.points, _millimetres).items()
-    for k, letter in enumerate("XYZ"[: found.points.shape[1]]):
-        columns += [(f"{letter}, µm", (found.errors[:, k], u[:, k]))]
+    columns += by_axis("{}, mm", errors.points, _millimetres).items()
+    for k, letter in enumerate("XYZ"[: errors.points.shape[1]]):
+        columns += [(f"{letter}, µm", (errors.errors[:, k], u[:, k]))]
         columns += [("U", (factor * u[:, k], expanded))]
-    columns.append(("resultant", (found.resultant, _resultant)))
-    return [*table_lines(columns, unknown=UNDETERMINED), *_largest(found, factor)]
+    columns.append(("resultant", (errors.resultant, _resultant)))
+    return [*table_lines(columns, unknown=UNDETERMINED), *_largest(errors, factor)]
 
 
 def _resultant(value: float) -> str:
     return UNDETERMINED if np.isnan(value) else number(1e6 * value)
 
 
-def _largest(found: FittedErrors, factor: float) -> list[str]:
-    known = np.flatnonzero(~np.isnan(found.resultant))
-    if not len(known):
+def _largest(errors: FittedErrors, factor: float) -> list[str]:
+    determined = np.flatnonzero(~np.isnan(errors.resultant))
+    if not len(determined):
         return ["all errors are undetermined"]
-    worst = int(known[comparable(found.resultant[known]).argmax()])
-    least = float(np.nanmax(found.uncertainties))
-    told = (
-        f"largest resultant {number(1e6 * float(found.resultant[worst]))} µm at"
-        f" {_point(found.points[worst])} mm; largest U of a co-ordinate"
+    worst = int(determined[comparable(errors.resultant[determined]).argmax()])
+    least = float(np.nanmax(errors.uncertainties))
+    text = (
+        f"largest resultant {number(1e6 * float(errors.resultant[worst]))} µm at"
+        f" {_point(errors.points[worst])} mm; largest U of a co-ordinate"
         f" {number(1e6 * factor * least, 3)} µm"
     )
-    left = len(found.points) - len(known)
-    return [f"{told}; {left} of {len(found.points)} points undetermined" if left else told]
+    undetermined = len(errors.points) - len(determined)
+    return [
+        f"{text}; {undetermined} of {len(errors.points)} points undetermined"
+        if undetermined
+        else text
+    ]
 
 
-def realisation_lines(found: Realisations, names: Sequence[str]) -> list[str]:
+def realisation_lines(realisations: Realisations, names: Sequence[str]) -> list[str]:
     """What each realisation has at most, and its length errors; all points are in CSV and JSON."""
-    largest = np.linalg.norm(found.errors, axis=2).max(axis=1)
+    largest = np.linalg.norm(realisations.errors, axis=2).max(axis=1)
     columns = [
         ("realisation", range(1, len(largest) + 1)),
         ("largest resultant, µm", largest),
-        *((f"{name}, µm", own) for name, own in zip(names, found.lengths.T, strict=True)),
+        *(
+            (f"{name}, µm", drawn_lengths)
+            for name, drawn_lengths in zip(names, realisations.lengths.T, strict=True)
+        ),
     ]
     table = table_lines(columns, unknown=UNDETERMINED)
-    return [*table, f"drawn from seed {found.draws.seed}; --format csv and --json have all points"]
+    return [
+        *table,
+        f"drawn from seed {realisations.draws.seed}; --format csv and --json have all points",
+    ]
 
 
 def point_csv(
-    found: FittedErrors,
+    errors: FittedErrors,
     factor: float,
     realisations: Realisations | None,
     names: Sequence[str] = (),
@@ -118,14 +128,14 @@ def point_csv(
     """Errors as lines of a CSV file; with realisations, a column tells which one, 0 the estimate,
     and only that has uncertainties.
     """
-    letters = "xyz"[: found.points.shape[1]]
+    letters = "xyz"[: errors.points.shape[1]]
     heads = [f"{letter}_mm" for letter in letters]
     heads += [f"error_{letter}_um" for letter in letters]
     heads += [f"U_{letter}_um" for letter in letters]
-    k = np.full(len(found.points), factor)
+    k = np.full(len(errors.points), factor)
     tables = [
-        [1e3 * found.points, 1e6 * error, 1e6 * factor * u, 1e6 * np.linalg.norm(error, axis=1), k]
-        for error, u in with_drawn(found.errors, found.uncertainties, realisations)
+        [1e3 * errors.points, 1e6 * error, 1e6 * factor * u, 1e6 * np.linalg.norm(error, axis=1), k]
+        for error, u in with_drawn(errors.errors, errors.uncertainties, realisations)
     ]
     return tables_csv([*heads, "resultant_um", "k"], tables, realisations is not None, names)
 

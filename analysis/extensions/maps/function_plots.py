@@ -42,7 +42,7 @@ DRAWN = ("low", "high")
 
 
 def draw_functions(
-    found: ErrorFunctions, title: str, k: float, path: str | Path | None = None
+    functions: ErrorFunctions, title: str, k: float, path: str | Path | None = None
 ) -> Figure:
     """A panel for each function and axis, all of a unit to the same scale, squareness errors below.
 
@@ -50,22 +50,24 @@ def draw_functions(
     :raises ValueError: the name ends in none of the kinds of pictures.
     :raises OSError: the file cannot be written.
     """
-    panels = _panels(found.curves)
+    panels = _panels(functions.curves)
     rows = list(dict.fromkeys(row for row, _ in sorted(panels)))
-    columns = list(dict.fromkeys(column for _, column in sorted(panels, key=lambda at: at[1])))
-    told = [_angle(one, k) for one in found.squareness]
+    columns = list(
+        dict.fromkeys(column for _, column in sorted(panels, key=lambda panel: panel[1]))
+    )
+    angles = [_angle(error, k) for error in functions.squareness]
     width = LEFT + RIGHT + len(columns) * (PANEL + BETWEEN) - BETWEEN
-    below = BELOW + LINE * (len(told) + bool(told))
+    below = BELOW + LINE * (len(angles) + bool(angles))
     height = below + ABOVE + len(rows) * (HEIGHT + ABOVE_PANEL) - ABOVE_PANEL
-    limits = _limits(found.curves, k)
+    limits = _limits(functions.curves, k)
     with drawing(height, width) as figure:
         for (row, column), curves in panels.items():
             x = LEFT + columns.index(column) * (PANEL + BETWEEN)
             y = below + (len(rows) - 1 - rows.index(row)) * (HEIGHT + ABOVE_PANEL)
             axes = placed_axes(figure, x, y, PANEL, HEIGHT)
             _draw_panel(axes, curves, k, limits[curves[0].unit])
-            is_last = not any((other, column) in panels for other in rows[rows.index(row) + 1 :])
-            is_first = not any((row, other) in panels for other in columns[: columns.index(column)])
+            is_last = not any((later, column) in panels for later in rows[rows.index(row) + 1 :])
+            is_first = not any((row, later) in panels for later in columns[: columns.index(column)])
             axes.tick_params(labelbottom=is_last, labelleft=is_first)
             if is_last:
                 axis = curves[0].axis
@@ -77,15 +79,15 @@ def draw_functions(
             (f"band: expanded uncertainty U, k = {k:g}, at each position by itself", 9.0),
             (CONVENTION, 9.0),
         ]
-        if any(one.line for one in found.curves):
+        if any(error.line for error in functions.curves):
             heads.append(("full lines: the other axes low; dashed: the other axes high", 9.0))
         for i, (text, size) in enumerate(heads):
             figure.text(LEFT / width, 1.0 - (18.0 + LINE * i) / height, text, fontsize=size)
-        for i, text in enumerate(told):
-            y = (LINE * (len(told) - i) - 8.0) / height
+        for i, text in enumerate(angles):
+            y = (LINE * (len(angles) - i) - 8.0) / height
             figure.text(LEFT / width, y, text, fontsize=9.5)
         words = f"{title}: error functions with U, k = {k:g}"
-        return save(figure, path, f"{words}. {'; '.join(told)}".rstrip(". ") + ".")
+        return save(figure, path, f"{words}. {'; '.join(angles)}".rstrip(". ") + ".")
 
 
 Place = tuple[int, int]
@@ -95,42 +97,46 @@ def _panels(curves: Sequence[FunctionCurve]) -> dict[Place, list[FunctionCurve]]
     """The curves of each panel, by row and column: errors of an axis in a column, displacements
     above rotations; functions of the place in a row each.
     """
-    others = list(dict.fromkeys(one.name for one in curves if one.name not in AXIS_ERRORS))
-    found: dict[Place, list[FunctionCurve]] = {}
-    for one in curves:
-        column = -1 if one.axis is None else one.axis
-        if one.name in AXIS_ERRORS:
-            error = AXIS_ERRORS[one.name]
+    other_names = list(
+        dict.fromkeys(curve.name for curve in curves if curve.name not in AXIS_ERRORS)
+    )
+    panels: dict[Place, list[FunctionCurve]] = {}
+    for curve in curves:
+        column = -1 if curve.axis is None else curve.axis
+        if curve.name in AXIS_ERRORS:
+            error = AXIS_ERRORS[curve.name]
             row = 3 * error.is_rotation + error.component
         else:
-            row = 6 + others.index(one.name)
-            if one.axis is not None and not _is_drawn(one):
+            row = 6 + other_names.index(curve.name)
+            if curve.axis is not None and not _is_drawn(curve):
                 continue
-        found.setdefault((row, column), []).append(one)
-    return found
+        panels.setdefault((row, column), []).append(curve)
+    return panels
 
 
-def _is_drawn(one: FunctionCurve) -> bool:
+def _is_drawn(curve: FunctionCurve) -> bool:
     """Whether a line of several is one of those that are drawn."""
-    if not one.line:
+    if not curve.line:
         return True
-    _, _, at = one.line.partition(" at ")
-    levels = {part.split()[-1] for part in at.split(" and ")}
+    _, _, levels_text = curve.line.partition(" at ")
+    levels = {part.split()[-1] for part in levels_text.split(" and ")}
     return any(levels == {level} for level in DRAWN)
 
 
 def _limits(curves: Sequence[FunctionCurve], k: float) -> dict[str, float]:
     """Largest values with their bands by unit, in millionths; 1 where nothing is known."""
-    found: dict[str, float] = {}
-    for one in curves:
-        ends = np.abs(one.values) + k * one.uncertainties
-        known = ends[np.isfinite(ends)]
-        found[one.unit] = max(found.get(one.unit, 0.0), 1e6 * float(known.max(initial=0.0)))
-    return {unit: limit or 1.0 for unit, limit in found.items()}
+    limits: dict[str, float] = {}
+    for curve in curves:
+        ends = np.abs(curve.values) + k * curve.uncertainties
+        determined = ends[np.isfinite(ends)]
+        limits[curve.unit] = max(
+            limits.get(curve.unit, 0.0), 1e6 * float(determined.max(initial=0.0))
+        )
+    return {unit: limit or 1.0 for unit, limit in limits.items()}
 
 
 def _draw_panel(axes: Axes, curves: Sequence[FunctionCurve], k: float, limit: float) -> None:
-    first, is_open = curves[0], all(one.is_undetermined for one in curves)
+    first, is_open = curves[0], all(curve.is_undetermined for curve in curves)
     along = f", along {AXIS_NAMES[first.axis]}" if first.line and first.axis is not None else ""
     axes.set_title(f"{first.name} {first.meaning}{along}", loc="left", fontsize=9.0, pad=4.0)
     if not is_open:
@@ -139,16 +145,16 @@ def _draw_panel(axes: Axes, curves: Sequence[FunctionCurve], k: float, limit: fl
     axes.margins(x=0.0)
     axes.set_ylim(-MARGIN * limit, MARGIN * limit)
     axes.tick_params(labelsize=8.5)
-    for i, one in enumerate(curves):
-        x = (1.0 if one.axis is None else 1e3) * one.positions
+    for i, curve in enumerate(curves):
+        x = (1.0 if curve.axis is None else 1e3) * curve.positions
         axes.set_xlim(x[0], x[-1])
-        values, half = 1e6 * one.values, 1e6 * k * one.uncertainties
+        values, half = 1e6 * curve.values, 1e6 * k * curve.uncertainties
         colour = SERIES[i % len(SERIES)]
         axes.fill_between(x, values - half, values + half, color=colour, alpha=0.25, linewidth=0)
         axes.plot(x, values, color=colour, linestyle=DASHES[i % len(DASHES)], linewidth=1.3)
         for edge in (values - half, values + half):
             axes.plot(x, edge, color=colour, linewidth=0.5)
-    if any(np.isnan(one.uncertainties).any() for one in curves):
+    if any(np.isnan(curve.uncertainties).any() for curve in curves):
         place, text = (
             ((0.5, 0.5), "undetermined") if is_open else ((0.5, 0.08), "undetermined in part")
         )
@@ -161,10 +167,10 @@ def _draw_panel(axes: Axes, curves: Sequence[FunctionCurve], k: float, limit: fl
         axes.patch.set_alpha(0.4)
 
 
-def _angle(one: EstimatedNumber, k: float) -> str:
+def _angle(squareness: EstimatedNumber, k: float) -> str:
     """A squareness error in words."""
-    if np.isnan(one.standard_uncertainty):
-        return f"{one.name} {one.meaning}: undetermined"
-    value = to_uncertainty(1e6 * one.value, 1e6 * one.standard_uncertainty)
-    u = number(1e6 * k * one.standard_uncertainty, 3)
-    return f"{one.name} {one.meaning}: {value.replace('-', '−')} µrad, U {u} µrad"
+    if np.isnan(squareness.standard_uncertainty):
+        return f"{squareness.name} {squareness.meaning}: undetermined"
+    value = to_uncertainty(1e6 * squareness.value, 1e6 * squareness.standard_uncertainty)
+    u = number(1e6 * k * squareness.standard_uncertainty, 3)
+    return f"{squareness.name} {squareness.meaning}: {value.replace('-', '−')} µrad, U {u} µrad"

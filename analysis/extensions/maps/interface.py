@@ -60,8 +60,8 @@ def convert(fitted: Fit | FittedMap | PathLike, to: str) -> ConvertedMap:
     from .map_files_of_machines import map_of_source
 
     ensure_type(str, 'an error model such as "empirical"', to=to)
-    found, label = map_of_source(map_or_path("fitted", fitted))
-    return converted(found, to, label)
+    source_map, label = map_of_source(map_or_path("fitted", fitted))
+    return converted(source_map, to, label)
 
 
 def diff(
@@ -106,18 +106,18 @@ def diff(
     ensure_type(str, 'a length such as "0.5 um + L/1000000"', stated=stated)
     if isinstance(dates, str) or len(dates) != 2:
         raise ValueError(f"dates={dates!r}; give two, that of the first and that of the second")
-    days = tuple(None if one is None else stated_day(one) for one in dates)
-    known = None if stated is None else Target(parse_length_function(stated), coverage_factor)
+    days = tuple(None if day is None else stated_day(day) for day in dates)
+    target = None if stated is None else Target(parse_length_function(stated), coverage_factor)
     is_file = isinstance(points, str | os.PathLike)
     places = Path(str(points)) if is_file else None if points is None else np.asarray(points, float)
     if isinstance(places, np.ndarray) and places.ndim != 2:
         raise ValueError("points: give a list of points, each with its co-ordinates in metres")
-    sides = [fit_map_or_path(name, one) for name, one in (("first", first), ("second", second))]
+    sides = [fit_map_or_path(name, side) for name, side in (("first", first), ("second", second))]
     return map_difference(
         (sides[0], sides[1]),
         ComparisonSettings(coverage_factor, grid, places, probe),
         shared is not None,
-        None if known is None else known.standard,
+        None if target is None else target.standard,
         (days[0], days[1]),
     )
 
@@ -210,22 +210,24 @@ def map(
         if (count := math.prod(counts)) > MOST_POINTS:
             raise ValueError(f"{count} points are too many; at most {MOST_POINTS} are possible")
     number: int | None = None
-    at: Path | GivenText | Array | None = None
+    places: Path | GivenText | Array | None = None
     if isinstance(points, int) or points is None:
         ensure_whole(2, MOST_POINTS, points=points)
         number = points
     elif isinstance(points, str | os.PathLike) or hasattr(points, "to_csv"):
-        at = table_of("points", points)
+        places = table_of("points", points)
     else:
-        at = given = np.asarray(points, float)
-        if given.ndim != 2 or not np.isfinite(given).all():
-            raise ValueError(f"points of shape {given.shape}; give finite numbers in metres (m, d)")
+        places = co_ordinates = np.asarray(points, float)
+        if co_ordinates.ndim != 2 or not np.isfinite(co_ordinates).all():
+            raise ValueError(
+                f"points of shape {co_ordinates.shape}; give finite numbers in metres (m, d)"
+            )
     asked = PlacesAsked(
         counts,
         parse_places(line) if isinstance(line, str) else line,
         parse_plane(plane) if isinstance(plane, str) else plane,
         number,
-        at,
+        places,
     )
     draws = None if draw is None else Draws(draw, seed)
     chosen = () if tasks is None else (experiment_of(tasks),)
@@ -329,31 +331,31 @@ def correct(
     names = chosen.probes.names
     offsets = chosen.drawn_offsets if coordinates == "ball centres" else None
     if isinstance(points, str | os.PathLike | pandas.DataFrame):
-        one = chosen.probe if probe is None else probe
-        if one not in names:
-            raise ValueError(f"no probe {one!r}; {hint(str(one), names)}")
+        name = chosen.probe if probe is None else probe
+        if name not in names:
+            raise ValueError(f"no probe {name!r}; {hint(str(name), names)}")
         table = table_of("points", points)
-        given = read_points(table, names, str(one), chosen.volume, offsets)
+        points_read = read_points(table, names, str(name), chosen.volume, offsets)
     else:
         x = ensure_points(points, chosen.volume)
         asked = chosen.probe if probe is None else probe
         probes = probe_places(asked, names, len(x))
         x = x if offsets is None else x - offsets[probes]
-        given = GivenPoints(x, ("",) * len(x), probes)
-    wanted = between_named(given, lengths)
-    return correction(chosen, given, wanted, coverage_factor, with_repeatability)
+        points_read = GivenPoints(x, ("",) * len(x), probes)
+    wanted = between_named(points_read, lengths)
+    return correction(chosen, points_read, wanted, coverage_factor, with_repeatability)
 
 
-def _several(name: str, given: Any) -> tuple[int, ...]:
-    if isinstance(given, Iterable) and type(given) is not str:
-        return tuple(given)
-    ensure_whole(2, None, **{name: given})
-    return (given,)
+def _several(name: str, value: Any) -> tuple[int, ...]:
+    if isinstance(value, Iterable) and type(value) is not str:
+        return tuple(value)
+    ensure_whole(2, None, **{name: value})
+    return (value,)
 
 
-def _texts(name: str, given: str | Iterable[str]) -> tuple[str, ...]:
+def _texts(name: str, texts_given: str | Iterable[str]) -> tuple[str, ...]:
     """One text or several."""
-    found = (given,) if isinstance(given, str) else tuple(given)
-    for text in found:
+    texts = (texts_given,) if isinstance(texts_given, str) else tuple(texts_given)
+    for text in texts:
         ensure_type(str, 'a text such as "x=22 um/m"', **{name: text})
-    return found
+    return texts

@@ -57,11 +57,11 @@ def largest_at_points(
         best = _best_of_parts(values, x > volume.lower + 0.5 * volume.size)
         starts = np.concatenate([x[best], at_random[[int(squares[-1].argmax())]]])
 
-        def at(some: Array, offset: Array = offset) -> Array:
+        def size_at(some: Array, offset: Array = offset) -> Array:
             return size(some, np.broadcast_to(offset, some.shape))
 
         step = volume.size / (POINTS_ALONG[d] - 1)
-        largest = max(largest, _climbed(at, starts, volume.lower, volume.upper, step))
+        largest = max(largest, _climbed(size_at, starts, volume.lower, volume.upper, step))
     rms = float(np.sqrt(np.mean(squares)))
     return LargestDifference(largest, rms, len(offsets) * (len(x) + RANDOM))
 
@@ -89,16 +89,18 @@ def largest_of_lengths(
     largest, squares = 0.0, []
     for offset in offsets:
 
-        def at(ends: Array, offset: Array = offset) -> Array:
+        def apart_at(ends: Array, offset: Array = offset) -> Array:
             return apart(ends, np.broadcast_to(offset, (len(ends), d)))
 
-        squares.append(at(at_random) ** 2)
+        squares.append(apart_at(at_random) ** 2)
         p = np.broadcast_to(offset, x.shape)
-        lengths = [np.linalg.norm(one[i] - one[j], axis=1) for one in (old(x, p), new(x, p))]
+        lengths = [
+            np.linalg.norm(corner[i] - corner[j], axis=1) for corner in (old(x, p), new(x, p))
+        ]
         ends = np.concatenate([x[i], x[j]], axis=1)
         best = _best_of_parts(np.abs(lengths[1] - lengths[0]), ends > middle)
-        lower, upper = (np.tile(one, 2) for one in volume.corners)
-        largest = max(largest, _climbed(at, ends[best], lower, upper, step))
+        lower, upper = (np.tile(corner, 2) for corner in volume.corners)
+        largest = max(largest, _climbed(apart_at, ends[best], lower, upper, step))
     rms = float(np.sqrt(np.mean(squares)))
     return LargestDifference(largest, rms, len(offsets) * (len(i) + RANDOM))
 

@@ -52,10 +52,10 @@ def length_settings(
     :raises ValueError: a target, grid, probe or coverage factor that the experiment cannot have.
     """
     try:
-        stated = (
+        stated_target = (
             None if experiment.target_uncertainty is None else experiment.target_uncertainty.stated
         )
-        chosen = stated if target is None else parse_length_function(target)
+        chosen = stated_target if target is None else parse_length_function(target)
     except QuantityError as error:
         raise ValueError(f"target: {error}") from None
     if chosen is None:
@@ -102,8 +102,8 @@ def length_map(
     by_direction, whole = _Tally(len(names), factors), _Tally(1, factors)
     worst, largest = None, -1.0
     named: list[tuple[int, int]] = []
-    done, count = 0, comb(len(points), 2)
-    report(ProgressStep("lengths", done, count))
+    finished, count = 0, comb(len(points), 2)
+    report(ProgressStep("lengths", finished, count))
     for tile in tiles:
         target = settings.target.at(tile.lengths)
         ratio = np.where(tile.is_open, np.nan, tile.uncertainties / target)
@@ -122,8 +122,8 @@ def length_map(
             worst, largest = (int(tile.first[top]), int(tile.second[top])), float(ratio[top])
         for k in np.flatnonzero(tile.is_open)[: NAMED - len(named)]:
             named.append((int(tile.first[k]), int(tile.second[k])))
-        done += len(tile.lengths)
-        report(ProgressStep("lengths", done, count))
+        finished += len(tile.lengths)
+        report(ProgressStep("lengths", finished, count))
     return LengthMap(
         experiment.label,
         experiment.title,
@@ -180,12 +180,12 @@ def _tiles(
     design: Design, points: Array, settings: LengthMapSettings
 ) -> tuple[int, Iterator[PairTile]]:
     """Rank deficiency, and the tiles of all pairs of points."""
-    at = linearise(design)
+    linearisation = linearise(design)
     probes = np.full(len(points), design.probes.names.index(settings.probe))
-    moved = displacements(at, MeasuredPoints(points, probes))
+    moved = displacements(linearisation, MeasuredPoints(points, probes))
     if settings.with_repeatability:
         moved.own[:] = np.diag(design.machine.repeatability)
-    return at.deficiency, pair_tiles(moved)
+    return linearisation.deficiency, pair_tiles(moved)
 
 
 def grid_points(design: Design, counts: tuple[int, ...]) -> Array:
@@ -240,11 +240,11 @@ def direction_classes(apart: Array) -> Integers:
     is_equal = (~moves | (np.abs(size - largest[:, None]) <= PARALLEL * largest[:, None])).all(
         axis=1
     )
-    found = np.full(len(apart), len(direction_names(d)) - 1)
-    found = np.where(count == 1, moves.argmax(axis=1), found)
+    classes = np.full(len(apart), len(direction_names(d)) - 1)
+    classes = np.where(count == 1, moves.argmax(axis=1), classes)
     if d == 3:
-        found = np.where((count == 2) & is_equal, 3 + moves.argmin(axis=1), found)
-    return np.where((count == d) & is_equal, 6 if d == 3 else 2, found)
+        classes = np.where((count == 2) & is_equal, 3 + moves.argmin(axis=1), classes)
+    return np.where((count == d) & is_equal, 6 if d == 3 else 2, classes)
 
 
 class _Tally:
@@ -269,15 +269,15 @@ class _Tally:
         kinds: tuple[NDArray[np.bool_], ...] = (~is_open | is_open, is_open, *within)
         for k, chosen in enumerate(kinds):
             self.counts[k] += np.bincount(group[chosen], minlength=size)
-        known = ~is_open
-        for k, one in enumerate((values, ratio)):
-            self.sums[k] += np.bincount(group[known], one[known], minlength=size)
-            np.maximum.at(self.tops[k], group[known], one[known])
+        is_determined = ~is_open
+        for k, column in enumerate((values, ratio)):
+            self.sums[k] += np.bincount(group[is_determined], column[is_determined], minlength=size)
+            np.maximum.at(self.tops[k], group[is_determined], column[is_determined])
 
     def groups(self) -> LengthGroups:
         count, open_, *within = self.counts
-        known = count - open_
+        determined = count - open_
         with np.errstate(invalid="ignore"):
-            average = np.where(known > 0, self.sums / np.maximum(known, 1), np.nan)
-            top = np.where(known > 0, self.tops, np.nan)
+            average = np.where(determined > 0, self.sums / np.maximum(determined, 1), np.nan)
+            top = np.where(determined > 0, self.tops, np.nan)
         return LengthGroups(count, open_, average[0], top[0], average[1], top[1], *within)

@@ -40,15 +40,15 @@ UNDER = 54.0
 MOST_SLICES, IN_A_ROW, BETWEEN, SCALE = 6, 3, 10.0, 62.0
 
 
-def draw_lengths(found: GroupedLengths, path: str | Path | None = None) -> Figure:
+def draw_lengths(lengths: GroupedLengths, path: str | Path | None = None) -> Figure:
     """A picture of the largest ratio of u to the target at each point, and of u over the length;
     it is written to the path, if there is one.
 
     :raises OSError: the file cannot be written.
     """
-    counts = found.settings.grid
-    factor = found.settings.target_factor
-    ratios = factor * found.by_point.maximum_ratio.reshape(counts)
+    counts = lengths.settings.grid
+    factor = lengths.settings.target_factor
+    ratios = factor * lengths.by_point.maximum_ratio.reshape(counts)
     marked, meaning = marks(ratios)
     levels = np.zeros(1, np.int64)
     if len(counts) == 3:
@@ -57,7 +57,7 @@ def draw_lengths(found: GroupedLengths, path: str | Path | None = None) -> Figur
         )
     columns = min(len(levels), IN_A_ROW) if len(levels) != 4 else 2
     rows = -(-len(levels) // columns)
-    span = found.design.machine.volume.size
+    span = lengths.design.machine.volume.size
     side = (WIDTH - LEFT - RIGHT - SCALE - (IN_A_ROW - 1) * BETWEEN) / IN_A_ROW
     side = side if columns == IN_A_ROW else 1.5 * side
     high = float(np.clip(side * span[1] / span[0], 0.4 * side, 1.6 * side))
@@ -65,17 +65,19 @@ def draw_lengths(found: GroupedLengths, path: str | Path | None = None) -> Figur
     total = BELOW + CURVES + UNDER + maps + 2 * ABOVE
     under = BELOW + CURVES + UNDER
     with drawing(total, WIDTH) as figure:
-        known = ratios[np.isfinite(ratios)]
-        limits = (float(known.min()), float(known.max())) if len(known) else (0.0, 1.0)
+        determined = ratios[np.isfinite(ratios)]
+        limits = (
+            (float(determined.min()), float(determined.max())) if len(determined) else (0.0, 1.0)
+        )
         image = None
         for place, level in enumerate(levels):
             row, column = divmod(place, columns)
             bottom = under + maps - (row + 1) * high - row * ABOVE
             axes = placed_axes(figure, LEFT + column * (side + BETWEEN), bottom, side, high)
             here = (..., level) if len(counts) == 3 else (...,)
-            image = _slice(axes, found, ratios[here], marked[here], limits)
+            image = _slice(axes, lengths, ratios[here], marked[here], limits)
             if len(counts) == 3:
-                axes.set_title(f"z = {_millimetres(found, 2, int(level))} mm", loc="left")
+                axes.set_title(f"z = {_millimetres(lengths, 2, int(level))} mm", loc="left")
             is_lowest = place + columns >= len(levels)
             axes.tick_params(
                 bottom=is_lowest, labelbottom=is_lowest, left=column == 0, labelleft=column == 0
@@ -84,18 +86,18 @@ def draw_lengths(found: GroupedLengths, path: str | Path | None = None) -> Figur
             axes.set_ylabel("y, mm" if column == 0 else "")
         u = "u" if factor == 1.0 else f"{factor:g} u"
         head = f"largest {u} / target of the lengths from or to a point" + _mark_words(
-            found, meaning
+            lengths, meaning
         )
         figure.text(LEFT / WIDTH, 1.0 - 14.0 / total, head, fontsize=10.5, va="center")
-        if image is not None and len(known):
+        if image is not None and len(determined):
             bar = placed_axes(figure, LEFT + columns * (side + BETWEEN) + 4.0, under, 10.0, maps)
             figure.colorbar(image, cax=bar)
         axes = placed_axes(figure, LEFT, BELOW, WIDTH - LEFT - RIGHT, CURVES - ABOVE)
-        _curves(axes, found)
-        shares = [percent(float(found.whole.share(expanded)[0])) for expanded in (False, True)]
-        k = f"{found.settings.coverage_factor:g}"
+        _curves(axes, lengths)
+        shares = [percent(float(lengths.whole.share(expanded)[0])) for expanded in (False, True)]
+        k = f"{lengths.settings.coverage_factor:g}"
         words = (
-            f"target {target_words(found.settings.target)}: u within it for {shares[0]} of"
+            f"target {target_words(lengths.settings.target)}: u within it for {shares[0]} of"
             " the lengths, "
         )
         return save(figure, path, f"{words}{k} u for {shares[1]} of them")
@@ -123,20 +125,20 @@ def marks(ratios: Array) -> tuple[NDArray[np.bool_], str]:
     )
 
 
-def _mark_words(found: GroupedLengths, meaning: str) -> str:
+def _mark_words(lengths: GroupedLengths, meaning: str) -> str:
     words = f"; {meaning}" if meaning else ""
-    return words + ("; undetermined ones left out" if found.whole.undetermined[0] else "")
+    return words + ("; undetermined ones left out" if lengths.whole.undetermined[0] else "")
 
 
 def _slice(  # type: ignore[no-untyped-def]
     axes: Axes,
-    found: GroupedLengths,
+    lengths: GroupedLengths,
     ratios: Array,
     marked: NDArray[np.bool_],
     limits: tuple[float, float],
 ):
     """Ratios (x, y) as colours, crosses where `marked`, dashes where nothing is determined."""
-    sides = [_centres(found, axis) for axis in (0, 1)]
+    sides = [_centres(lengths, axis) for axis in (0, 1)]
     image = axes.pcolormesh(
         *(_borders(side) for side in sides),
         np.ma.masked_invalid(ratios.T),
@@ -160,13 +162,13 @@ def _slice(  # type: ignore[no-untyped-def]
     return image
 
 
-def _centres(found: GroupedLengths, axis: int) -> Array:
+def _centres(lengths: GroupedLengths, axis: int) -> Array:
     """Co-ordinates of the grid along an axis, in millimetres."""
-    return np.unique(1e3 * found.points[:, axis].round(12))
+    return np.unique(1e3 * lengths.points[:, axis].round(12))
 
 
-def _millimetres(found: GroupedLengths, axis: int, level: int) -> str:
-    return f"{_centres(found, axis)[level] + 0.0:.6g}"
+def _millimetres(lengths: GroupedLengths, axis: int, level: int) -> str:
+    return f"{_centres(lengths, axis)[level] + 0.0:.6g}"
 
 
 def _borders(centres: Array) -> Array:
@@ -175,16 +177,20 @@ def _borders(centres: Array) -> Array:
     return np.append(centres - half, centres[-1] + half)
 
 
-def _curves(axes: Axes, found: GroupedLengths) -> None:
+def _curves(axes: Axes, lengths: GroupedLengths) -> None:
     """Average and largest u of each class of length, the largest k u, and the target."""
-    groups, edges = found.by_length, 1e3 * found.edges
+    groups, edges = lengths.by_length, 1e3 * lengths.edges
     middle = 0.5 * (edges[1:] + edges[:-1])
-    k = f"{found.settings.coverage_factor:g}"
+    k = f"{lengths.settings.coverage_factor:g}"
     axes.plot(
-        edges, 1e6 * found.settings.target.at(found.edges), color=INK, linewidth=1.2, label="target"
+        edges,
+        1e6 * lengths.settings.target.at(lengths.edges),
+        color=INK,
+        linewidth=1.2,
+        label="target",
     )
     curves = [("u, average", groups.average), ("u, largest", groups.maximum)]
-    curves.append((f"{k} u, largest", found.settings.coverage_factor * groups.maximum))
+    curves.append((f"{k} u, largest", lengths.settings.coverage_factor * groups.maximum))
     for j, (label, values) in enumerate(curves):
         axes.plot(
             middle,

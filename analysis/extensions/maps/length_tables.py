@@ -90,8 +90,8 @@ class LengthMap(GroupedLengths, Result):
         if self.worst is not None:
             i, j = self.worst
             ratio = settings.target_factor * float(whole.maximum_ratio[0])
-            told = f"largest ratio of {_compared(self)} to the target: {number(ratio)}"
-            lines.append(f"{told}, from {_place(self.points[i])} to {_place(self.points[j])}")
+            summary = f"largest ratio of {_compared(self)} to the target: {number(ratio)}"
+            lines.append(f"{summary}, from {_place(self.points[i])} to {_place(self.points[j])}")
         return [
             *lines,
             "",
@@ -135,13 +135,13 @@ class LengthMap(GroupedLengths, Result):
         data = self.to_dict()
         rows = []
         for group, name in (
-            ("by_length", lambda one: f"{1e3 * one['from']:g} to {1e3 * one['to']:g} mm"),
-            ("by_direction", lambda one: one["direction"]),
-            ("by_point", lambda one: _place(one["point"])),
+            ("by_length", lambda row: f"{1e3 * row['from']:g} to {1e3 * row['to']:g} mm"),
+            ("by_direction", lambda row: row["direction"]),
+            ("by_point", lambda row: _place(row["point"])),
         ):
-            for one in data[group]:
-                kept = {k.replace("_", " "): v for k, v in one.items() if k not in HEADS}
-                rows.append({"group": group.replace("_", " "), "of": name(one), **kept})
+            for row in data[group]:
+                cells = {k.replace("_", " "): v for k, v in row.items() if k not in HEADS}
+                rows.append({"group": group.replace("_", " "), "of": name(row), **cells})
         lengths = {"average": "average, µm", "maximum": "maximum, µm"}
         return {lengths.get(name, name): name for name in rows[0]}, rows
 

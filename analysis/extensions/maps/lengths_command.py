@@ -117,16 +117,16 @@ def run(options: Namespace) -> int:
             " --grid coarser"
         )
     with progress(options) as shown:
-        found = length_map(experiment, settings, shown.show)
+        lengths = length_map(experiment, settings, shown.show)
     contents: dict[Path | None, Writer] = {
-        options.output: _of_lines(point_csv(found)),
+        options.output: _of_lines(point_csv(lengths)),
         options.pairs: _of_lines(pair_csv(experiment, settings)),
-        options.plot: found.plot,
+        options.plot: lengths.plot,
     }
     write(options, contents)
-    show(options, found)
-    is_missed = options.fail and not found.is_met
-    return 0 if found.as_expected and not is_missed else 1
+    show(options, lengths)
+    is_missed = options.fail and not lengths.is_met
+    return 0 if lengths.as_expected and not is_missed else 1
 
 
 def _of_lines(lines: Iterable[str]) -> Writer:

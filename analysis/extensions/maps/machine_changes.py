@@ -46,11 +46,9 @@ class MachineChange:
         if self.towards is None:
             more = "less" if self.amount < 0.0 else "more"
             return f"{letter} made to read {number(1e6 * size)} µm per m {more}"
-        other = AXIS_NAMES[self.towards].upper()
         sign = "-" if self.amount < 0.0 else "+"
-        return (
-            f"{letter} guideway turned by {number(size / ARCSECOND)} arcsec towards {sign}{other}"
-        )
+        direction = f"{sign}{AXIS_NAMES[self.towards].upper()}"
+        return f"{letter} guideway turned by {number(size / ARCSECOND)} arcsec towards {direction}"
 
 
 def scale_change(text: str) -> MachineChange:
@@ -82,8 +80,8 @@ def guideway_turn(text: str) -> MachineChange:
     0.001
     """
     name, equal, value = (part.strip() for part in text.partition("="))
-    found = re.fullmatch("([xyz])([+-])([xyz])", name.lower())
-    if not equal or found is None or found[1] == found[3]:
+    match = re.fullmatch("([xyz])([+-])([xyz])", name.lower())
+    if not equal or match is None or match[1] == match[3]:
         raise ValueError(
             f'"{text}" is no turn of a guideway; write for example y-x="12 arcsec" for the Y'
             ' guideway towards -X, or y-x="0.25 turns of 1 mm at 400 mm" for its screw'
@@ -97,9 +95,9 @@ def guideway_turn(text: str) -> MachineChange:
         if not arm > 0.0:
             raise ValueError(f'"{screw[3]}" is no arm of a screw; it must be above zero')
         angle = count * pitch / arm
-    axis, towards = AXIS_NAMES.index(found[1]), AXIS_NAMES.index(found[3])
+    axis, towards = AXIS_NAMES.index(match[1]), AXIS_NAMES.index(match[3])
     angle = _within(text, angle)
-    return MachineChange(axis, -angle if found[2] == "-" else angle, towards)
+    return MachineChange(axis, -angle if match[2] == "-" else angle, towards)
 
 
 def _parsed(text: str, parse: Any) -> float:

@@ -128,10 +128,10 @@ def _points(text: str) -> int | Path:
 
     if not text.isdigit():
         return Path(text)
-    found = count(text)
-    if not 2 <= found <= MOST_POINTS:
-        raise ArgumentTypeError(f"a line has 2 to {MOST_POINTS} points, not {found}")
-    return found
+    number = count(text)
+    if not 2 <= number <= MOST_POINTS:
+        raise ArgumentTypeError(f"a line has 2 to {MOST_POINTS} points, not {number}")
+    return number
 
 
 def _draw(text: str) -> int:
@@ -164,9 +164,9 @@ def run(options: Namespace) -> int:
     from .realisations import Draws
     from .volumetric_results import VolumetricMap
 
-    others = (options.line, options.plane, options.error)
+    exclusive = (options.line, options.plane, options.error)
     table = options.points if isinstance(options.points, Path) else None
-    is_grid = table is None and all(one is None for one in others)
+    is_grid = table is None and all(option is None for option in exclusive)
     if options.magnification is not None and (options.plot is None or not is_grid):
         raise UsageError("--magnification is for the drawing of the grid; leave it out")
     if options.seed is not None and options.draw is None:
@@ -177,13 +177,13 @@ def run(options: Namespace) -> int:
     draws = None if options.draw is None else Draws(options.draw, seed)
     tasks = () if options.tasks is None else load(options.tasks)
     try:
-        found = map_errors(
+        errors = map_errors(
             options.file, asked, options.error, options.probe, draws, options.budget, tasks
         )
     except ValueError as error:
         raise UsageError(error) from None
-    draw = found.plot
-    if options.magnification is not None and isinstance(found, VolumetricMap | FittedErrorMap):
-        draw = partial(found.plot, magnification=options.magnification)
-    show_errors(options, found, draw)
+    draw = errors.plot
+    if options.magnification is not None and isinstance(errors, VolumetricMap | FittedErrorMap):
+        draw = partial(errors.plot, magnification=options.magnification)
+    show_errors(options, errors, draw)
     return 0

@@ -63,24 +63,24 @@ def converted(
     """
     x, p, tips = _places(fitted, model)
     zero, d = np.zeros(len(model.parameters)), fitted.dimension
-    own = model.jacobian(x, zero, p).reshape(x.size, -1)
+    own_columns = model.jacobian(x, zero, p).reshape(x.size, -1)
     wanted = (fitted.model.error(x, fitted.values, p) - p).ravel()
     by_old = fitted.model.jacobian(x, fitted.values, p).reshape(x.size, -1)
-    size = np.array([1.0 / one.effect for one in model.parameters])
-    inverse = np.linalg.pinv(own * size, rcond=NOTHING)
+    size = np.array([1.0 / parameter.effect for parameter in model.parameters])
+    inverse = np.linalg.pinv(own_columns * size, rcond=NOTHING)
     arm = x + p - (x + p).mean(axis=0)
     shifts = np.broadcast_to(np.eye(d), (len(x), d, d))
     motions = np.concatenate([shifts, rotation_sensitivity(arm)], axis=2).reshape(x.size, -1)
 
-    def left(columns: Array) -> Array:
-        return np.asarray(columns - own @ (size[:, None] * (inverse @ columns)))
+    def residual(columns: Array) -> Array:
+        return np.asarray(columns - own_columns @ (size[:, None] * (inverse @ columns)))
 
     # What the model can move by itself is no motion between frames.
-    beyond = left(motions)
+    beyond = residual(motions)
     used = np.linalg.norm(beyond, axis=0) > OWN_MOTION * np.linalg.norm(motions, axis=0)
     moving = np.linalg.pinv(beyond[:, used], rcond=OWN_MOTION)
     sides = np.column_stack([wanted, by_old])
-    moved = moving @ left(sides)
+    moved = moving @ residual(sides)
     by_both = size[:, None] * (inverse @ (sides - motions[:, used] @ moved))
     values, matrix = by_both[:, 0], by_both[:, 1:]
     motion = np.zeros(motions.shape[1])
@@ -116,9 +116,9 @@ def _places(fitted: FittedMap, model: ErrorModel) -> tuple[Array, Array, Array]:
     x = volume.lower + volume.size * fractions
     arms = USUAL_OFFSET * float(volume.size.max()) * np.eye(d)
     tips = np.concatenate([fitted.probes.offsets, arms])
-    of = np.arange(len(x)) % len(tips)
-    x, of = (
+    tip_indices = np.arange(len(x)) % len(tips)
+    x, tip_indices = (
         np.concatenate([x, np.repeat(x[: len(corners)], len(tips), axis=0)]),
-        np.append(of, np.tile(np.arange(len(tips)), len(corners))),
+        np.append(tip_indices, np.tile(np.arange(len(tips)), len(corners))),
     )
-    return x, tips[of], np.unique(tips, axis=0)
+    return x, tips[tip_indices], np.unique(tips, axis=0)

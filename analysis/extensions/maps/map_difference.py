@@ -68,8 +68,8 @@ class MapDifference(Result):
 
     @property
     def title(self) -> str:
-        both = dict.fromkeys([self.first.title, self.second.title])
-        return "; ".join(both)
+        titles = dict.fromkeys([self.first.title, self.second.title])
+        return "; ".join(titles)
 
     @property
     def years(self) -> float | None:
@@ -99,9 +99,9 @@ class MapDifference(Result):
     @property
     def tests(self) -> tuple[JointTest, ...]:
         """The joint tests that decide: of the map as a whole, and of each plate."""
-        found = self.comparison
-        every = (found.test, *(one.test for one in found.plates))
-        return tuple(one for one in every if one is not None)
+        comparison = self.comparison
+        every = (comparison.test, *(plate.test for plate in comparison.plates))
+        return tuple(test for test in every if test is not None)
 
     @property
     def is_changed(self) -> bool | None:
@@ -132,8 +132,8 @@ class MapDifference(Result):
         return "readings in common may hide a change" if is_hidden else "no change is shown"
 
     def lines(self) -> list[str]:
-        found, k = self.comparison, self.coverage_factor
-        probe = f", measured with probe {found.probe}" if found.probe else ""
+        comparison, k = self.comparison, self.coverage_factor
+        probe = f", measured with probe {comparison.probe}" if comparison.probe else ""
         lines = [
             f"{self.label}: {self.title}",
             (
@@ -142,9 +142,9 @@ class MapDifference(Result):
             ),
             self._assumption(),
             *(
-                verdict_line(one.lack_of_fit, one.label)
-                for one in (self.first, self.second)
-                if not one.is_expected
+                verdict_line(side.lack_of_fit, side.label)
+                for side in (self.first, self.second)
+                if not side.is_expected
             ),
             "",
             *self._motion_table(),
@@ -154,39 +154,43 @@ class MapDifference(Result):
         ]
         if self.in_common == "same":
             return lines
-        if found.functions:
+        if comparison.functions:
             lines += ["", *self._function_table()]
         else:
-            lines += ["", f"error functions are not compared: {found.why_no_functions}"]
+            lines += ["", f"error functions are not compared: {comparison.why_no_functions}"]
         return lines
 
     @property
     def notes(self) -> tuple[str, ...]:
-        found = [
-            f"warning: sigma of {one.label} comes from {one.degrees_of_freedom:g} degrees of"
+        cautions = [
+            f"warning: sigma of {side.label} comes from {side.degrees_of_freedom:g} degrees of"
             f" freedom; with so few, more than {_share(0.0455)} exceed |E_n| = 1 by chance"
-            for one in (self.first, self.second)
-            if one.degrees_of_freedom < FEW
+            for side in (self.first, self.second)
+            if side.degrees_of_freedom < FEW
         ]
-        for one in (self.first, self.second):
-            found += [f"warning: {one.label}: {caution}" for caution in one.cautions if caution]
+        for side in (self.first, self.second):
+            cautions += [
+                f"warning: {side.label}: {caution}" for caution in side.cautions if caution
+            ]
         if self.in_common == "same":
-            found.append(f"warning: {SAME_READINGS}")
+            cautions.append(f"warning: {SAME_READINGS}")
         elif once := positions_in_common(self.first, self.second):
-            found.append(f"warning: {read_once_words(once)}")
+            cautions.append(f"warning: {read_once_words(once)}")
         elif self.is_too_alike:
-            found.append(f"warning: {TOO_ALIKE}")
-        return tuple(found)
+            cautions.append(f"warning: {TOO_ALIKE}")
+        return tuple(cautions)
 
     def _assumption(self) -> str:
         if self.in_common != "none":
             return SAME_READINGS if self.in_common == "same" else SOME_READINGS
-        expected = [one for one in (self.first, self.second) if one.is_expected]
+        expected = [side for side in (self.first, self.second) if side.is_expected]
         if expected:
-            one = expected[0]
-            known = "exactly known" if not one.root.size and one.stated is None else "as well known"
-            known += "" if known == "exactly known" else " as is stated"
-            return f"{one.label} is no measurement, and is {known}"
+            side = expected[0]
+            knowledge = (
+                "exactly known" if not side.root.size and side.stated is None else "as well known"
+            )
+            knowledge += "" if knowledge == "exactly known" else " as is stated"
+            return f"{side.label} is no measurement, and is {knowledge}"
         if self.shared is None:
             return INDEPENDENT
         return (
@@ -200,48 +204,55 @@ class MapDifference(Result):
         values = zip(motion.names, motion.values, motion.standard_uncertainties, strict=True)
         for name, value, u in values:
             unit = "µm" if name.startswith("shift") else "µrad"
-            told = "undetermined" if math.isnan(u) else number(1e6 * value)
-            rows.append([name, told, number(1e6 * k * u), unit])
-        return [*aligned(rows, [False, True, True, False]), *map(self._held, self._measured())]
+            value_text = "undetermined" if math.isnan(u) else number(1e6 * value)
+            rows.append([name, value_text, number(1e6 * k * u), unit])
+        return [*aligned(rows, [False, True, True, False]), *map(self._held_line, self._measured())]
 
     def _measured(self) -> tuple[ComparedMap, ...]:
-        return tuple(one for one in (self.first, self.second) if not one.is_expected)
+        return tuple(side for side in (self.first, self.second) if not side.is_expected)
 
-    def _held(self, one: ComparedMap) -> str:
-        every = MOTIONS[one.dimension]
-        turns = {f"{name} of the probe" for name in every[one.dimension :]}
-        held = set(one.held)
+    def _held_line(self, side: ComparedMap) -> str:
+        every = MOTIONS[side.dimension]
+        turns = {f"{name} of the probe" for name in every[side.dimension :]}
+        held_motions = set(side.held)
         parts = []
-        if held >= set(every):
+        if held_motions >= set(every):
             parts.append("every motion of the frame")
         else:
-            parts += [name for name in every if name in held]
-        parts += ["the orientation of the probe"] if held >= turns else sorted(held & turns)
-        told = ", ".join(parts) or "nothing"
-        return f"({one.label}: the conditions of its error model take out {told})"
+            parts += [name for name in every if name in held_motions]
+        parts += (
+            ["the orientation of the probe"]
+            if held_motions >= turns
+            else sorted(held_motions & turns)
+        )
+        motions = ", ".join(parts) or "nothing"
+        return f"({side.label}: the conditions of its error model take out {motions})"
 
-    def _told_groups(self) -> tuple[FigureGroup, ...]:
+    def _shown_groups(self) -> tuple[FigureGroup, ...]:
         """Groups of figures, those of all error functions as one."""
-        found = self.comparison
-        lengths, plates = found.lengths, tuple(one.figures for one in found.plates)
-        of_functions = [one.figures for one in found.functions]
+        comparison = self.comparison
+        lengths, plates = (
+            comparison.lengths,
+            tuple(compared_part.figures for compared_part in comparison.plates),
+        )
+        of_functions = [compared_part.figures for compared_part in comparison.functions]
         joined = (_joined(of_functions),) if of_functions else ()
-        return (*lengths, found.places, *joined, *plates)
+        return (*lengths, comparison.places, *joined, *plates)
 
     def _tested_lines(self) -> list[str]:
-        lines = [*_group_table(self._told_groups()), ""]
-        for one in self.tests:
-            freedom = one.degrees_of_freedom
+        lines = [*_group_table(self._shown_groups()), ""]
+        for test in self.tests:
+            freedom = test.degrees_of_freedom
             scatter = "" if math.isinf(freedom) else f" (sigma of {freedom:.0f} degrees of freedom)"
-            if one.fixed:
+            if test.fixed:
                 scatter += (
-                    f", {one.fixed} more fixed by the certificate and not tested, the same to"
-                    f" {number(1e6 * one.held, 2)} µm"
+                    f", {test.fixed} more fixed by the certificate and not tested, the same to"
+                    f" {number(1e6 * test.held, 2)} µm"
                 )
             lines.append(
-                f"{one.what}, one joint test: chi-squared {number(one.statistic)} of"
-                f" {one.dimensions} independent differences{scatter}, p = {_chance(one.p)}:"
-                f" {self._verdict(one)}"
+                f"{test.what}, one joint test: chi-squared {number(test.statistic)} of"
+                f" {test.dimensions} independent differences{scatter}, p = {_chance(test.p)}:"
+                f" {self._verdict(test)}"
             )
         lines.append(
             "a single |E_n| > 1 among many figures shows nothing, since about as many as stated by"
@@ -255,7 +266,7 @@ class MapDifference(Result):
         heads = ["length", "difference, µm", "U, µm", "E_n"]
         rows = [heads + (["µm per year", "U, µm per year"] if years else [])]
         for group in self.comparison.lengths:
-            for place in _told(group):
+            for place in _shown_places(group):
                 value, u = group.differences[place], group.standard_uncertainties[place]
                 is_open = math.isnan(u)
                 row = [
@@ -272,33 +283,36 @@ class MapDifference(Result):
 
     def _function_table(self) -> list[str]:
         rows = [["error function", "largest |E_n|", "at", "chi-squared", "of", "p"]]
-        for one in self.comparison.functions:
-            place, test = one.figures.largest, one.test
-            value = math.nan if place is None else abs(float(one.figures.normalised[place]))
+        for function in self.comparison.functions:
+            place, test = function.figures.largest, function.test
+            value = math.nan if place is None else abs(float(function.figures.normalised[place]))
             rows.append(
                 [
-                    f"{one.name} {one.axis}",
+                    f"{function.name} {function.axis}",
                     "undetermined" if place is None else number(value, 3),
-                    "" if place is None else one.figures.names[place].partition(" at ")[2],
+                    "" if place is None else function.figures.names[place].partition(" at ")[2],
                     "" if test is None else number(test.statistic),
                     "" if test is None else str(test.dimensions),
                     "" if test is None else _chance(test.p),
                 ]
             )
-        count = sum(one.test is not None for one in self.comparison.functions)
-        told = (
+        count = sum(function.test is not None for function in self.comparison.functions)
+        remark = (
             f"({count} tests: the smallest p of as many is below {LEVEL / max(count, 1):.2g} once"
             f" in {round(1 / LEVEL)} where nothing has changed)"
         )
-        return [*aligned(rows, [False, True, False, True, True, True]), told]
+        return [*aligned(rows, [False, True, False, True, True, True]), remark]
 
     def to_dict(self) -> dict[str, Any]:
-        found, motion = self.comparison, self.comparison.motion
-        tested = (*self.tests, *(one.test for one in found.functions if one.test is not None))
+        comparison, motion = self.comparison, self.comparison.motion
+        tested = (
+            *self.tests,
+            *(function.test for function in comparison.functions if function.test is not None),
+        )
         return {
             "first": _map_data(self.first),
             "second": _map_data(self.second),
-            "probe": found.probe,
+            "probe": comparison.probe,
             "coverage_factor": self.coverage_factor,
             "shared_values": self.shared,
             "same_readings": self.in_common == "same",
@@ -317,15 +331,15 @@ class MapDifference(Result):
                     motion.names, motion.values, motion.standard_uncertainties, strict=True
                 )
             ],
-            "tests": [_test_data(one) for one in tested],
+            "tests": [_test_data(test) for test in tested],
             "groups": [
                 {
                     **picked(group, "kind", "count", "undetermined", "exceeding"),
                     "share_by_chance": group.by_chance,
                 }
-                for group in found.groups
+                for group in comparison.groups
             ],
-            "functions_not_compared": found.why_no_functions or None,
+            "functions_not_compared": comparison.why_no_functions or None,
             "figures": [
                 {
                     name: finite(value) if isinstance(value, float) else value
@@ -337,7 +351,7 @@ class MapDifference(Result):
 
     def rows(self) -> list[dict[str, Any]]:
         """One row for each figure that is compared, or undetermined."""
-        found = []
+        table = []
         for group in self.comparison.groups:
             normalised, is_compared = group.normalised, group.is_compared
             for k, name in enumerate(group.names):
@@ -356,8 +370,8 @@ class MapDifference(Result):
                 }
                 if self.years:
                     row["per year"] = difference / self.years
-                found.append(row)
-        return found
+                table.append(row)
+        return table
 
     def plot(self, path: str | Path | None = None) -> Figure:
         """What changed: the difference at points of the volume as magnified vectors, and E_n of
@@ -381,30 +395,34 @@ def _share(share: float) -> str:
     return f"{100.0 * share:.1f} %"
 
 
-def _told(group: FigureGroup) -> list[int]:
+def _shown_places(group: FigureGroup) -> list[int]:
     """Figures of a group that are told one by one."""
     if len(group.names) <= TOLD:
         return list(range(len(group.names)))
     sizes = comparable(np.nan_to_num(np.abs(group.normalised)))
-    found: list[int] = np.argsort(-sizes, kind="stable")[:LARGEST].tolist()
-    return found
+    largest: list[int] = np.argsort(-sizes, kind="stable")[:LARGEST].tolist()
+    return largest
 
 
 def _joined(groups: Sequence[FigureGroup]) -> FigureGroup:
     """Groups of several units as one, of differences in their own standard uncertainties."""
-    compared = [one.is_compared | np.isnan(one.standard_uncertainties) for one in groups]
+    compared = [group.is_compared | np.isnan(group.standard_uncertainties) for group in groups]
     open_ = [
-        np.isnan(one.standard_uncertainties[w]) for one, w in zip(groups, compared, strict=True)
+        np.isnan(group.standard_uncertainties[w]) for group, w in zip(groups, compared, strict=True)
     ]
     u = np.where(np.concatenate(open_), np.nan, 1.0)
-    normalised = [one.normalised[which] for one, which in zip(groups, compared, strict=True)]
+    normalised = [
+        group.normalised[is_compared] for group, is_compared in zip(groups, compared, strict=True)
+    ]
     names = (
         name
-        for one, which in zip(groups, compared, strict=True)
-        for name, is_in in zip(one.names, which, strict=True)
+        for group, is_compared in zip(groups, compared, strict=True)
+        for name, is_in in zip(group.names, is_compared, strict=True)
         if is_in
     )
-    chances = [one.chances[which] for one, which in zip(groups, compared, strict=True)]
+    chances = [
+        group.chances[is_compared] for group, is_compared in zip(groups, compared, strict=True)
+    ]
     k = groups[0].coverage_factor
     return FigureGroup(
         "error functions",
@@ -419,34 +437,36 @@ def _joined(groups: Sequence[FigureGroup]) -> FigureGroup:
 
 def _group_table(groups: Sequence[FigureGroup]) -> list[str]:
     rows = [["figures", "compared", "|E_n| > 1", "by chance", "largest |E_n|", "at"]]
-    for one in groups:
-        place = one.largest
-        count = str(one.count)
-        if one.undetermined:
-            count += f" ({one.undetermined} undetermined)"
-        share = f"{one.exceeding} ({_share(one.exceeding / one.count)})" if one.count else ""
+    for group in groups:
+        place = group.largest
+        count = str(group.count)
+        if group.undetermined:
+            count += f" ({group.undetermined} undetermined)"
+        share = (
+            f"{group.exceeding} ({_share(group.exceeding / group.count)})" if group.count else ""
+        )
         rows.append(
             [
-                one.kind,
+                group.kind,
                 count,
                 share,
-                _share(one.by_chance) if one.count else "",
-                "" if place is None else number(abs(float(one.normalised[place])), 3),
-                "" if place is None else one.names[place],
+                _share(group.by_chance) if group.count else "",
+                "" if place is None else number(abs(float(group.normalised[place])), 3),
+                "" if place is None else group.names[place],
             ]
         )
     return aligned(rows, [False, True, True, True, True, False])
 
 
-def _map_data(one: ComparedMap) -> dict[str, Any]:
+def _map_data(side: ComparedMap) -> dict[str, Any]:
     return {
-        "label": one.label,
-        "title": one.title,
-        "date": one.date,
-        "expected": one.is_expected,
-        "degrees_of_freedom": finite(one.degrees_of_freedom),
-        **({} if one.is_expected else {"lack_of_fit": verdict_data(one.lack_of_fit)}),
-        "frame_takes_out": list(one.held),
+        "label": side.label,
+        "title": side.title,
+        "date": side.date,
+        "expected": side.is_expected,
+        "degrees_of_freedom": finite(side.degrees_of_freedom),
+        **({} if side.is_expected else {"lack_of_fit": verdict_data(side.lack_of_fit)}),
+        "frame_takes_out": list(side.held),
     }
 
 

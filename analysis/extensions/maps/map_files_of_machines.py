@@ -55,11 +55,11 @@ def map_errors(
     :raises ValueError: what does not go together, or is not in the machine.
     """
     if error is not None:
-        given = {**vars(asked), "probe": probe, "draw": draws, "budget": with_budget or None}
-        given["tasks"] = tasks or None
-        others = [name for name, value in given.items() if value is not None]
-        if others:
-            raise ValueError(f"{others[0]} and error do not go together; give one of them")
+        choices = {**vars(asked), "probe": probe, "draw": draws, "budget": with_budget or None}
+        choices["tasks"] = tasks or None
+        stated_choices = [name for name, value in choices.items() if value is not None]
+        if stated_choices:
+            raise ValueError(f"{stated_choices[0]} and error do not go together; give one of them")
     if isinstance(source, Path) and not is_map_file(source):
         if probe is not None:
             raise ValueError("a machine file states its own probe; leave the probe out")
@@ -69,6 +69,6 @@ def map_errors(
     fitted, label = map_of_source(source)
     if error is not None:
         return error_curves(fitted, label, (error,))
-    lengths = [tasks_of_experiment(fitted, one) for one in tasks]
+    lengths = [tasks_of_experiment(fitted, task) for task in tasks]
     wanted = reduce(Tasks.beside, lengths) if lengths else None
     return fitted_map_errors(fitted, label, asked, probe, draws, with_budget, wanted)

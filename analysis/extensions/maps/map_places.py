@@ -92,10 +92,10 @@ def parse_plane(text: str) -> dict[str, float]:
     >>> parse_plane("z = 200 mm")
     {'z': 0.2}
     """
-    found = parse_line(text)
-    if len(found) != 1:
+    axes = parse_line(text)
+    if len(axes) != 1:
         raise ValueError("a plane keeps one axis fixed; write for example z = 200 mm")
-    return found
+    return axes
 
 
 def map_places(
@@ -107,12 +107,12 @@ def map_places(
     :raises ExperimentError: a table of points that is wrong.
     :raises ValueError: what does not go together, or is not in the volume.
     """
-    given = {
+    choices = {
         "grid": asked.grid if asked.plane is None else None,
         **picked(asked, "line", "plane"),
         "points of a file": asked.at,
     }
-    several = [name for name, value in given.items() if value is not None]
+    several = [name for name, value in choices.items() if value is not None]
     if len(several) > 1:
         raise ValueError(f"{' and '.join(several)} do not go together; give one of them")
     if asked.points is not None and asked.line is None:
@@ -125,9 +125,11 @@ def map_places(
         if not probe and PROBE in header_names(asked.at):
             text = "a machine file states its own probe; remove the column probe"
             raise refused(str(asked.at), text)
-        found = read_points(asked.at, probes, probe, volume)
-        of_points = found.names if any(found.names) else ()
-        return MapPlaces("points", found.points, (), *ends, names, of_points, found.probes)
+        points_read = read_points(asked.at, probes, probe, volume)
+        of_points = points_read.names if any(points_read.names) else ()
+        return MapPlaces(
+            "points", points_read.points, (), *ends, names, of_points, points_read.probes
+        )
     if asked.line is not None:
         start, end = _ends(volume, asked.line)
         points = np.linspace(start, end, asked.points or POINTS)
@@ -145,8 +147,8 @@ def map_places(
             raise ValueError("a plane has points along two axes; write for example --grid 9,9")
         counts.insert(axis, 1)
     if len(counts) != d:
-        told = "three numbers of points, such as 5,5,5" if d == 3 else "two, such as 5,5"
-        raise ValueError(f"the machine has {d} axes; give {told}")
+        expected = "three numbers of points, such as 5,5,5" if d == 3 else "two, such as 5,5"
+        raise ValueError(f"the machine has {d} axes; give {expected}")
     points = even_grid(lower, upper, counts)
     kind: PlaceKind = "grid" if asked.plane is None else "plane"
     return MapPlaces(kind, points, tuple(counts), *ends, names)
@@ -157,8 +159,8 @@ def _ends(volume: Volume, line: Line) -> tuple[Array, Array]:
     d = len(volume.lower)
     if isinstance(line, Mapping):
         if len(line) != d - 1 or not set(line) <= set(AXIS_NAMES[:d]):
-            what = "two axes fixed; write for example y = 600 mm, z = 600 mm"
-            raise ValueError(f"a line keeps {what}" if d == 3 else "a line keeps x or y fixed")
+            remedy = "two axes fixed; write for example y = 600 mm, z = 600 mm"
+            raise ValueError(f"a line keeps {remedy}" if d == 3 else "a line keeps x or y fixed")
         ends = np.stack([volume.lower, volume.upper])
         for name, value in line.items():
             ends[:, AXIS_NAMES.index(name)] = value
@@ -170,8 +172,8 @@ def _ends(volume: Volume, line: Line) -> tuple[Array, Array]:
     return ends[0], ends[1]
 
 
-def _ensure_inside(volume: Volume, ends: Array, what: str) -> None:
+def _ensure_inside(volume: Volume, ends: Array, subject: str) -> None:
     outside = np.flatnonzero(((ends < volume.lower) | (ends > volume.upper)).any(axis=0))
     if len(outside):
         named = " and ".join(AXIS_NAMES[k] for k in outside)
-        raise ValueError(f"the {what} is outside the volume in {named}")
+        raise ValueError(f"the {subject} is outside the volume in {named}")

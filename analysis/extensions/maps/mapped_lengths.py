@@ -39,22 +39,22 @@ def mapped_lengths(
 
     :raises ValueError: both points of a pair are at the same place.
     """
-    values, read, uncertainties = (np.zeros(len(pairs)) for _ in range(3))
+    values, readings, uncertainties = (np.zeros(len(pairs)) for _ in range(3))
     root = np.zeros((len(pairs), fitted.root.shape[1]))
     for start in range(0, len(pairs), LENGTHS_AT_ONCE):
         some = slice(start, start + LENGTHS_AT_ONCE)
         used, place = np.unique(pairs[some], return_inverse=True)
         first, second = place.reshape(-1, 2).T
-        x, own = points[used], probes[used]
-        places, rows = corrected(fitted, x, own)
-        drawn = drawn_rows(fitted, x, own)
+        x, ends = points[used], probes[used]
+        places, rows = corrected(fitted, x, ends)
+        drawn = drawn_rows(fitted, x, ends)
         apart = places[first] - places[second]
         values[some] = np.linalg.norm(apart, axis=1)
         if not values[some].all():
             raise ValueError("both points of a length are at the same place")
         unit = apart / values[some][:, None]
-        tip = tips(fitted, x, own)
-        read[some] = np.linalg.norm(tip[first] - tip[second], axis=1)
+        tip = tips(fitted, x, ends)
+        readings[some] = np.linalg.norm(tip[first] - tip[second], axis=1)
         of_lengths = np.einsum("md,mds->ms", unit, rows[first] - rows[second])
         as_drawn = (
             None if drawn is None else np.einsum("md,mds->ms", unit, drawn[first] - drawn[second])
@@ -62,4 +62,4 @@ def mapped_lengths(
         root[some] = fitted.function_root(of_lengths, as_drawn)
         of_readings = 2.0 * (unit**2) @ (scatter * fitted.repeatability) ** 2
         uncertainties[some] = np.sqrt((root[some] ** 2).sum(axis=1) + of_readings)
-    return MappedLengths(values, read, uncertainties, root)
+    return MappedLengths(values, readings, uncertainties, root)

@@ -110,17 +110,17 @@ class ValueDifference:
     def is_open(self) -> NDArray[np.bool_]:
         """Which (m,) either map leaves undetermined."""
         values = np.zeros(len(self.values))
-        for one in (self.first, self.second):
-            values = values + blank(np.zeros(len(values)), one.null, one.size)
+        for mapped in (self.first, self.second):
+            values = values + blank(np.zeros(len(values)), mapped.null, mapped.size)
         return np.isnan(values)
 
     @property
     def roots(self) -> Roots:
         """Square roots (m, r) of both campaigns' parts of the covariance."""
-        one, other = self.first, self.second
+        first_map, second_map = self.first, self.second
         first, second = (scatter.sigma for scatter in self.scatters)
-        common = one.shared / first - other.shared / second
-        return with_common((one.root, other.root), common, self.scatters)
+        common = first_map.shared / first - second_map.shared / second
+        return with_common((first_map.root, second_map.root), common, self.scatters)
 
     def variances(self) -> Roots:
         """Both campaigns' parts of the variances (m,)."""
@@ -142,7 +142,9 @@ class ValueDifference:
         """The differences as figures of one kind; `stated` variances (m,) of either side are
         added.
         """
-        first, second = (one + more for one, more in zip(self.variances(), stated, strict=True))
+        first, second = (
+            variance + more for variance, more in zip(self.variances(), stated, strict=True)
+        )
         with np.errstate(invalid="ignore"):
             shares = np.nan_to_num(first / (first + second))
         u = np.where(self.is_open, np.nan, np.sqrt(first + second))
@@ -154,18 +156,23 @@ class ValueDifference:
         """The test of all of them together, in the space of what has an uncertainty less what is
         undetermined; None where nothing is left of it.
         """
-        both = self.first, self.second
-        found = self.by(
-            orthonormal(np.hstack([m for one in both for m in (one.root, one.shared)])).T
+        sides = self.first, self.second
+        difference = self.by(
+            orthonormal(np.hstack([m for side in sides for m in (side.root, side.shared)])).T
         )
-        null = np.concatenate([one.null for one in (found.first, found.second)], axis=1)
+        null = np.concatenate([side.null for side in (difference.first, difference.second)], axis=1)
         if null.shape[1]:
             size = max(
-                float(np.abs(one.size).max(initial=0.0)) for one in (found.first, found.second)
+                float(np.abs(side.size).max(initial=0.0))
+                for side in (difference.first, difference.second)
             )
             open_ = orthonormal(null, 1e-7, size)
-            left = orthonormal(np.eye(len(null)) - open_ @ open_.T, 1e-6, 1.0)
-            found = found.by(left.T)
-        alone = [m for one in (found.first, found.second) for m in (one.root, one.shared)]
-        test = joint_difference(found.values, found.roots, self.scatters, np.hstack(alone))
+            determined = orthonormal(np.eye(len(null)) - open_ @ open_.T, 1e-6, 1.0)
+            difference = difference.by(determined.T)
+        alone = [
+            m for side in (difference.first, difference.second) for m in (side.root, side.shared)
+        ]
+        test = joint_difference(
+            difference.values, difference.roots, self.scatters, np.hstack(alone)
+        )
         return None if test is None else JointTest(**vars(test), what=what)

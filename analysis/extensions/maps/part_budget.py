@@ -60,9 +60,9 @@ class _Split:
         of probes (m, d), or the same (d,) everywhere.
         """
         probe = np.broadcast_to(offset, points.shape)
-        found = [self.model.error(points, self.a * mask, probe) - probe for mask in self.masks]
+        by_part = [self.model.error(points, self.a * mask, probe) - probe for mask in self.masks]
         whole = self.model.error(points, self.a, probe) - probe
-        return np.stack([*found, whole - np.sum(found, axis=0)])
+        return np.stack([*by_part, whole - np.sum(by_part, axis=0)])
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,12 +73,12 @@ class _End:
 
     points: Array
     offsets: Array
-    stated: Array
+    stated_offsets: Array
 
     @property
     def tips(self) -> Array:
         """Where the tips (k, d) are by the scales."""
-        return self.points + self.stated
+        return self.points + self.stated_offsets
 
 
 def _figures(
@@ -91,12 +91,12 @@ def _figures(
     at_points = split.errors(points, of_points)
     whole = at_points.sum(axis=0)
     square = float((whole**2).sum()) / len(points)
-    own = np.sqrt((at_points**2).sum(axis=(1, 2)) / len(points))
+    alone = np.sqrt((at_points**2).sum(axis=(1, 2)) / len(points))
     products = (at_points * whole).sum(axis=(1, 2)) / len(points)
-    yield places.kind, False, own, _ratio(products, square), float(np.sqrt(square))
+    yield places.kind, False, alone, _ratio(products, square), float(np.sqrt(square))
     moved = split.errors(last.points, last.offsets) - split.errors(first.points, first.offsets)
     if offset >= 0:
-        moved[offset] += last.offsets - last.stated - (first.offsets - first.stated)
+        moved[offset] += last.offsets - last.stated_offsets - (first.offsets - first.stated_offsets)
     totals = length_errors(first.tips, last.tips, moved.sum(axis=0))
     along = np.einsum("md,kmd->km", _directions(first.tips, last.tips), moved)
     # What is of second order belongs to no part alone.
@@ -105,14 +105,14 @@ def _figures(
         yield name, True, along[:, k], _ratio(along[:, k], float(totals[k])), float(totals[k])
 
 
-def _flat(one: ErrorRows, count: int) -> ErrorRows:
+def _flat(rows: ErrorRows, count: int) -> ErrorRows:
     """The rows of all co-ordinates, whose squares add to the mean over points."""
-    parts = (one.rows, one.rows if one.drawn is None else one.drawn)
-    rows, drawn = (part.reshape(-1, part.shape[-1]) / np.sqrt(count) for part in parts)
-    return ErrorRows(rows, None if one.drawn is None else drawn)
+    parts = (rows.rows, rows.rows if rows.drawn is None else rows.drawn)
+    flat, drawn = (part.reshape(-1, part.shape[-1]) / np.sqrt(count) for part in parts)
+    return ErrorRows(flat, None if rows.drawn is None else drawn)
 
 
-def _one(rows: ErrorRows, k: int) -> ErrorRows:
+def _row(rows: ErrorRows, k: int) -> ErrorRows:
     return ErrorRows(rows.rows[k : k + 1], None if rows.drawn is None else rows.drawn[k : k + 1])
 
 
@@ -133,47 +133,54 @@ def fitted_budget(
     fitted: FittedMap, places: MapPlaces, probes: Integers, probe: int
 ) -> tuple[PartBudget, ...]:
     """Budgets of the errors of a fitted machine at points, and of the lengths beside them."""
-    functions = {one.function: one.meaning for one in reversed(fitted.parameters)}
-    of = list(dict.fromkeys(one.function for one in fitted.parameters))
-    masks = np.array([[one.function == name for one in fitted.parameters] for name in of])
-    parts = [OFFSETS if name == "offset" else (name, functions[name]) for name in of]
+    functions = {parameter.function: parameter.meaning for parameter in reversed(fitted.parameters)}
+    functions_in_order = list(dict.fromkeys(parameter.function for parameter in fitted.parameters))
+    masks = np.array(
+        [
+            [parameter.function == name for parameter in fitted.parameters]
+            for name in functions_in_order
+        ]
+    )
+    parts = [
+        OFFSETS if name == "offset" else (name, functions[name]) for name in functions_in_order
+    ]
     offsets = fitted.probes.offsets
     split = _Split(fitted.model, fitted.values, masks[:, : len(fitted.values)])
     at_points = rows_of_errors(fitted, places.points, probes)
     of_lengths = length_rows(fitted, places, probe)
     count = len(places.points)
-    rows = [_flat(at_points, count), *(_one(of_lengths, k) for k in range(len(places.names)))]
+    rows = [_flat(at_points, count), *(_row(of_lengths, k) for k in range(len(places.names)))]
     first, last = (
-        _End(points, offsets[own], fitted.drawn_offsets[own])
-        for points, own in length_ends(places, probe)
+        _End(points, offsets[end_probes], fitted.drawn_offsets[end_probes])
+        for points, end_probes in length_ends(places, probe)
     )
-    estimated = of.index("offset") if "offset" in of else -1
+    estimated = functions_in_order.index("offset") if "offset" in functions_in_order else -1
     figures = _figures(split, places, offsets[probes], (first, last), estimated)
-    found = []
-    for (name, is_length, errors, shares, total), own in zip(figures, rows, strict=True):
+    budgets = []
+    for (name, is_length, errors, shares, total), rows_of_figure in zip(figures, rows, strict=True):
         is_open = np.array(
-            [np.isnan(_masked(own, mask).uncertainties(fitted)).any() for mask in masks]
+            [np.isnan(_masked(rows_of_figure, mask).uncertainties(fitted)).any() for mask in masks]
         )
         is_open = np.append(is_open, is_open.any())
-        undetermined = bool(np.isnan(own.uncertainties(fitted)).any())
-        squares = own.rows.T @ own.rows
+        undetermined = bool(np.isnan(rows_of_figure.uncertainties(fitted)).any())
+        squares = rows_of_figure.rows.T @ rows_of_figure.rows
         alone = np.array([np.sum(fitted.covariance[m][:, m] * squares[m][:, m]) for m in masks])
         with_whole = masks @ np.einsum("ij,ji->i", fitted.covariance, squares)
         variance = float(with_whole.sum())
-        both = is_open | undetermined
-        one = PartBudget(
+        is_unknown = is_open | undetermined
+        budget = PartBudget(
             name,
             is_length,
             (*parts, REST),
             np.where(is_open, np.nan, errors),
-            np.where(both, np.nan, shares),
+            np.where(is_unknown, np.nan, shares),
             np.nan if undetermined else total,
             np.where(is_open, np.nan, np.sqrt(np.append(alone, 0.0))),
-            np.where(both, np.nan, _ratio(np.append(with_whole, 0.0), variance)),
+            np.where(is_unknown, np.nan, _ratio(np.append(with_whole, 0.0), variance)),
             np.nan if undetermined else float(np.sqrt(variance)),
         )
-        found.append(one)
-    return tuple(found)
+        budgets.append(budget)
+    return tuple(budgets)
 
 
 @single_threaded
@@ -183,38 +190,46 @@ def machine_budget(built: Volumetric, places: MapPlaces) -> tuple[PartBudget, ..
     """
     points, starts, ends = places.points, places.starts, places.ends
     truth, machine = built.truth, built.machine
-    functions = {one.function: one.meaning for one in truth.model.parameters}
-    random = [one.function for one in built.approach[0].parameters]
-    random += [PROBING[0]] * 3 + [one.function for one in built.lasting[0].parameters]
+    functions = {parameter.function: parameter.meaning for parameter in truth.model.parameters}
+    random = [parameter.function for parameter in built.approach[0].parameters]
+    random += [PROBING[0]] * 3 + [parameter.function for parameter in built.lasting[0].parameters]
     meanings = {
-        one.function: one.meaning
+        parameter.function: parameter.meaning
         for model in (built.approach[0], built.lasting[0])
-        for one in model.parameters
+        for parameter in model.parameters
     }
     every = list(dict.fromkeys([*functions, *random]))
     parts = [
         PROBING if name == PROBING[0] else (name, (functions | meanings)[name]) for name in every
     ]
-    masks = np.array([[one.function == name for one in truth.model.parameters] for name in every])
+    masks = np.array(
+        [[parameter.function == name for parameter in truth.model.parameters] for name in every]
+    )
     split = _Split(truth.model, truth.a, masks.reshape(len(every), -1))
     offset = np.array(machine.probe)
-    both = _End(starts, offset, offset), _End(ends, offset, offset)
+    both_ends = _End(starts, offset, offset), _End(ends, offset, offset)
     drawn, lasting = built.random_roots(points)
     at_points = np.concatenate([drawn, lasting], axis=2)
     variances = [(at_points**2).sum(axis=(0, 1)) / len(points)]
     (first, steady), (last, moved) = built.random_roots(starts), built.random_roots(ends)
     along = [
-        np.einsum("md,mdk->mk", _directions(starts, ends), one)
-        for one in (first, last, moved - steady)
+        np.einsum("md,mdk->mk", _directions(starts, ends), root)
+        for root in (first, last, moved - steady)
     ]
     variances += list(np.concatenate([along[0] ** 2 + along[1] ** 2, along[2] ** 2], axis=1))
-    found = []
-    for (name, is_length, errors, shares, total), own in zip(
-        _figures(split, places, offset, both), variances, strict=True
+    budgets = []
+    for (name, is_length, errors, shares, total), variances_of_figure in zip(
+        _figures(split, places, offset, both_ends), variances, strict=True
     ):
-        by_part = np.array([own[[one == part for one in random]].sum() for part in every] + [0.0])
+        by_part = np.array(
+            [
+                variances_of_figure[[name_of_random == part for name_of_random in random]].sum()
+                for part in every
+            ]
+            + [0.0]
+        )
         variance = float(by_part.sum())
-        one = PartBudget(
+        budget = PartBudget(
             name,
             is_length,
             (*parts, REST),
@@ -225,5 +240,5 @@ def machine_budget(built: Volumetric, places: MapPlaces) -> tuple[PartBudget, ..
             _ratio(by_part, variance),
             float(np.sqrt(variance)),
         )
-        found.append(one)
-    return tuple(found)
+        budgets.append(budget)
+    return tuple(budgets)

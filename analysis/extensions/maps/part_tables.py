@@ -33,42 +33,51 @@ def budget_lines(
     """What the parts contribute: to the errors at points, then to all lengths and to their
     variances.
     """
-    shown = [k for k in range(len(figures[0].parts)) if any(_is_shown(one, k) for one in figures)]
+    shown = [
+        k for k in range(len(figures[0].parts)) if any(_is_shown(budget, k) for budget in figures)
+    ]
     word = f"U alone, k = {factor:g}" if correlated else "random"
-    lines, lengths = [], [one for one in figures if one.is_length]
+    lines, lengths = [], [budget for budget in figures if budget.is_length]
     names = [figures[0].parts[k][0] for k in shown]
     meanings = [figures[0].parts[k][1] for k in shown]
-    for one in (one for one in figures if not one.is_length):
+    for budget in (budget for budget in figures if not budget.is_length):
         columns = {
-            f"budget: {one.figure}": [*names, "whole"],
+            f"budget: {budget.figure}": [*names, "whole"],
             "": [*meanings, ""],
-            "error alone, µm": ([*one.errors[shown], one.total], _shown),
-            "share": ([*one.shares[shown], None], _percent),
-            f"{word}, µm": (factor * np.append(one.uncertainties[shown], one.uncertainty), _shown),
-            "share of variance": ([*one.variance_shares[shown], None], _percent),
+            "error alone, µm": ([*budget.errors[shown], budget.total], _shown),
+            "share": ([*budget.shares[shown], None], _percent),
+            f"{word}, µm": (
+                factor * np.append(budget.uncertainties[shown], budget.uncertainty),
+                _shown,
+            ),
+            "share of variance": ([*budget.variance_shares[shown], None], _percent),
         }
         lines += [*table_lines(columns), ""]
     whole = f"U, k = {factor:g}, µm" if correlated else "random, µm"
-    errors = [(one.figure, ([*one.errors[shown], one.total], _shown)) for one in lengths]
+    errors = [
+        (budget.figure, ([*budget.errors[shown], budget.total], _shown)) for budget in lengths
+    ]
     lines += [*table_lines([("error of length, µm", [*names, "whole"]), *errors]), ""]
     right = [False, *[True] * len(lengths)]
-    rows = [["share of variance", *(one.figure for one in lengths)]]
-    if not any(one.uncertainty for one in figures):
+    rows = [["share of variance", *(budget.figure for budget in lengths)]]
+    if not any(budget.uncertainty for budget in figures):
         shown = []
     for k in shown:
-        shares = [_percent(one.variance_shares[k]) for one in lengths]
+        shares = [_percent(budget.variance_shares[k]) for budget in lengths]
         rows.append([figures[0].parts[k][0], *shares])
-    rows.append([whole, *(_shown(factor * one.uncertainty) for one in lengths)])
+    rows.append([whole, *(_shown(factor * budget.uncertainty) for budget in lengths)])
     lines += [*aligned(rows, right), ""]
-    left = len(figures[0].parts) - len(shown)
-    told = [f"(parts that contribute nothing, {left} of them, are left out)"] if left else []
-    return [*lines, *told, OF_POINTS, OF_LENGTHS, OF_ESTIMATES if correlated else OF_SOURCES]
+    omitted = len(figures[0].parts) - len(shown)
+    omission = (
+        [f"(parts that contribute nothing, {omitted} of them, are left out)"] if omitted else []
+    )
+    return [*lines, *omission, OF_POINTS, OF_LENGTHS, OF_ESTIMATES if correlated else OF_SOURCES]
 
 
-def _is_shown(one: PartBudget, k: int) -> bool:
-    sizes = np.array([abs(one.errors[k]), one.uncertainties[k]])
+def _is_shown(budget: PartBudget, k: int) -> bool:
+    sizes = np.array([abs(budget.errors[k]), budget.uncertainties[k]])
     if np.isnan(sizes).any():
-        return one.parts[k] != REST
+        return budget.parts[k] != REST
     return bool(sizes.max() > NOTHING)
 
 
@@ -76,23 +85,23 @@ def budget_data(figures: Sequence[PartBudget], factor: float = 1.0) -> list[dict
     """The same in metres."""
     return [
         {
-            **picked(one, "figure", "is_length"),
-            "error": one.total,
-            "expanded_uncertainty": factor * one.uncertainty,
+            **picked(budget, "figure", "is_length"),
+            "error": budget.total,
+            "expanded_uncertainty": factor * budget.uncertainty,
             "coverage_factor": factor,
             "parts": [
                 {
                     "part": name,
                     "meaning": meaning,
-                    "error": one.errors[k],
-                    "share": one.shares[k],
-                    "expanded_uncertainty": factor * one.uncertainties[k],
-                    "share_of_variance": one.variance_shares[k],
+                    "error": budget.errors[k],
+                    "share": budget.shares[k],
+                    "expanded_uncertainty": factor * budget.uncertainties[k],
+                    "share_of_variance": budget.variance_shares[k],
                 }
-                for k, (name, meaning) in enumerate(one.parts)
+                for k, (name, meaning) in enumerate(budget.parts)
             ],
         }
-        for one in figures
+        for budget in figures
     ]
 
 

@@ -35,32 +35,34 @@ def plate_differences(
     """The plates of the same names that both maps' fits have estimated."""
     if first.fit is None or second.fit is None:
         return ()
-    found = []
+    differences = []
     scatters = first.scatter, second.scatter
     for name in _plates(first.fit):
         if name not in _plates(second.fit):
             continue
-        balls = [_balls(one, name) for one in (first.fit, second.fit)]
+        balls = [_balls(fit, name) for fit in (first.fit, second.fit)]
         common = [ball for ball in balls[0] if ball in balls[1]]
         d = first.dimension
         if not d <= len(common) <= MOST_BALLS:
             continue
-        one, other = (
-            _estimated(of, np.array([own[ball] for ball in common]))
-            for of, own in zip((first, second), balls, strict=True)
+        first_balls, second_balls = (
+            _estimated(side, np.array([numbers[ball] for ball in common]))
+            for side, numbers in zip((first, second), balls, strict=True)
         )
-        places = one.values.reshape(-1, d)
-        rotation, origin = fit_motion(other.values.reshape(-1, d), places)
-        turned = other.by(np.asarray(np.kron(np.eye(len(common)), rotation)))
+        places = first_balls.values.reshape(-1, d)
+        rotation, origin = fit_motion(second_balls.values.reshape(-1, d), places)
+        turned = second_balls.by(np.asarray(np.kron(np.eye(len(common)), rotation)))
         shifted = turned.values + np.tile(origin, len(common))
-        other = MappedValues(shifted, turned.root, turned.null, turned.size, turned.shared)
+        second_balls = MappedValues(shifted, turned.root, turned.null, turned.size, turned.shared)
         moving = motions(places - places.mean(axis=0)).reshape(places.size, -1)
-        left = ValueDifference(one, other, scatters).without(orthonormal(moving))
+        remainder = ValueDifference(first_balls, second_balls, scatters).without(
+            orthonormal(moving)
+        )
         names = tuple(f"{ball} {axis}" for ball in common for axis in AXIS_NAMES[:d])
         kind = f"balls of {name}"
-        group = left.group(kind, "m", names, coverage_factor)
-        found.append(PlateDifference(name, group, left.joint_test(kind)))
-    return tuple(found)
+        group = remainder.group(kind, "m", names, coverage_factor)
+        differences.append(PlateDifference(name, group, remainder.joint_test(kind)))
+    return tuple(differences)
 
 
 def _plates(fit: Fit) -> tuple[str, ...]:
@@ -73,20 +75,20 @@ def _plates(fit: Fit) -> tuple[str, ...]:
 def _balls(fit: Fit, artefact: str) -> dict[str, int]:
     """Indices of a plate's balls by name."""
     design = fit.design
-    own = design.balls.of(design.artefacts.names.index(artefact))
-    return {design.balls.names[ball]: int(ball) for ball in own}
+    ball_numbers = design.balls.of(design.artefacts.names.index(artefact))
+    return {design.balls.names[ball]: int(ball) for ball in ball_numbers}
 
 
-def _estimated(one: ComparedMap, index: Integers) -> MappedValues:
+def _estimated(side: ComparedMap, index: Integers) -> MappedValues:
     """Co-ordinates (n d,) of the balls of indices (n,) in the frame of their artefact."""
-    assert one.fit is not None
-    moved = displacements(one.fit.functions.at, BallPlaces(index))
+    assert side.fit is not None
+    moved = displacements(side.fit.functions.at, BallPlaces(index))
     n, d = moved.places.shape
-    balls = len(one.fit.design.balls.names)
-    own = np.zeros((n, d, balls, moved.own.shape[2]))
-    own[np.arange(n), :, index] = moved.own
+    balls = len(side.fit.design.balls.names)
+    effects = np.zeros((n, d, balls, moved.own.shape[2]))
+    effects[np.arange(n), :, index] = moved.own
     common = moved.common.reshape(n * d, -1)
-    root: Array = one.fit.sigma * np.concatenate([common, own.reshape(n * d, -1)], axis=1)
-    root, shared = without_shared(root, one.absorbed)
+    root: Array = side.fit.sigma * np.concatenate([common, effects.reshape(n * d, -1)], axis=1)
+    root, shared = without_shared(root, side.absorbed)
     null = moved.null.reshape(n * d, -1)
     return MappedValues(moved.places.ravel(), root, null, moved.size.ravel(), shared)

@@ -72,13 +72,15 @@ def read_points(
     rows = read_table(source, texts, AXES[:d])
     points = np.array([row.lengths for row in rows])
     messages: list[Message] = []
-    known = {name: k for k, name in enumerate(probes)}
-    given = [probe] * len(rows)
+    probe_indices = {name: k for k, name in enumerate(probes)}
+    probe_names = [probe] * len(rows)
     if PROBE in texts:
-        given = [row.texts[texts.index(PROBE)] for row in rows]
-    for row, name in zip(rows, given, strict=True):
-        if name not in known and len(messages) < MOST_MESSAGES:
-            messages.append(row.mark.message("", f'unknown probe "{name}"; {hint(name, known)}'))
+        probe_names = [row.texts[texts.index(PROBE)] for row in rows]
+    for row, name in zip(rows, probe_names, strict=True):
+        if name not in probe_indices and len(messages) < MOST_MESSAGES:
+            messages.append(
+                row.mark.message("", f'unknown probe "{name}"; {hint(name, probe_indices)}')
+            )
     for i, axis in np.argwhere(volume.far_outside(points)).tolist():
         text = f"{AXES[axis]} is {points[i, axis]:.6g} m, far outside the volume; check the unit"
         messages.append(rows[i].mark.message("", text))
@@ -89,7 +91,7 @@ def read_points(
         raise ExperimentError(messages)
     named = [k for k, name in enumerate(texts) if name in NAMING]
     names = tuple(" ".join(row.texts[k] for k in named) for row in rows)
-    indices = np.array([known[name] for name in given], np.int64)
+    indices = np.array([probe_indices[name] for name in probe_names], np.int64)
     if offsets is not None:
         points = points - offsets[indices]
     return GivenPoints(points, names, indices, tuple(row.mark for row in rows))

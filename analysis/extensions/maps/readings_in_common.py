@@ -25,11 +25,13 @@ def same_positions(first: ObservedReadings, second: ObservedReadings) -> tuple[s
     the first most of whose are those of the second.
     """
     shared, chance = _same(first, second)
-    for one, is_shared in ((second, shared[1]), (first, shared[0])):
-        position, names = one.design.readings.position, one.design.positions.names
+    for campaign, is_shared in ((second, shared[1]), (first, shared[0])):
+        position, names = campaign.design.readings.position, campaign.design.positions.names
         share = np.bincount(position, is_shared) / np.maximum(np.bincount(position), 1)
-        if found := tuple(names[k] for k in np.flatnonzero(_are_most(share, chance)).tolist()):
-            return found
+        if names_shared := tuple(
+            names[k] for k in np.flatnonzero(_are_most(share, chance)).tolist()
+        ):
+            return names_shared
     return ()
 
 
@@ -41,7 +43,7 @@ def same_readings(first: ObservedReadings, second: ObservedReadings) -> InCommon
     many are left out, up to the last digit of the table that was rounded more coarsely.
     """
     shared, chance = _same(first, second)
-    if _are_most(np.array([one.mean() for one in shared]), chance).all():
+    if _are_most(np.array([is_shared.mean() for is_shared in shared]), chance).all():
         return "same"
     return "some" if same_positions(first, second) else "none"
 
@@ -63,7 +65,7 @@ def _same(first: ObservedReadings, second: ObservedReadings) -> tuple[tuple[Flag
     from scipy.spatial import cKDTree
     from scipy.special import erf
 
-    digits = [_last_digit(one.x) for one in (first, second)]
+    digits = [_last_digit(campaign.x) for campaign in (first, second)]
     s = np.asarray(first.design.machine.repeatability)
     apart = 0.5 * sum(digits) if digits[0] != digits[1] else 0.0
     # Digits as coarse as the scatter would make readings of their own alike.
@@ -71,21 +73,21 @@ def _same(first: ObservedReadings, second: ObservedReadings) -> tuple[tuple[Flag
     within = apart + NOTHING
     chance = float(np.prod(erf((2.0 * apart or min(digits)) / (2.0 * s))))
     named: dict[tuple[str, str], int] = {}
-    points = [_places(one, named) for one in (first, second)]
-    trees = [cKDTree(one) for one in points]
-    found = [
-        np.isfinite(tree.query(own, distance_upper_bound=within, p=np.inf)[0])
-        for tree, own in zip(trees[::-1], points, strict=True)
+    points = [_places(campaign, named) for campaign in (first, second)]
+    trees = [cKDTree(named_points) for named_points in points]
+    is_repeated = [
+        np.isfinite(tree.query(own_points, distance_upper_bound=within, p=np.inf)[0])
+        for tree, own_points in zip(trees[::-1], points, strict=True)
     ]
-    return (found[0], found[1]), chance
+    return (is_repeated[0], is_repeated[1]), chance
 
 
 def _places(observed: ObservedReadings, named: dict[tuple[str, str], int]) -> Array:
     """Scale readings (n, d + 1) with a number for the ball and the probe, by their names."""
     design, readings = observed.design, observed.design.readings
     balls, probes = design.balls.names, design.probes.names
-    both = zip(readings.ball.tolist(), readings.probe.tolist(), strict=True)
-    numbers = [named.setdefault((balls[k], probes[p]), len(named)) for k, p in both]
+    pairs = zip(readings.ball.tolist(), readings.probe.tolist(), strict=True)
+    numbers = [named.setdefault((balls[k], probes[p]), len(named)) for k, p in pairs]
     return np.column_stack([np.nan_to_num(observed.x), numbers])
 
 

@@ -21,31 +21,31 @@ from ballplate.simulator.maps import FittedMap
 from .point_files import GivenPoints, read_pairs
 
 
-def between_named(given: GivenPoints, pairs: Sequence[Sequence[str | int]]) -> Tasks:
+def between_named(points: GivenPoints, pairs: Sequence[Sequence[str | int]]) -> Tasks:
     """Lengths between pairs of points by their names, or indices.
 
     :raises ValueError: a name that no point has, or several; an index of none.
     """
-    return _between(given, [_ends(given, pair) for pair in pairs])
+    return _between(points, [_ends(points, pair) for pair in pairs])
 
 
-def between_listed(given: GivenPoints, source: Path | GivenText) -> Tasks:
+def between_listed(points: GivenPoints, source: Path | GivenText) -> Tasks:
     """Lengths between the pairs of points that a CSV file names.
 
     :raises ExperimentError: a wrong table, or a name that no point has, or several.
     """
     pairs, marks = read_pairs(source)
-    found, messages = [], []
+    ends, messages = [], []
     for pair, mark in zip(pairs, marks, strict=True):
         try:
-            found.append(_ends(given, pair))
+            ends.append(_ends(points, pair))
         except ValueError as error:
             messages.append(mark.message("", str(error)))
         if len(messages) >= MOST_MESSAGES:
             break
     if messages:
         raise ExperimentError(messages)
-    return _between(given, found)
+    return _between(points, ends)
 
 
 def tasks_of_experiment(fitted: FittedMap, experiment: Experiment) -> Tasks:
@@ -54,49 +54,49 @@ def tasks_of_experiment(fitted: FittedMap, experiment: Experiment) -> Tasks:
     :raises ExperimentError: there is none, of other dimensions, or with a probe that the map does
         not have.
     """
-    tasks, known = experiment.evaluation.tasks, fitted.probes.names
+    tasks, probe_names = experiment.evaluation.tasks, fitted.probes.names
     if not tasks:
         raise refused(experiment.source, "has no measuring tasks", "evaluation.tasks")
     if experiment.dimension != fitted.dimension:
         text = f"has {experiment.dimension} axes, and the map {fitted.dimension}"
         raise refused(experiment.source, text, "machine.volume")
-    absent = {name for task in tasks for name in task.probes if name not in known}
+    absent = {name for task in tasks for name in task.probes if name not in probe_names}
     if absent:
-        text = f"the map has no probe {listing(sorted(absent))}; known: {listing(known)}"
+        text = f"the map has no probe {listing(sorted(absent))}; known: {listing(probe_names)}"
         raise refused(experiment.source, text, "evaluation.tasks")
     return Tasks(
         tuple(task.name for task in tasks),
         np.array([task.points for task in tasks]),
-        np.array([[known.index(name) for name in task.probes] for task in tasks], np.int64),
+        np.array([[probe_names.index(name) for name in task.probes] for task in tasks], np.int64),
         tuple(task.target for task in tasks),
     )
 
 
-def _between(given: GivenPoints, pairs: Sequence[tuple[int, int]]) -> Tasks:
+def _between(points: GivenPoints, pairs: Sequence[tuple[int, int]]) -> Tasks:
     places = np.array(pairs, np.int64).reshape(-1, 2)
-    names = tuple(f"{given.name(i)} to {given.name(j)}" for i, j in pairs)
-    return Tasks(names, given.points[places], given.probes[places], (None,) * len(names))
+    names = tuple(f"{points.name(i)} to {points.name(j)}" for i, j in pairs)
+    return Tasks(names, points.points[places], points.probes[places], (None,) * len(names))
 
 
-def _ends(given: GivenPoints, pair: Sequence[str | int]) -> tuple[int, int]:
+def _ends(points: GivenPoints, pair: Sequence[str | int]) -> tuple[int, int]:
     """Indices of two points by their names, or indices.
 
     :raises ValueError: see `between_named`.
     """
     if isinstance(pair, str) or len(pair) != 2:
         raise ValueError(f"a length between {pair!r}; give two points")
-    first, second = (_end(given, one) for one in pair)
+    first, second = (_end(points, end) for end in pair)
     return first, second
 
 
-def _end(given: GivenPoints, one: str | int) -> int:
-    if not isinstance(one, str):
-        if not 0 <= one < len(given.points):
-            raise ValueError(f"no point {one!r}; there are 0 to {len(given.points) - 1}")
-        return int(one)
-    count = given.times[one]
+def _end(points: GivenPoints, end: str | int) -> int:
+    if not isinstance(end, str):
+        if not 0 <= end < len(points.points):
+            raise ValueError(f"no point {end!r}; there are 0 to {len(points.points) - 1}")
+        return int(end)
+    count = points.times[end]
     if count != 1:
-        what = f"{count} points are called" if count else "no point is called"
-        told = "names of ends must differ" if count else hint(one, given.times)
-        raise ValueError(f'{what} "{one}"; {told}')
-    return given.places[one]
+        fact = f"{count} points are called" if count else "no point is called"
+        remedy = "names of ends must differ" if count else hint(end, points.times)
+        raise ValueError(f'{fact} "{end}"; {remedy}')
+    return points.places[end]

@@ -55,12 +55,16 @@ def map_difference(
         None if machine else _measured(side, label, day)
         for side, label, day, machine in zip(sides, labels, dates, described, strict=True)
     ]
-    dimension = next(one.dimension for one in measured if one is not None)
+    dimension = next(
+        compared_map.dimension for compared_map in measured if compared_map is not None
+    )
     if isinstance(settings.points, Path):
         settings = replace(settings, points=read_points(settings.points, dimension))
     first, second = (
-        one or _expected(machine, label, dimension, stated, day)
-        for one, machine, label, day in zip(measured, described, labels, dates, strict=True)
+        compared_map or _expected(machine, label, dimension, stated, day)
+        for compared_map, machine, label, day in zip(
+            measured, described, labels, dates, strict=True
+        )
     )
     count = None
     if shared:
@@ -119,14 +123,14 @@ def _measured(side: Side, label: str, day: str | None) -> ComparedMap:
         if kind_of_file(side) == "experiment":
             return map_of_fit(fit_of_file(side), label, day)
         side = read_map(side)
-    own = slice(len(side.values))
+    own_values = slice(len(side.values))
     return ComparedMap(
         label,
         side.title,
         side.model,
         side.values,
-        side.root[own],
-        side.undetermined[own],
+        side.root[own_values],
+        side.undetermined[own_values],
         np.zeros((len(side.values), 0)),
         side.degrees_of_freedom if side.sigma_is_estimated else np.inf,
         side.volume,

@@ -71,10 +71,10 @@ def stated_model(text: str, volume: Volume, source: str) -> StatedModel:
 
 
 def _section(root: Node, source: str) -> Node:
-    found = root.items.get("error_model") if isinstance(root, MappingNode) else None
-    if found is None:
+    section = root.items.get("error_model") if isinstance(root, MappingNode) else None
+    if section is None:
         raise refused(source, "has no error_model; name a file that has, or state a kind")
-    return found
+    return section
 
 
 def _built(settings: Any, volume: Volume, folder: Path, problems: Problems) -> ErrorModel | None:

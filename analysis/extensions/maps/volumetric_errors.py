@@ -96,8 +96,8 @@ class Volumetric:
         """
         machine = self.machine
         random = [error for error in machine.errors if error.deviation is not None]
-        one = Combination(((1.0, PowerSeries((1.0,))),))
-        functions = tuple(error_function(error.name, one) for error in random)
+        constant = Combination(((1.0, PowerSeries((1.0,))),))
+        functions = tuple(error_function(error.name, constant) for error in random)
         chain = KinematicModel(
             machine.arrangement, functions, machine.lower, machine.upper, origin=machine.reference
         )
@@ -112,19 +112,22 @@ class Volumetric:
         """
         machine = self.machine
         fields = [
-            (squareness_field(one.name), one.deviation)
-            for one in machine.squareness
-            if one.deviation
+            (squareness_field(field.name), field.deviation)
+            for field in machine.squareness
+            if field.deviation
         ]
-        for axis, known in machine.temperature.items():
-            if known.uncertainty:
+        for axis, temperature in machine.temperature.items():
+            if temperature.uncertainty:
                 fields.append(
-                    (thermal_field(AXES.index(axis)), abs(known.expansion) * known.uncertainty)
+                    (
+                        thermal_field(AXES.index(axis)),
+                        abs(temperature.expansion) * temperature.uncertainty,
+                    )
                 )
         chain = KinematicModel(
             machine.arrangement, (), machine.lower, machine.upper, origin=machine.reference
         )
-        return VolumetricModel(chain, tuple(one for one, _ in fields)), np.array(
+        return VolumetricModel(chain, tuple(field for field, _ in fields)), np.array(
             [size for _, size in fields]
         )
 
@@ -148,7 +151,7 @@ class Volumetric:
         for k, (function, deviation) in enumerate(
             zip(model.chain.functions, deviations, strict=True)
         ):
-            columns[:, :, k] *= _at(deviation, points[:, function.axis])[:, None]
+            columns[:, :, k] *= _deviations(deviation, points[:, function.axis])[:, None]
         probing = np.broadcast_to(self.machine.probing * np.eye(3), (len(points), 3, 3))
         lasting, sizes = self.lasting
         return (
@@ -175,10 +178,10 @@ class Volumetric:
         drawn_first, lasting_first = self.random_roots(starts)
         drawn_last, lasting_last = self.random_roots(ends)
         along = [
-            np.einsum("mi,mik->mk", direction, one)
-            for one in (drawn_first, drawn_last, np.asarray(lasting_last - lasting_first))
+            np.einsum("mi,mik->mk", direction, array)
+            for array in (drawn_first, drawn_last, np.asarray(lasting_last - lasting_first))
         ]
-        deviation = np.sqrt(sum((one**2).sum(axis=1) for one in along))
+        deviation = np.sqrt(sum((array**2).sum(axis=1) for array in along))
         return LengthErrors(starts, ends, nominal, error, np.asarray(deviation))
 
 
@@ -200,10 +203,10 @@ def drawn_machine_errors(built: Volumetric, places: MapPlaces, draws: Draws) -> 
     """
     draws.ensure_possible(places.points)
     (drawn, lasting), (first, at_start), (last, at_end) = (
-        built.random_roots(one) for one in (places.points, places.starts, places.ends)
+        built.random_roots(array) for array in (places.points, places.starts, places.ends)
     )
     (steady, *anew) = draws.normal(
-        lasting.shape[2:], *((len(one), one.shape[2]) for one in (drawn, first, last))
+        lasting.shape[2:], *((len(array), array.shape[2]) for array in (drawn, first, last))
     )
 
     def moved(approach: Array, constant: Array, normal: Array) -> Array:
@@ -214,11 +217,11 @@ def drawn_machine_errors(built: Volumetric, places: MapPlaces, draws: Draws) -> 
     errors = built.systematic(places.points) + moved(drawn, lasting, anew[0])
     starts = built.systematic(places.starts) + moved(first, at_start, anew[1])
     ends = built.systematic(places.ends) + moved(last, at_end, anew[2])
-    lengths = [length_errors(places.starts, places.ends, one) for one in ends - starts]
+    lengths = [length_errors(places.starts, places.ends, array) for array in ends - starts]
     return Realisations(draws, errors, np.array(lengths).reshape(draws.count, -1))
 
 
-def _at(deviation: float | Points, positions: Array) -> Array:
+def _deviations(deviation: float | Points, positions: Array) -> Array:
     """A standard deviation at positions (m,) along its axis."""
     if isinstance(deviation, Points):
         return np.asarray(np.interp(positions, deviation.positions, deviation.values))
@@ -254,7 +257,7 @@ class AlongAxis:
 def along_axes(machine: MachineDescription) -> list[AlongAxis]:
     """All parametric errors that the machine has."""
     functions = reference_functions(machine)
-    found = []
+    curves = []
     for error in machine.errors:
         positions = np.linspace(machine.lower[error.axis], machine.upper[error.axis], ALONG)
         table = error.shape if isinstance(error.shape, Points) else None
@@ -265,14 +268,14 @@ def along_axes(machine: MachineDescription) -> list[AlongAxis]:
         t = machine.scaled(error.axis, positions)
         shape = stated_function(machine, error)
         deviation = error.deviation
-        found.append(
+        curves.append(
             AlongAxis(
                 error,
                 positions,
                 None if shape is None else shape.values(t)[:, 0],
                 functions[error.name].values(t)[:, 0] if error.name in functions else None,
-                None if deviation is None else _at(deviation, positions),
+                None if deviation is None else _deviations(deviation, positions),
                 table,
             )
         )
-    return found
+    return curves

@@ -104,10 +104,11 @@ def draw_grid(
             [], [], color=SERIES[0], linewidth=1.1, label=f"with errors, magnified {factor:g} times"
         )
         axes.legend(loc="upper left", borderaxespad=0.8)
-        told = [
-            f"{k + 1}: {number(1e6 * float(one), 3)} µm" for k, one in enumerate(diagonals.error)
+        legend = [
+            f"{k + 1}: {number(1e6 * float(error), 3)} µm"
+            for k, error in enumerate(diagonals.error)
         ]
-        lengths = f"length errors of the diagonals from the corners {', '.join(told)}"
+        lengths = f"length errors of the diagonals from the corners {', '.join(legend)}"
         figure.text(0.5, 0.025, lengths, ha="center", fontsize=8.5)
         axes.set_xlim(low[0] - 0.2 * size, high[0] + 0.16 * size)
         axes.set_ylim(low[1] - 0.16 * size, high[1] + 0.2 * size)
@@ -128,11 +129,11 @@ def _spread(count: int, most: int) -> Integers:
 
 
 def draw_line(
-    found: VolumetricErrors,
+    errors: VolumetricErrors,
     path: str | Path | None = None,
     factor: float = 2.0,
     band: str = "2 standard deviations",
-    what: str = "error",
+    quantity: str = "error",
 ) -> Figure:
     """A picture of the errors along a line: components, resultant, and a `factor` times the random
     part about them, as `band` says, with `what` they are; it is written to the path, if there is
@@ -140,40 +141,40 @@ def draw_line(
 
     :raises OSError: the file cannot be written.
     """
-    start, end = 1e3 * found.points[0], 1e3 * found.points[-1]
+    start, end = 1e3 * errors.points[0], 1e3 * errors.points[-1]
     moving = np.flatnonzero(start != end)
     if len(moving) == 1:
         axis = int(moving[0])
-        name, positions = "xyz"[axis], 1e3 * found.points[:, axis]
-        others = [k for k in range(len(start)) if k != axis]
-        where = ", ".join(f"{'xyz'[k]} = {start[k] + 0.0:.6g} mm" for k in others)
+        name, positions = "xyz"[axis], 1e3 * errors.points[:, axis]
+        fixed_axes = [k for k in range(len(start)) if k != axis]
+        where = ", ".join(f"{'xyz'[k]} = {start[k] + 0.0:.6g} mm" for k in fixed_axes)
         along = f"along {name} at {where}"
     else:
-        name, positions = "distance", 1e3 * np.linalg.norm(found.points - found.points[0], axis=1)
+        name, positions = "distance", 1e3 * np.linalg.norm(errors.points - errors.points[0], axis=1)
         ends = [f"({', '.join(f'{v + 0.0:.6g}' for v in point)})" for point in (start, end)]
         where = along = f"from {ends[0]} to {ends[1]} mm"
     with drawing(320.0, WIDTH) as figure:
         axes = placed_axes(figure, LEFT, BELOW, WIDTH - LEFT - RIGHT, 320.0 - BELOW - ABOVE)
         axes.set_title(where, loc="left", pad=TITLE_PAD)
         for k, letter in enumerate("XYZ"[: len(start)]):
-            values, half = 1e6 * found.systematic[:, k], 1e6 * factor * found.deviation[:, k]
+            values, half = 1e6 * errors.systematic[:, k], 1e6 * factor * errors.deviation[:, k]
             _band(axes, positions, values, half, k, letter)
         axes.plot(
             positions,
-            1e6 * found.resultant,
+            1e6 * errors.resultant,
             color=INK,
             linewidth=1.2,
             linestyle=DASHES[3],
             label="resultant",
         )
-        _band_in_legend(axes, bool(found.deviation.any()), band)
-        _finish(axes, f"{name}, mm", f"{what}, µm")
-        worst = int(comparable(np.nan_to_num(found.resultant)).argmax())
-        told = (
-            f"largest resultant {number(1e6 * float(found.resultant[worst]))} µm at"
+        _band_in_legend(axes, bool(errors.deviation.any()), band)
+        _finish(axes, f"{name}, mm", f"{quantity}, µm")
+        worst = int(comparable(np.nan_to_num(errors.resultant)).argmax())
+        subtitle = (
+            f"largest resultant {number(1e6 * float(errors.resultant[worst]))} µm at"
             f" {positions[worst]:.6g} mm"
         )
-        return save(figure, path, f"Volumetric errors {along}: {told}")
+        return save(figure, path, f"Volumetric errors {along}: {subtitle}")
 
 
 def draw_along(along: AlongAxis, path: str | Path | None = None) -> Figure:

@@ -124,12 +124,12 @@ class ErrorsAtPoints(MachineErrors):
 
     def more_data(self) -> dict[str, Any]:
         """Realisations and budget as plain data, where they were asked for."""
-        found: dict[str, Any] = {}
+        data: dict[str, Any] = {}
         if self.realisations is not None:
-            found["realisations"] = self.realisations.to_dict()
+            data["realisations"] = self.realisations.to_dict()
         if self.with_budget:
-            found["budget"] = budget_data(self.budget)
-        return found
+            data["budget"] = budget_data(self.budget)
+        return data
 
     def lines(self) -> list[str]:
         diagonals = diagonal_lines(self.lengths)
@@ -146,13 +146,13 @@ class ErrorsAtPoints(MachineErrors):
 
     def columns(self) -> tuple[Columns, Sequence[Any]]:
         """One row for each point, in metres."""
-        found = self.errors
+        errors = self.errors
         columns = {
-            **by_axis("{}, mm", found.points),
-            **by_axis("error {}, µm", found.systematic),
-            "resultant, µm": found.resultant,
-            **by_axis("random {}, µm", found.deviation),
-            "unit": ["m"] * len(found.points),
+            **by_axis("{}, mm", errors.points),
+            **by_axis("error {}, µm", errors.systematic),
+            "resultant, µm": errors.resultant,
+            **by_axis("random {}, µm", errors.deviation),
+            "unit": ["m"] * len(errors.points),
         }
         return columns, ()
 
@@ -162,9 +162,9 @@ class ErrorsAtPoints(MachineErrors):
     def plot(self, path: str | Path | None = None) -> Figure:
         """The errors as vectors, magnified, seen from the front and above."""
         view, towards = projection(3)
-        volume, found = self.machine.volume, self.errors
+        volume, errors = self.machine.volume, self.errors
         edges = box_edges(volume.lower, volume.upper, towards)[0]
-        vectors = Vectors("", found.points @ view.T, found.systematic @ view.T)
+        vectors = Vectors("", errors.points @ view.T, errors.systematic @ view.T)
         return draw_vectors((vectors,), self.title, path, edges @ view.T, "errors")
 
 
@@ -249,7 +249,7 @@ def machine_errors(
     built = Volumetric(machine)
     common = file.stem, built, tuple(map(str, doubts))
     if error is not None:
-        every = {one.error.name: one for one in along_axes(machine)}
+        every = {function.error.name: function for function in along_axes(machine)}
         if error not in every:
             raise ValueError(why_not_along(error, built, str(file)))
         return ErrorAlongAxis(*common, every[error])

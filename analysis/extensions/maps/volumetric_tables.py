@@ -57,18 +57,28 @@ def machine_lines(built: Volumetric) -> list[str]:
     name = f"{machine.arrangement_name}: " if machine.arrangement_name else ""
     lines = [machine.title, f"{name}{_chain(machine.arrangement)}; {CONVENTION}", ""]
     rows = [["", "symbol", "error", "range", "random", "unit", "stated as"]]
-    for one in along_axes(machine):
-        name = one.error.name
-        random = "" if one.deviation is None else number(1e6 * float(one.deviation.max()))
-        found = "" if one.values is None else number(1e6 * one.range)
-        rows.append([name, symbol(name), meaning(name), found, random, _unit(one), _stated_as(one)])
+    for function in along_axes(machine):
+        name = function.error.name
+        random = "" if function.deviation is None else number(1e6 * float(function.deviation.max()))
+        range_text = "" if function.values is None else number(1e6 * function.range)
+        rows.append(
+            [
+                name,
+                symbol(name),
+                meaning(name),
+                range_text,
+                random,
+                _unit(function),
+                _stated_as(function),
+            ]
+        )
     lines += (
         aligned(rows, [False, False, False, True, True, False, False])
         if len(rows) > 1
         else ["no errors of axes"]
     )
-    others = _others(built)
-    lines += ["", *aligned(others, [False, False, False, True, False])] if others else []
+    other_rows = _single_numbers(built)
+    lines += ["", *aligned(other_rows, [False, False, False, True, False])] if other_rows else []
     return [*lines, *(["", RANDOM] if built.is_random else [])]
 
 
@@ -95,40 +105,42 @@ def _stated_as(along: AlongAxis) -> str:
         curve = "spline" if along.measured.knots else "polynomial"
         form = f"{curve} fitted to the {form}, sigma {sigma} {_unit(along)}"
     if error.line is not None and not error.is_rotation:
-        others = [k for k in range(3) if k != error.axis]
-        form += " at " + ", ".join(f"{AXES[k]} = {format_length(error.line[k])}" for k in others)
+        fixed_axes = [k for k in range(3) if k != error.axis]
+        form += " at " + ", ".join(
+            f"{AXES[k]} = {format_length(error.line[k])}" for k in fixed_axes
+        )
     return form + (f", {error.criterion}" if error.is_straightness else "")
 
 
 def why_not_along(name: str, built: Volumetric, file: str) -> str:
     """Why there is no parametric error of that name along an axis."""
-    stated = {one.name for one in built.machine.errors}
+    stated_names = {error.name for error in built.machine.errors}
     value = {
         parameter.name: f"{number(1e6 * size)} {SHOWN[parameter.unit]}"
         for parameter, size in _numbers(built)
     }
     if name in SQUARENESS:
-        told = (
+        value_text = (
             f"{value[name]} at the reference point, in the table without --error"
             if name in value
             else "not stated"
         )
-        return f"{name} is the {meaning(name)}, a single number: {told}"
+        return f"{name} is the {meaning(name)}, a single number: {value_text}"
     if name in NAMES:
         return (
             f"{file} does not state {name}, {meaning(name)}; it is zero (stated:"
-            f" {listing(sorted(stated))})"
+            f" {listing(sorted(stated_names))})"
         )
-    return f'{file} states no error "{name}"; {hint(name, stated)}'
+    return f'{file} states no error "{name}"; {hint(name, stated_names)}'
 
 
-def _others(built: Volumetric) -> list[list[str]]:
+def _single_numbers(built: Volumetric) -> list[list[str]]:
     """Squareness, expansion and droop at the reference point."""
     return [
         [
             parameter.name,
             symbol(parameter.name) if parameter.name in SQUARENESS else "",
-            _told(parameter),
+            _meaning_text(parameter),
             number(1e6 * value),
             "ppm" if parameter.unit == "1" else SHOWN[parameter.unit],
         ]
@@ -136,7 +148,7 @@ def _others(built: Volumetric) -> list[list[str]]:
     ]
 
 
-def _told(parameter: Parameter) -> str:
+def _meaning_text(parameter: Parameter) -> str:
     """What an error that is no function means."""
     is_droop = parameter.name in ("phi1", "phi2")
     return parameter.meaning + (", over the whole axis" if is_droop else "")
@@ -145,7 +157,7 @@ def _told(parameter: Parameter) -> str:
 def _numbers(built: Volumetric) -> list[tuple[Parameter, float]]:
     """Errors that are no functions, with their values."""
     every = zip(built.truth.model.parameters, built.truth.a.tolist(), strict=True)
-    names = {one.name for one in built.machine.errors}
+    names = {error.name for error in built.machine.errors}
     return [(parameter, value) for parameter, value in every if parameter.function not in names]
 
 
@@ -189,7 +201,7 @@ def error_lines(errors: VolumetricErrors) -> list[str]:
 def extreme_lines(errors: VolumetricErrors) -> list[str]:
     """Ranges of the components, and the largest resultant."""
     worst = int(comparable(errors.resultant).argmax())
-    at = ", ".join(
+    location = ", ".join(
         f"{axis} = {format_length(v)}"
         for axis, v in zip(AXES, errors.points[worst].tolist(), strict=True)
     )
@@ -201,14 +213,14 @@ def extreme_lines(errors: VolumetricErrors) -> list[str]:
     return [
         (
             f"range in µm: {bands}, resultant {number(1e6 * float(np.ptp(resultant)))}; "
-            f"largest resultant {number(1e6 * float(resultant[worst]))} µm at {at}"
+            f"largest resultant {number(1e6 * float(resultant[worst]))} µm at {location}"
         ),
     ]
 
 
 def along_lines(along: AlongAxis) -> list[str]:
     """A parametric error along its axis."""
-    given, unit = _given(along, "at the reference point"), _unit(along)
+    columns_shown, unit = _curve_columns(along, "at the reference point"), _unit(along)
     positions = along.positions
     keep = (
         np.arange(0, len(positions), 5)
@@ -218,16 +230,19 @@ def along_lines(along: AlongAxis) -> list[str]:
     axis = AXES[along.error.axis]
     columns = {
         f"{axis}, mm": (positions[keep], _millimetres),
-        **{f"{name}, {unit}": (one[keep], _three_decimals) for name, one in given.items()},
+        **{
+            f"{name}, {unit}": (values[keep], _three_decimals)
+            for name, values in columns_shown.items()
+        },
     }
     head = f"{along.error.name} {symbol(along.error.name)}: {meaning(along.error.name)}"
     band = "" if along.values is None else f", range {number(1e6 * along.range)} {unit}"
-    told = (
+    subtitle = (
         []
         if along.values is None
         else [f"stated as {_stated_as(along)}; {_line_stated(along)}".rstrip("; ")]
     )
-    return [head + band, *told, *table_lines(columns)]
+    return [head + band, *subtitle, *table_lines(columns)]
 
 
 def _two_decimals(value: float) -> str:
@@ -286,37 +301,37 @@ def tables_csv(
 
 def along_csv(along: AlongAxis) -> Iterator[str]:
     """A parametric error along its axis as lines of a CSV file."""
-    given = _given(along, along.error.name)
+    columns = _curve_columns(along, along.error.name)
     return csv_lines(
-        ["position_mm", *(f"{name}_{ascii_units(_unit(along))}" for name in given)],
+        ["position_mm", *(f"{name}_{ascii_units(_unit(along))}" for name in columns)],
         1e3 * along.positions,
-        *(1e6 * values for values in given.values()),
+        *(1e6 * values for values in columns.values()),
     )
 
 
-def _given(one: AlongAxis, name: str) -> dict[str, Array]:
+def _curve_columns(along: AlongAxis, name: str) -> dict[str, Array]:
     """What there is of an error along its axis, where `name` is what it is at the reference
     point.
     """
-    columns = {"stated": one.stated, name: one.values, "random": one.deviation}
+    columns = {"stated": along.stated, name: along.values, "random": along.deviation}
     return {key: values for key, values in columns.items() if values is not None}
 
 
-def _unit(one: AlongAxis) -> str:
-    return SHOWN[one.unit]
+def _unit(along: AlongAxis) -> str:
+    return SHOWN[along.unit]
 
 
 def machine_data(built: Volumetric) -> dict[str, Any]:
     """What the machine is and its parametric errors, in metres and radians."""
     machine = built.machine
     functions = {
-        one.error.name: {
-            "symbol": symbol(one.error.name),
-            "unit": one.unit,
-            "range": None if one.values is None else one.range,
-            "random": None if one.deviation is None else one.deviation.max(),
+        function.error.name: {
+            "symbol": symbol(function.error.name),
+            "unit": function.unit,
+            "range": None if function.values is None else function.range,
+            "random": None if function.deviation is None else function.deviation.max(),
         }
-        for one in along_axes(machine)
+        for function in along_axes(machine)
     }
     return {
         "machine": machine.title,
@@ -325,7 +340,11 @@ def machine_data(built: Volumetric) -> dict[str, Any]:
         "convention": CONVENTION,
         "parametric_errors": functions,
         "other_errors": {
-            parameter.name: {"value": value, "unit": parameter.unit, "meaning": _told(parameter)}
+            parameter.name: {
+                "value": value,
+                "unit": parameter.unit,
+                "meaning": _meaning_text(parameter),
+            }
             for parameter, value in _numbers(built)
         },
     }
@@ -333,7 +352,7 @@ def machine_data(built: Volumetric) -> dict[str, Any]:
 
 def diagonal_data(errors: LengthErrors) -> list[dict[str, Any]]:
     """Length errors of the body diagonals, in metres."""
-    return [{"diagonal": k + 1, **one} for k, one in enumerate(length_data(errors))]
+    return [{"diagonal": k + 1, **row} for k, row in enumerate(length_data(errors))]
 
 
 def length_data(errors: LengthErrors) -> list[dict[str, Any]]:
