@@ -1,4 +1,4 @@
-"""Drawing of a planned campaign: criterion against budget, gains of the candidates, the chosen
+"""Plot of a planned campaign: criterion against limit, improvements by candidates, chosen
 positions.
 """
 
@@ -53,13 +53,11 @@ WIDE, FAR = 5.0, 4.0
 
 
 def draw_campaign(selection: Selection, path: str | Path | None = None) -> Figure:
-    """A picture of the criterion against the budget, of the gain of each candidate, and of the
-    positions.
-
-    It is written to the path, if there is one.
+    """Draw the criterion against the limit, the improvement by each candidate, and the positions;
+    save to the path, if any.
 
     :raises ImportError: matplotlib is missing.
-    :raises ValueError: the name ends in none of the kinds of pictures.
+    :raises ValueError: the file name has no known picture format.
     :raises OSError: the file cannot be written.
     """
     rows, marks = _rows(selection), _marks(selection)
@@ -127,7 +125,7 @@ def _title(figure: Figure, height: float, text: str) -> None:
 
 @dataclass(frozen=True)
 class _Extent:
-    """What of budgets stands along the axis."""
+    """The limited quantity along the axis."""
 
     name: str
     of_budget: str
@@ -147,7 +145,7 @@ def _extent(budget: Budget) -> _Extent:
 
 @dataclass(frozen=True)
 class _Mark:
-    """A value of the criterion as it is drawn, in micrometres or as a ratio."""
+    """A value of the criterion on the plot, in micrometres or as a ratio."""
 
     name: str
     value: float
@@ -164,7 +162,7 @@ def _factor(selection: Selection) -> float:
 
 
 def _marks(selection: Selection) -> list[_Mark]:
-    """What a choice is compared with, the choice first."""
+    """Return the choice and the values for its comparison."""
     marks = [_Mark(CHOSEN, selection.value, SERIES[0], MARKERS[0])]
     if not math.isnan(selection.bound):
         marks.append(_Mark(BOUND, selection.bound, MUTED, "|"))
@@ -176,7 +174,7 @@ def _marks(selection: Selection) -> list[_Mark]:
 
 
 def _strip(axes: Axes, marks: Sequence[_Mark]) -> None:
-    """The marks one below the other, with what no choice can reach."""
+    """Draw the marks in rows, with the range below the bound shaded."""
     target = next((mark.value for mark in marks if mark.name == TARGET), None)
     low, high = _limits([mark.value for mark in marks if mark.name != TARGET], target)
     axes.set_xscale("log" if high > WIDE * low > 0.0 else "linear")
@@ -208,7 +206,7 @@ def _strip(axes: Axes, marks: Sequence[_Mark]) -> None:
 
 # In one piece: layers of one drawing, from the back to the front.
 def _curve(axes: Axes, selection: Selection, marks: Sequence[_Mark]) -> None:
-    """Criterion against budget: choices, their bounds, the positions as drawn, and the target."""
+    """Draw the criterion against the limit: choices, their bounds, current design, target."""
     from matplotlib.ticker import MaxNLocator
 
     extent, factor = _extent(selection.budget), _factor(selection)
@@ -280,7 +278,7 @@ def _curve(axes: Axes, selection: Selection, marks: Sequence[_Mark]) -> None:
 
 
 def _limits(values: Sequence[float], target: float | None) -> tuple[float, float]:
-    """Ends of the axis: around what is finite, and the target unless it is far off."""
+    """Return ends of the axis around finite values, and the target unless it is far off."""
     finite_values = np.array([value for value in values if math.isfinite(value)] or [target or 1.0])
     if target is not None and finite_values.min() / FAR <= target <= finite_values.max() * FAR:
         finite_values = np.append(finite_values, target)
@@ -304,7 +302,7 @@ def _plain_numbers(axis: Axis, is_logarithmic: bool) -> None:
 
 @dataclass(frozen=True)
 class _Row:
-    """A candidate with what it gains: `size` None where there is no figure."""
+    """A candidate with its improvement: `size` None if unavailable."""
 
     mark: str
     name: str
@@ -314,8 +312,8 @@ class _Row:
 
 
 def _rows(selection: Selection) -> list[_Row]:
-    """The chosen ones with their numbers in the drawing, those first that gain most, then the best
-    of the others.
+    """Return chosen candidates with their numbers, largest improvement first, then other
+    candidates.
     """
     numbers = {name: k + 1 for k, name in enumerate(selection.prediction.design.positions.names)}
     rows = [_row(selection, gain, numbers) for gain in selection.gains[:MOST_CHOSEN]]
@@ -353,7 +351,7 @@ def _row(selection: Selection, gain: Gain, numbers: Mapping[str, int]) -> _Row:
 
 
 def _place(selection: Selection, candidate: Candidate, numbers: Mapping[str, int]) -> int | None:
-    """The number of a candidate in the drawing, by its short name if it has one."""
+    """Return the number of a candidate on the plot, by its short name if it has one."""
     return numbers.get(selection.names.get(candidate.name, candidate.name))
 
 
@@ -362,12 +360,11 @@ def _shown(place: int | None) -> str:
 
 
 def _colour(place: int | None) -> str:
-    """The colour that a position has in the drawing of the volume."""
     return MUTED if place is None else SERIES[(place - 1) % len(SERIES)]
 
 
 def _bars(axes: Axes, rows: Sequence[_Row]) -> None:
-    """Bars behind the names; what is needed has one of full length and another pattern."""
+    """Draw bars behind the names; necessary candidates have full length and another pattern."""
     sizes = np.array([row.size for row in rows if row.size is not None and math.isfinite(row.size)])
     full = float(sizes.max(initial=0.0)) or 1.0
     axes.set_xlim(0.0, 1.0)
@@ -395,7 +392,7 @@ def _bars(axes: Axes, rows: Sequence[_Row]) -> None:
 def _write_beside(
     axes: Axes, text: str, row: int, x: float, points: float = VALUES - RIGHT + 2.0
 ) -> None:
-    """A text that ends so many points to the right of a place."""
+    """Write a text a number of points to the right of a location."""
     axes.annotate(
         text,
         (x, row),

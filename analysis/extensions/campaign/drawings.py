@@ -1,4 +1,4 @@
-"""A small drawing of where an artefact stands in the volume, as SVG within a page."""
+"""SVG drawing of the location of an artefact in the volume, for a page."""
 
 from __future__ import annotations
 
@@ -19,10 +19,10 @@ VIEWS = {"x": ("y", False, "z"), "y": ("x", True, "z"), "z": ("x", False, "y")}
 
 # In one piece: elements of one drawing, which share its scale and margins.
 def place_drawing(candidate: Candidate, experiment: Experiment) -> str:
-    """A position seen against its plane's normal: the volume, the balls, filled where they are
-    read, the first named.
+    """Return a position viewed along its plane's normal: volume and balls, filled if read, the
+    first named.
 
-    An artefact in a free pose is seen along the axis in which it is thinnest.
+    For an artefact in a free pose the view is along its thinnest axis.
     """
     position = candidate.item
     assert isinstance(position, Position)

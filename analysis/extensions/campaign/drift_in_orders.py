@@ -1,4 +1,4 @@
-"""What a drift does to a campaign in the orders in which it can be read."""
+"""Effects of drift on a campaign by reading order."""
 
 from __future__ import annotations
 
@@ -38,15 +38,13 @@ class DriftSize:
 
 @dataclass(frozen=True)
 class DriftEffect:
-    """What a drift does where positions are read in an order that takes `seconds`, of which
-    `change_seconds` are change-over.
+    """Effects of drift in a reading order that takes `seconds`, of which `change_seconds` are
+    change-over.
 
     `of_point` and `of_scale` are the largest changes of a distance between corrected points, in
-    metres, by drifts of the size stated that nobody knows of; the drift of the point is along the
-    axis where it does most; NaN where a length standard is read, of which no drift is followed.
-    `without` is the mean uncertainty of these distances if nothing drifts,
-    and `estimated` that with the drifts as free parameters, NaN where these leave a distance
-    undetermined.
+    metres, by unmodelled drifts of the stated size, along the worst axis for a point; NaN if a
+    length standard is read, whose drift is not modelled. `without` is the mean uncertainty of the
+    distances without drift, `estimated` that with drifts as free parameters, NaN if undetermined.
     """
 
     order: OrderName
@@ -98,7 +96,6 @@ def drift_size(text: str) -> dict[str, float]:
 
 
 def is_of_plates(experiment: Experiment, positions: Iterable[Candidate]) -> bool:
-    """Whether all positions are of plates."""
     return all(
         experiment.artefacts[position.item.artefact].role == "plate" for position in positions
     )
@@ -108,11 +105,7 @@ def is_of_plates(experiment: Experiment, positions: Iterable[Candidate]) -> bool
 def drift_effect(
     experiment: Experiment, name: OrderName, sheet: RunSheet, changes: ChangeTimes, size: DriftSize
 ) -> DriftEffect:
-    """What drifts of a size do to an experiment in the order of a run sheet.
-
-    With drifts as parameters of any prior uncertainty, functions f and drifts e have covariances
-    whose quotient cov(f, e) cov(e, e)^-1 is what f changes by where the drifts are held wrong.
-    """
+    """Return the effects of drifts of a size on an experiment in the order of a run sheet."""
     change = sum(step.change_seconds for step in sheet.steps)
     plain = without_drift(experiment)
     if (
@@ -164,8 +157,8 @@ def _drift(size: DriftSize | None) -> DriftSettings:
 
 
 def effects_on_distances(design: Design, p: int) -> tuple[Array, Array, Array]:
-    """Uncertainties (m,) of distances between evaluation points, what they change by per unit of
-    each of the last p influence parameters (m, p), and the covariance (p, p) of these.
+    """Return uncertainties (m,) of distances between evaluation points, their changes per unit of
+    each of the last p influence parameters (m, p), and the covariance (p, p) of these parameters.
     """
     linearisation, every = linearise(design), evaluation_points(design)
     chosen = np.unique(np.linspace(0, len(every.points) - 1, MOST_POINTS).round().astype(int))
@@ -175,6 +168,8 @@ def effects_on_distances(design: Design, p: int) -> tuple[Array, Array, Array]:
         np.eye(len(linearisation.layout))[linearisation.layout.influences][-p:]
     )
     covariance = linearisation.covariance(drifts, drifts)
+    # With drifts e as parameters of any prior, cov(f, e) cov(e, e)^-1 is the change of functions
+    # f per unit of drift that is fixed at a wrong value.
     bias = np.linalg.lstsq(covariance, linearisation.covariance(drifts, functions), rcond=1e-12)[
         0
     ].T

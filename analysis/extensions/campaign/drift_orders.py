@@ -1,4 +1,4 @@
-"""Orders in which a chosen campaign can be read, and what a drift does in each."""
+"""Reading orders of a chosen campaign, with the effect of drift in each."""
 
 from __future__ import annotations
 
@@ -32,8 +32,8 @@ from .least_drift import least_drift
 
 @dataclass(frozen=True)
 class DriftOrders:
-    """What a drift of a `size` does to a campaign in each order, where that was asked; `chosen` is
-    the order that it is to be read in.
+    """Effects of a drift of a `size` on a campaign in each order, if requested; `chosen` is the
+    reading order.
     """
 
     chosen: ReadingOrder
@@ -42,7 +42,7 @@ class DriftOrders:
 
     @staticmethod
     def ensure_size(text: str) -> None:
-        """Refuse what is no size of a drift.
+        """Refuse an invalid size of a drift.
 
         :raises QuantityError: it is none.
         """
@@ -57,7 +57,7 @@ class DriftOrders:
         has_begun: bool,
         chosen: Sequence[Candidate],
     ) -> DriftOrders:
-        """The orders of chosen candidates of a pool, and what a drift does in each.
+        """Return the orders of chosen candidates of a pool, with the effects of drift.
 
         :raises ExperimentError: an order is asked of a campaign that has begun, or that of the
             least effect of drift where there are length standards.
@@ -87,7 +87,7 @@ class DriftOrders:
         }
 
     def lines(self, campaign: Campaign) -> list[str]:
-        """A table of the orders of a campaign; nothing without any."""
+        """Return the table of orders; empty without any."""
         return _order_table(self.size, self.effects, campaign) if self.effects else []
 
 
@@ -98,7 +98,7 @@ def _orders(
     has_begun: bool,
     chosen: Sequence[Candidate],
 ) -> list[ReadingOrder]:
-    """The orders that are offered: where one is asked or a drift stated, all that there are."""
+    """Return all orders if one is requested or a drift is stated."""
     is_asked = bool(request.order or request.drift)
     if has_begun and is_asked:
         text = "has begun, and its times are unknown; leave --order and --drift out"
@@ -121,7 +121,7 @@ def _impossible(experiment: Experiment, text: str) -> ExperimentError:
 
 
 def _order_table(size: DriftSize, effects: Sequence[DriftEffect], campaign: Campaign) -> list[str]:
-    """What a drift does in each order, and which one is chosen."""
+    """Return the table of drift effects by order, with the chosen one marked."""
     budget = campaign.budget.seconds
 
     def remarks(effect: DriftEffect) -> str:
@@ -161,7 +161,7 @@ def _micrometres(value: float) -> str:
 
 
 def _chosen_without_drift(campaign: Campaign) -> list[str]:
-    """That the drift of the file had no part in the choice."""
+    """Return the remark that the choice ignores the drift of the file."""
     drifts = [influence for influence in campaign.experiment.influences if influence.in_order]
     if not drifts:
         return []

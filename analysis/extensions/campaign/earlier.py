@@ -17,12 +17,11 @@ from .positions_read import done_candidates
 
 
 def earlier_choice(chosen: Experiment, offered: Offer) -> tuple[int, ...]:
-    """Indices of the candidates that an experiment consists of: its positions by name, or by what
-    describes a short name, calibration items by content.
+    """Return indices of the candidates in an experiment: positions by name, or by description of a
+    short name; calibration items by content.
 
-    A position that was interrupted since stands for what completes it, or sets it up again, unless
-    no more was to be read of it than has been. Items of calibration that are no candidates belong
-    to the experiment in any case.
+    An interrupted position counts as its completion or second set-up, unless its planned readings
+    are complete. Calibration items outside the pool belong to the experiment in any case.
 
     :raises ExperimentError: a position is no candidate.
     """
@@ -94,7 +93,7 @@ def _equal(calibration: Calibration, earlier: Calibration) -> bool:
 
 
 def _plain(value: Any) -> Any:
-    """What a field of an item states: of a covariance the root, of a user's functions the names."""
+    """Return the content of a field: the root of a covariance, the names of a user's functions."""
     if isinstance(value, CovarianceRoot):
         return value.drawn(np.eye(len(value.own)))
     return value.names if hasattr(value, "derivatives") else value
@@ -106,11 +105,10 @@ def begun(
     moved: bool = False,
     earlier: Path | None = None,
 ) -> tuple[Offer | None, tuple[int, ...] | None]:
-    """What is offered where readings are `done` already, and the indices of an `earlier` choice of
-    a file; None for what is not there.
+    """Return the candidates on offer after `readings_done`, and the indices of an `earlier` choice
+    of a file; None if absent.
 
-    Where the artefact has `moved` since it was read last, a position interrupted there can only be
-    set up again.
+    If the artefact has `moved` since, an interrupted position needs a second set-up.
 
     :raises ExperimentError: what is wrong with both files.
     """

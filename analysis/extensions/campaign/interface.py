@@ -15,8 +15,7 @@ if TYPE_CHECKING:
 
 
 def sheet(experiment: Experiment | PathLike) -> Sheet:
-    """What goes to the laboratory with an experiment: a run sheet, a table to fill in, and points
-    for a program.
+    """Return a run sheet of an experiment, a table to fill in, and points for a program.
 
     `text()` is the run sheet, `template()` the CSV file of readings with empty cells, and
     `points()` the nominal centres of the balls; that of a plan is its `to_print`.

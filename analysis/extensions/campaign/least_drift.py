@@ -43,8 +43,8 @@ GAIN = 1e-9
 
 @dataclass(frozen=True)
 class ScaleByBlock(Influence):
-    """Scales that are wrong by a ratio of their own in each of the `blocks`, what is read in one
-    position with one probe, and by the drift within blocks.
+    """Scale errors by a ratio in each of the `blocks` (readings in one position with one probe),
+    and by the drift within blocks.
     """
 
     blocks: Blocks
@@ -58,7 +58,7 @@ class ScaleByBlock(Influence):
         )
 
     def shifts(self, disturbed: Disturbed) -> tuple[Array, Array]:
-        """What the scales say too much, by block and within."""
+        """Return the scale errors, by block and within."""
         order = disturbed.column("order").astype(np.int64)
         is_here = self.blocks.of_reading[order][:, None] == np.arange(len(self.blocks.weight))
         share = np.column_stack([is_here, self.blocks.within[order]])
@@ -66,7 +66,7 @@ class ScaleByBlock(Influence):
 
 
 class ScaleByBlockSettings(InfluenceSettings):
-    """Settings that no file has."""
+    """Settings without a file."""
 
     reading: tuple[float, ...]
     probe_change: float
@@ -80,10 +80,11 @@ class ScaleByBlockSettings(InfluenceSettings):
 
 @dataclass(frozen=True)
 class Blocks:
-    """Readings of a position with a probe: `of_reading` (m,) tells the block, `within` (m,) hours
-    from its mean. By block (b,) are its `position` and `probe`, the number of readings in it as
-    `weight`, the `middle` of it in hours from the first reading of the position on, as the file has
-    the probes, and the `length` of what is read.
+    """Readings of a position with a probe: `of_reading` (m,) is the block, `within` (m,) hours from
+    its mean.
+
+    By block (b,): its `position` and `probe`, the number of readings as `weight`, its `middle` in
+    hours from the first reading of the position, in the file's order of probes, and its `length`.
     """
 
     of_reading: Integers
@@ -95,8 +96,8 @@ class Blocks:
     length: Array
 
     def hours(self, k: int, probes: Sequence[str], names: Sequence[str], change: float) -> Array:
-        """Hours of the middles of a position's blocks from its first reading on, where it is read
-        with its probes in this order.
+        """Return hours of the middles of a position's blocks from its first reading, for this order
+        of probes.
         """
         indices = np.flatnonzero(self.position == k)
         order = np.argsort([list(probes).index(names[probe]) for probe in self.probe[indices]])
@@ -106,7 +107,7 @@ class Blocks:
 
 
 def blocks(clock: Clock, readings: Readings) -> Blocks:
-    """The blocks of a design, each position of which begins at zero by its clock."""
+    """Return the blocks of a design; each position begins at zero by its clock."""
     pairs, inverse = np.unique(
         np.stack([readings.position, readings.probe], axis=1), axis=0, return_inverse=True
     )
@@ -168,9 +169,10 @@ def least_drift(
 
 @dataclass(frozen=True, eq=False)
 class _Ways:
-    """Ways to read single positions, `each` a position's index and its probes in order. Hours: the
-    `middles` (w, b) of its blocks from when the position begins, what it `takes` (w,), and the
-    `change` (w, w) from one to another; `is_own` (w, b) tells which blocks are its own.
+    """Ways to read single positions, `each` a position's index and its probes in order.
+
+    Hours: the `middles` (w, b) of its blocks from its beginning, its duration `takes` (w,), and the
+    `change` (w, w) between ways; `is_own` (w, b) flags its own blocks.
     """
 
     each: tuple[tuple[int, tuple[str, ...]], ...]
@@ -230,16 +232,15 @@ class _Drift:
     effects: Array
 
     def least(self, sequences: Integers) -> tuple[list[int], float]:
-        """Of sequences (n, p) of ways that with the smallest largest effect, and how large it is;
-        of equal ones that with the least change-over, or the first.
-
-        The effect on some distances is a lower bound of that on all. The sequence with the smallest
-        bound is looked at in full, and the distance that changes most there joins the others until
-        none changes more.
+        """Return the sequence of ways, of (n, p), with the smallest largest effect, and its size;
+        ties by least change-over, then the first.
         """
         hours, change = self.ways.hours(sequences)
         hours -= np.average(hours, axis=1, weights=self.weight)[:, None]
         times = np.column_stack([hours, np.ones(len(hours))])
+        # The effect on some distances is a lower bound of that on all. The sequence with the
+        # smallest bound is evaluated in full; its worst distance joins the others until none
+        # changes more.
         bounds = np.zeros(len(times))
         while True:
             k = int(bounds.argmin())
@@ -256,7 +257,9 @@ class _Drift:
         return sequences[k].tolist(), most
 
     def improved(self, best: list[int], options: Sequence[Sequence[int]]) -> list[int]:
-        """What exchanges of two positions, and other orders of the probes of one, lead to."""
+        """Return the best sequence by exchanges of two positions and by other orders of the probes
+        of one.
+        """
         least = np.inf
         while True:
             near = [best]

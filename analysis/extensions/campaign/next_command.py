@@ -114,9 +114,7 @@ def _judged(
 
 
 def _watch(options: Namespace, experiment: Experiment, goal: Goal) -> int:
-    """Judge whenever files in the folder have changed, until the target is met or somebody ends
-    it.
-    """
+    """Judge at each change of files in the folder, until the target is met or an interrupt."""
     import time
 
     from ballplate.cli import note, print_errors, print_lines

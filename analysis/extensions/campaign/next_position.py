@@ -1,6 +1,4 @@
-"""A campaign as it is measured: whether the target is met by what has been read, and what to read
-next.
-"""
+"""Judgement of a running campaign: target met or not, and the next position to read."""
 
 from __future__ import annotations
 
@@ -36,9 +34,7 @@ Addition = tuple[str, int, Experiment]
 
 @dataclass(frozen=True)
 class ReadPosition:
-    """Positions of which something has been read, in the order in which they were first; `whole`
-    are all their planned readings, `position` those that were taken.
-    """
+    """A position with readings; `whole` has all planned readings, `position` the available ones."""
 
     position: Position
     whole: Position
@@ -55,11 +51,10 @@ def next_step(
     goal: Goal,
     report: Report = unreported,
 ) -> NextStep:
-    """Judge what has been read so far of an experiment's positions, or of its pool's, and find the
-    position that is best read next.
+    """Judge the readings of an experiment's or pool's positions, and find the best next position.
 
-    Positions that were read again count as they were read last. Uncertainties are as stated, or
-    larger where the residuals show so.
+    The last readings of a position count. Uncertainties are as stated, or larger if residuals show
+    it.
 
     :raises ExperimentError: a file is wrong, or names a position that is none.
     :raises GoalError: a goal about what the experiment does not have.
@@ -117,7 +112,7 @@ def next_step(
 def _judged(
     additions: Iterable[Addition], count: int, goal: Goal, sigma: float, report: Report
 ) -> list[Offered]:
-    """What positions to be read next achieve, the best first."""
+    """Return judgements of possible next positions, the best first."""
     offered = []
     for name, readings, more in counted(additions, "positions to come", count, report):
         planned = _planned(more, goal, sigma)
@@ -126,10 +121,8 @@ def _judged(
 
 
 def sigmas(fit: Fit) -> tuple[float, float]:
-    """What multiplies the stated uncertainties: the root of S^2 over its degrees of freedom where
-    that is above 1, and the bound that it keeps to with 95 % where these are few.
-
-    Without any degree of freedom nothing is known of the scatter, and the bound is infinite.
+    """Return the factor of the stated uncertainties: the root of S^2 over its degrees of freedom,
+    at least 1, and its 95 % upper limit, infinite without degrees of freedom.
     """
     from scipy.special import chdtri
 
@@ -188,7 +181,7 @@ def _positions_read(experiment: Experiment, observed: ObservedReadings) -> Itera
 
 
 def _fitted(experiment: Experiment, observed: ObservedReadings) -> tuple[Fit | None, str]:
-    """The fit of what has been read, or why there is none."""
+    """Return the fit of the readings, or its failure reason."""
     design = observed.design
     unread = np.setdiff1d(design.plate_balls, design.readings.ball)
     if len(unread):
@@ -221,11 +214,11 @@ def _planned(experiment: Experiment, goal: Goal, sigma: float) -> PlannedUncerta
 def _additions(
     experiment: Experiment, possible: Mapping[str, Position], read_positions: Sequence[ReadPosition]
 ) -> Iterator[Addition]:
-    """Positions that can be read next, by name with the number of their readings, and the
-    experiment with what has been read and each.
+    """Yield possible next positions: name, number of readings, and the experiment with all earlier
+    readings and the position.
 
-    What was interrupted may be completed. Of candidates of which only some may be read, none is
-    offered when as many have been.
+    Interrupted positions may be completed. Of a limited group, none is on offer once the limit is
+    reached.
     """
     by_name = {earlier.position.name: earlier for earlier in read_positions}
     closed = set() if experiment.pool is None else _closed(experiment.pool, set(by_name))
@@ -246,7 +239,7 @@ def _additions(
 
 
 def _closed(pool: Pool, names_read: set[str]) -> set[str]:
-    """Candidates of groups of which as many have been read as may be."""
+    """Return candidates of groups whose limit is reached."""
     closed: set[str] = set()
     for limit in pool.at_most:
         members = {pool.candidates[k].name for k in limit.members}

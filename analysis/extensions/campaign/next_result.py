@@ -1,4 +1,4 @@
-"""How far a campaign has come, and what to read next, in a few lines."""
+"""Progress of a campaign and its next position, in a few lines."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from ballplate.uncertainty import can_stretch
 
 @dataclass(frozen=True)
 class Offered:
-    """A position that can be read next, with its number of `readings`, and what is known then."""
+    """A possible next position, with its number of `readings` and its judgement."""
 
     name: str
     readings: int
@@ -27,7 +27,7 @@ class Offered:
 
     @property
     def average(self) -> float:
-        """Average U6 in metres; NaN where no length is determined."""
+        """Average U6 in metres; NaN without a determined length."""
         return (
             self.planned.quantities["U6"].average if "U6" in self.planned.quantities else math.nan
         )
@@ -42,13 +42,13 @@ class Offered:
 
 @dataclass(frozen=True, repr=False)
 class NextStep(Result):
-    """What the positions `read`, in their order, achieve, and what others would.
+    """Judgement of the positions `read`, in their order, and of possible next ones.
 
-    `missing` counts planned readings that positions lack. `fit` is None where nothing can be
-    estimated yet, for the reason `why`. Uncertainties are those stated times `sigma`, which keeps
-    to `bound`; `now` judges the goal, and `is_sure` whether it is met at the bound too. `suspected`
-    is what residuals show, in words. `offered` are positions that can be read next, the best first;
-    none where the target is met.
+    `missing` counts planned readings that positions lack. `fit` is None if nothing can be estimated
+    yet, for the reason `why`. Uncertainties are those stated times `sigma`, with upper limit
+    `bound`; `now` judges the goal, `is_sure` also at the bound. `suspected` are findings of the
+    residuals as text. `offered` are possible next positions, the best first; empty once the target
+    is met.
     """
 
     label: str
@@ -68,21 +68,19 @@ class NextStep(Result):
 
     @property
     def is_met(self) -> bool:
-        """Whether nothing more need be read: the goal is met by what has been read, its scatter is
-        known well enough for that, and the residuals show nothing that is wrong.
-        """
+        """True if the goal is met, also at the upper limit of sigma, without flagged readings."""
         return self.now is not None and self.now.is_met and self.is_sure and not self.suspected
 
     @property
     def next(self) -> Offered | None:
-        """The best position to be read next; None where the target is met, or none is left."""
+        """The best next position; None if the target is met, or all are read."""
         return self.offered[0] if self.offered else None
 
     def headline(self) -> str:
         return self._verdict()
 
     def lines(self) -> list[str]:
-        """The answer first, then what it rests on."""
+        """Return the verdict, then its grounds."""
         count, planned = len(self.read), self.next
         lines = [
             f"{number_of(count, 'position')} read, last {self.read[-1]}; {self._answer()}",
@@ -95,7 +93,7 @@ class NextStep(Result):
         return lines
 
     def _missing(self) -> list[str]:
-        """How many planned readings each position lacks."""
+        """Return the numbers of planned readings that positions lack."""
         if not self.missing:
             return []
         named = listing(f"{name} {count}" for name, count in self.missing.items())
@@ -116,7 +114,7 @@ class NextStep(Result):
         return [sigma_text, *shown, "; ".join(reached)]
 
     def _maximum(self) -> list[str]:
-        """The largest U6, where the goal does not tell it."""
+        """Return the largest U6, unless the goal states it."""
         assert self.fit is not None
         lengths = self.fit.quantities["U6"]
         if lengths.undetermined == lengths.count:

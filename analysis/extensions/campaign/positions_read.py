@@ -38,10 +38,10 @@ Amounts = dict[tuple[int, str], int]
 def done_candidates(
     path: Path | GivenText, experiment: Experiment, names: Mapping[str, str] | None = None
 ) -> tuple[SetUp, ...]:
-    """Set-ups of a pool's candidates that a file of readings has readings of, in its order.
+    """Return set-ups of a pool's candidates in a file of readings, in its order.
 
-    A position may have been set up more than once: "low again" is another set-up of the candidate
-    "low". `names` tell what the file calls candidates that a plan gave short names.
+    A position may have several set-ups: "low again" is another one of the candidate "low". `names`
+    are the file's names of candidates with short names in a plan.
 
     :raises ExperimentError: the file is wrong, or names a position that is no candidate.
     """
@@ -85,7 +85,7 @@ def done_candidates(
 
 
 def _meant(name: str, planned: Mapping[str, str]) -> str:
-    """The name in the pool of what a file of readings calls so."""
+    """Return the pool's name for a name in a file of readings."""
     if name in planned:
         return planned[name]
     base = base_name(name)
@@ -95,8 +95,8 @@ def _meant(name: str, planned: Mapping[str, str]) -> str:
 def groups_taken(
     design: Design, place: int, experiment: Experiment, item: Position
 ) -> tuple[ReadingGroup, ...]:
-    """Readings in a position, by its `place` in a design, as groups of those of equal uncertainty
-    and repeats.
+    """Return readings in a position, by its `place` in a design, in groups of equal uncertainty and
+    repeats.
     """
     own_readings = design.readings.select(np.flatnonzero(design.readings.position == place))
     first = int(design.balls.of(design.artefacts.names.index(item.artefact))[0])
@@ -166,8 +166,8 @@ def _set_up(
 def _missing(
     planned: Sequence[ReadingGroup], groups_read: Sequence[ReadingGroup], names: Sequence[str]
 ) -> Iterator[ReadingGroup]:
-    """What of the planned readings has not been taken, whatever their uncertainty; balls left alike
-    make a group.
+    """Yield groups of planned readings that are missing, regardless of uncertainty; equally
+    incomplete balls make a group.
     """
     amounts_left = _amounts(groups_read)
     for group in planned:
@@ -193,7 +193,7 @@ def _missing(
 
 
 def _amounts(readings: Sequence[ReadingGroup]) -> Amounts:
-    """How often each ball is read with each probe."""
+    """Return the number of readings by ball and probe."""
     amounts: Amounts = {}
     for group in readings:
         for pair in product(group.ball_indices.tolist(), group.probes):
@@ -202,7 +202,7 @@ def _amounts(readings: Sequence[ReadingGroup]) -> Amounts:
 
 
 def _same(first: Sequence[ReadingGroup], second: Sequence[ReadingGroup]) -> bool:
-    """Whether both read the same balls as often with the same probes and uncertainties."""
+    """Compare numbers of readings by ball, probe and uncertainty."""
 
     def by_uncertainty(groups: Sequence[ReadingGroup]) -> dict[tuple[float, ...] | None, Amounts]:
         kinds: dict[tuple[float, ...] | None, list[ReadingGroup]] = {}
@@ -217,7 +217,7 @@ def _same(first: Sequence[ReadingGroup], second: Sequence[ReadingGroup]) -> bool
 
 
 def _with_readings(candidate: Candidate, readings: tuple[ReadingGroup, ...]) -> Candidate:
-    """A position with these readings, and what a file says of it."""
+    """Return a position with these readings, and its settings for a file."""
     settings = {key: value for key, value in candidate.settings.items() if key not in GROUP}
     groups = []
     for reading in readings:
@@ -234,6 +234,6 @@ def _with_readings(candidate: Candidate, readings: tuple[ReadingGroup, ...]) -> 
 
 
 def _exactly(lengths: Array) -> str | list[str]:
-    """Lengths (d,) as a file says them, one for all axes where they are the same."""
+    """Return lengths (d,) as a file states them, one for all axes if equal."""
     texts = [length_text(length) for length in lengths.tolist()]
     return texts[0] if len(set(texts)) == 1 else texts

@@ -56,9 +56,9 @@ def sequence(step: Step) -> Iterator[tuple[str, list[tuple[str, int, int]]]]:
 
 
 def planned_readings(sheet: RunSheet, experiment: Experiment) -> list[PlannedReading]:
-    """Every reading that is still to be taken, in order.
+    """Return every planned reading, in order.
 
-    :raises ExperimentError: two of them would have the same name as features.
+    :raises ExperimentError: two readings would have the same feature name.
     """
     planned: list[PlannedReading] = []
     meant: dict[str, tuple[str, str, str]] = {}
@@ -93,8 +93,8 @@ def feature_name(position: str, ball: str, probe: str) -> str:
 
 
 def template_csv(readings: Sequence[PlannedReading], experiment: Experiment) -> str:
-    """The table of readings with empty cells for the co-ordinates, and for what influence
-    quantities ask of each, as `fit` reads it when they are filled in.
+    """Return the table of readings as `fit` reads it, with empty cells for co-ordinates and
+    influence quantities.
     """
     out = io.StringIO()
     writer = CsvWriter(out)
@@ -127,11 +127,9 @@ def points_csv(readings: Sequence[PlannedReading], dimension: int) -> str:
 def points_dmis(
     readings: Sequence[PlannedReading], title: str, diameter: float, styli: dict[str, Array]
 ) -> str:
-    """Spheres of a `diameter` (m) in DMIS, with points to probe on the side that each stylus comes
-    from.
+    """Return spheres of a `diameter` (m) in DMIS, with points to probe on the side of each stylus.
 
-    `styli` are the probes' offsets (3,) by name. There are no moves between balls: what is in the
-    way there only the machine's programmer knows.
+    `styli` are the probes' offsets (3,) by name. The machine's programmer adds moves between balls.
     """
     title_text = re.sub(r"[^ -~]|'", "-", in_one_line(title))
     lines = [

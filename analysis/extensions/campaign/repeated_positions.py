@@ -1,4 +1,4 @@
-"""Readings of positions that were read again: the later ones count, in place of the earlier."""
+"""Repeated readings of positions: later ones replace the earlier."""
 
 from __future__ import annotations
 
@@ -16,14 +16,13 @@ Names = tuple[str, ...]
 def without_redone(
     rows: Sequence[FileRow], design: Design
 ) -> tuple[tuple[FileRow, ...], tuple[str, ...]]:
-    """Rows of readings in the order in which they were taken, less what was read again, and in
-    words what was left out.
+    """Return rows of readings in their order, without replaced ones, and notes on the rows left
+    out.
 
-    A position is read in runs of rows, between which another position, or another file, stands. A
-    run that reads balls again, more often than is planned, comes after the artefact was set up
-    anew: all that was read of the position before is left out. Readings that are repeated within a
-    run replace the earlier ones of the same ball and probe. A run of other balls or probes goes on
-    with the position.
+    A position is read in runs of rows, separated by another position or file. A run that reads
+    balls more often than planned follows a new set-up and replaces all earlier readings of the
+    position. Repeats within a run replace earlier readings of the same ball and probe. A run of
+    other balls or probes continues the position.
     """
     planned = _planned(design)
     rows_by_position: dict[str, list[int]] = {}
@@ -65,9 +64,7 @@ def without_redone(
 
 
 def _planned(design: Design) -> Counter[Names]:
-    """How often each ball is planned to be read in a position with a probe, by name; once where it
-    is not planned.
-    """
+    """Return planned numbers of readings by names of position, ball and probe; at least 1."""
     readings = design.readings.expanded()
     planned: Counter[Names] = _AtLeastOnce(
         (design.positions.names[k], design.balls.names[ball], design.probes.names[probe])

@@ -1,4 +1,4 @@
-"""The run sheet of an experiment, planned or not, with what goes to the laboratory beside it."""
+"""Run sheet of an experiment, planned or not, with tables for the laboratory."""
 
 from __future__ import annotations
 
@@ -74,14 +74,12 @@ class Sheet(Result):
         raise ValueError(f'"{form}" is no form of a run sheet; give .html, .md, .csv or .txt')
 
     def template(self) -> str:
-        """The CSV file of the readings in order with empty cells, for `fit` when it is filled
-        in.
-        """
+        """Return the CSV file of readings in order with empty cells, for `fit`."""
         return template_csv(planned_readings(self.sheet, self.experiment), self.experiment)
 
     def points(self, diameter: float | None = None) -> str:
-        """The centres of the balls in order as a CSV file, with a `diameter` of the balls (m) as
-        DMIS.
+        """Return the centres of the balls in order as a CSV file, or with a `diameter` of the balls
+        (m) as DMIS.
 
         :raises ExperimentError: two readings would have the same name, or DMIS is asked for in two
             dimensions.
@@ -97,7 +95,7 @@ class Sheet(Result):
 
 
 def sheet_of(experiment: Experiment) -> Sheet:
-    """The run sheet of an experiment as it is, in the order of its positions."""
+    """Return the run sheet of an experiment, in the order of its positions."""
     tree = to_python(experiment.tree)
     positions = tree.get("positions", ()) if isinstance(tree, Mapping) else ()
     by_name = {str(settings["name"]): settings for settings in positions}
@@ -135,7 +133,7 @@ def sheet_of(experiment: Experiment) -> Sheet:
 
 
 def _settings(position: Position, experiment: Experiment) -> dict[str, Any]:
-    """What a file would say of a position that no file has."""
+    """Return the settings of a position that is in no file."""
     rotation = position.pose.rotation
     turns = [float(np.arctan2(rotation[1, 0], rotation[0, 0]))]
     if len(rotation) == 3:

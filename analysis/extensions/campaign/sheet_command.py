@@ -83,7 +83,7 @@ def _diameter(text: str) -> float:
 
 
 def run(options: Namespace) -> int:
-    """Print the run sheet, or write what was asked for."""
+    """Print the run sheet, or write the files."""
     from .sheet import sheet_of
 
     is_dmis = options.points is not None and options.points.suffix.lower() in DMIS

@@ -27,10 +27,11 @@ INK, GREY = "#222", "#777"
 
 
 def artefact_drawing(name: str, layout: BallLayout, order: Sequence[int]) -> str:
-    """An artefact seen against its normal, with its balls named and the path of the reading order.
+    """Return an artefact viewed along its normal, with named balls and the path of the reading
+    order.
 
-    Where balls are too close for their names, those at the corners and the first have one; names
-    that are too long are told by numbers.
+    If balls are too close, only those at the corners and the first are named; numbers replace long
+    names.
     """
     points = np.array(layout.coordinates)[:, :2]
     lower, size = points.min(axis=0), np.ptp(points, axis=0)
@@ -77,9 +78,8 @@ def artefact_drawing(name: str, layout: BallLayout, order: Sequence[int]) -> str
 
 
 def volume_drawing(design: Design, names: Mapping[str, str]) -> str:
-    """The machine's volume with all positions in it, seen from the front and above.
-
-    `names` are what positions are called in the drawing.
+    """Return the machine's volume with all positions, seen from the front and above; `names` are
+    their labels.
     """
     drawn = scene(design)
     ends = drawn.box.edges.reshape(-1, 2)

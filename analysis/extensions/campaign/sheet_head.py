@@ -1,4 +1,4 @@
-"""What stands at the head of a run sheet: fields to fill in by hand, and the styli."""
+"""Head of a run sheet: fields to fill in by hand, and the styli."""
 
 from __future__ import annotations
 
@@ -18,12 +18,11 @@ NOTES = ("begun", "ended", "temperature", "remarks")
 
 @dataclass(frozen=True, eq=False)
 class Stylus:
-    """A probe of a run sheet: its tip's offset (d,) in metres, and the angles (rad) of that
-    direction.
+    """A probe of a run sheet: its tip's offset (d,) in metres, and angles (rad) of that direction.
 
     `from_down` is the angle from straight down, -z; `around` that of its level part from +x towards
-    +y. Both are NaN where there is no such direction. `angles` are A and B of an articulating head
-    (rad), None where the offset is stated itself.
+    +y; NaN without a direction. `angles` are A and B of an articulating head (rad), None for a
+    stated offset.
     """
 
     name: str
@@ -34,7 +33,7 @@ class Stylus:
 
 
 def known_fields(experiment: Experiment) -> dict[str, str]:
-    """What the head of a sheet says already."""
+    """Return the fields with known values."""
     machine, volume = experiment.machine, experiment.machine.volume
     size = " x ".join(f"{1e3 * length:.6g}" for length in volume.size)
     noise = sorted({f"{1e6 * deviation:.4g}" for deviation in machine.repeatability}, key=float)
@@ -75,7 +74,7 @@ def _stylus(probe: Probe) -> Stylus:
 
 
 def degrees(angle: float) -> str:
-    """An angle in degrees, or a dash where there is none."""
+    """Return an angle in degrees, or a dash."""
     return "–" if np.isnan(angle) else f"{np.degrees(angle):.4g}°"
 
 

@@ -222,7 +222,7 @@ def _pictures(sheet: RunSheet, experiment: Experiment) -> str:
 
 
 def _numbered(layout: BallLayout) -> str:
-    """What is to be said where balls have numbers in place of names that are too long."""
+    """Return the remark on numbers in place of long ball names."""
     is_long = max(map(len, layout.names)) > LONGEST_NAME
     return "; numbers are places in the artefact's list of balls" if is_long else ""
 

@@ -10,8 +10,8 @@ from ballplate.simulator.inputs import number_of
 
 
 def set_up_rows(step: Step, experiment: Experiment) -> list[tuple[str, str]]:
-    """How a position is set up: the artefact where there are several, the place, the machine
-    co-ordinates of its first and its last ball, and what is read.
+    """Return the set-up of a position: the artefact if there are several, its location, machine
+    co-ordinates of its first and last ball, and the balls to read.
     """
     item = step.candidate.item
     assert isinstance(item, Position)

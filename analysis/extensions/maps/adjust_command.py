@@ -127,8 +127,8 @@ def _second(options: Namespace) -> tuple[FittedMap | None, bool]:
 
 
 def _fitted(options: Namespace, file: Path, readings: list[Path]) -> tuple[FittedMap | None, bool]:
-    """A map, of a file or of a fit, and whether there is something to complain of; None where a fit
-    has failed.
+    """Return a map, of a file or of a fit, and whether it has a failure reason; None if a fit
+    failed.
     """
     from ballplate.simulator.experiment import read_map
 
@@ -146,7 +146,6 @@ def _fitted(options: Namespace, file: Path, readings: list[Path]) -> tuple[Fitte
 
 
 def _is_map(path: Path) -> bool:
-    """Whether a file is a map rather than an experiment or readings."""
     from ballplate.simulator.inputs import read_tree, written
 
     if path.suffix.lower() == ".npz":

@@ -1,8 +1,7 @@
-"""A machine after adjustments that were made to it: what its map predicts, and what a second
-campaign says.
+"""Machine after adjustments: predictions of its map and results of a second campaign.
 
-Hurt and Foss, US 4,437,151: a machine is inspected, its scales and guideways are adjusted by what
-was found, and it is inspected again.
+Hurt and Foss, US 4,437,151: inspect a machine, adjust its scales and guideways accordingly, and
+inspect it again.
 """
 
 from __future__ import annotations
@@ -39,11 +38,11 @@ CAMPAIGNS = "the first campaign", "the second campaign"
 
 @dataclass(frozen=True)
 class MachineLine:
-    """A figure of a machine that adjustments change: a scale error, the excess of an angle between
-    axes over 90 degrees, or the error of the length along a diagonal of the volume.
+    """A quantity that adjustments change: a scale error, the excess over 90 degrees of an angle
+    between axes, or the length error of a diagonal of the volume.
 
-    It is the sum over `parts` of component `along` of the error at `end` less that at `start`,
-    times a factor.
+    It sums, over `parts`, component `along` of the error at `end` less that at `start`, times a
+    factor.
     """
 
     name: str
@@ -90,7 +89,7 @@ def machine_lines(lower: Array, upper: Array) -> tuple[MachineLine, ...]:
 
 @dataclass(frozen=True)
 class LineValue:
-    """A figure of a machine with its standard uncertainty; NaN both where it is undetermined."""
+    """Value of a quantity with its standard uncertainty; both NaN if undetermined."""
 
     value: float
     standard_uncertainty: float
@@ -98,7 +97,7 @@ class LineValue:
 
 @single_threaded
 def line_values(fitted: FittedMap, lines: Sequence[MachineLine]) -> tuple[Array, Array]:
-    """Figures (m,) of a fitted machine and a square root (m, r) of their covariance, NaN where
+    """Return values (m,) of the quantities and a square root (m, r) of their covariance, NaN where
     undetermined.
     """
     weights = np.array([part[2] for machine_line in lines for part in machine_line.parts])
@@ -125,8 +124,7 @@ def line_values(fitted: FittedMap, lines: Sequence[MachineLine]) -> tuple[Array,
 def adjusted_map(
     fitted: FittedMap, changes: Sequence[MachineChange], share: float = 0.0
 ) -> FittedMap:
-    """The map of a machine after changes, each made as stated but for a standard uncertainty that
-    is a `share` of it.
+    """Return the map of a machine after changes, each with a relative standard uncertainty `share`.
 
     :raises ValueError: the machine has no such axis, or its error model cannot follow a change.
     """
@@ -143,7 +141,7 @@ def adjusted_map(
 
 
 def _followed(fitted: FittedMap, values: Array, change: MachineChange) -> Array:
-    """Parameters of the error model of a machine after a change, but for a motion of the whole."""
+    """Return model parameters after a change, up to a rigid motion of the whole."""
     d, (lower, upper) = fitted.dimension, map(np.array, fitted.volume.corners)
     if max(change.axis, change.towards or 0) >= d:
         raise ValueError(f"{change.words}: the map has the axes {', '.join(AXIS_NAMES[:d])} only")
@@ -180,11 +178,11 @@ def _followed(fitted: FittedMap, values: Array, change: MachineChange) -> Array:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class AdjustedMachine(Result):
-    """What adjustments of a machine leave of its errors, and what a second campaign found.
+    """Errors left by adjustments of a machine, with the results of a second campaign.
 
-    `before` and `predicted` are the figures of `lines_of_machine`, `found` those of the second
-    campaign, and `difference` is that of its map less `predicted_map`, the machine as predicted;
-    both are None without a second campaign.
+    `before`, `predicted` and `found` (second campaign) are values of `lines_of_machine`;
+    `difference` is the second map less `predicted_map`. `found` and `difference` are None without a
+    second campaign.
     """
 
     label: str
@@ -202,7 +200,7 @@ class AdjustedMachine(Result):
 
     @property
     def normalised_errors(self) -> Array:
-        """E_n (m,) of the figures; NaN where one is undetermined or exactly known."""
+        """E_n (m,) of the quantities; NaN if undetermined or exact."""
         errors = []
         for predicted, actual in zip(self.predicted, self.found or (), strict=False):
             u = np.hypot(predicted.standard_uncertainty, actual.standard_uncertainty)
@@ -213,8 +211,8 @@ class AdjustedMachine(Result):
 
     @property
     def is_within(self) -> bool | None:
-        """Whether the joint test of the second campaign's map shows no change from the prediction;
-        None where nothing can be tested.
+        """True if the joint test of the second map shows no change from the prediction; None if
+        untestable.
         """
         changed = None if self.difference is None else self.difference.is_changed
         return None if changed is None else not changed
@@ -324,10 +322,10 @@ def adjusted_machine(
     second: FittedMap | None = None,
     share: float = 0.0,
 ) -> AdjustedMachine:
-    """What changes leave of a fitted machine's errors and, with a `second` campaign after them,
-    whether it finds that.
+    """Return the errors left by changes of a fitted machine, compared with a `second` campaign
+    after them.
 
-    `share` is the standard uncertainty of each change as a part of it.
+    `share` is the relative standard uncertainty of each change.
 
     :raises ValueError: the error model cannot follow a change; the second map is of another volume,
         or rests on readings of the first.

@@ -1,11 +1,10 @@
-"""Tests of the difference of two campaigns of which each may estimate its sigma.
+"""Tests of the difference of two campaigns, each of which may estimate its sigma.
 
-Welch's effective degrees of freedom come from the estimated shares of both campaigns. A campaign
-whose sigma came out too small has too small a share as well, so that a test by Welch's degrees of
-freedom is wrong if these are few. Here they only weight differences of unequal shares. The
-distribution of the weighted sum is computed for campaigns whose stated uncertainties are wrong by
-the same factor: the residual sum of squares of both is then chi-squared and independent of the
-ratio of both sigmas, over which the chance is integrated.
+Welch's effective degrees of freedom use estimated shares of both campaigns. A campaign with too
+small a sigma gets too small a share, which invalidates tests with few degrees of freedom. Here they
+only weight differences of unequal shares. If stated uncertainties of both campaigns are wrong by
+the same factor, the sum of their residual sums of squares is chi-squared and independent of the
+ratio of both sigmas, over which the p-value is integrated.
 """
 
 from __future__ import annotations
@@ -43,8 +42,8 @@ NODES = 100
 
 @dataclass(frozen=True)
 class EstimatedSigma:
-    """The `sigma` of a campaign, by which its stated uncertainties were multiplied, and the degrees
-    of freedom that it was estimated with, infinite where it is stated.
+    """Factor `sigma` of a campaign's stated uncertainties and its degrees of freedom, infinite if
+    stated.
     """
 
     sigma: float
@@ -57,12 +56,12 @@ Roots = tuple[Array, Array]
 
 @dataclass(frozen=True)
 class JointDifference:
-    """The test of differences together: `statistic` is their sum of squares, weighted with their
-    covariance, of as many `dimensions` as there are independent ones.
+    """Joint test of differences: `statistic` is their sum of squares, weighted with their
+    covariance, of `dimensions` independent ones.
 
-    `degrees_of_freedom` are Welch's, of the mean share of both campaigns, and `p` is the chance of
-    so much where nothing has changed. What both campaigns have in common fixes `fixed` directions,
-    which are not tested; `held` is the largest difference along these.
+    `degrees_of_freedom` are Welch's for the mean share of both campaigns; `p` is the p-value.
+    Common errors fix `fixed` directions, which are not tested; `held` is the largest difference
+    along them.
     """
 
     statistic: float
@@ -91,10 +90,10 @@ def with_common(roots: Roots, common: Array, scatters: SigmaPair) -> Roots:
 def joint_difference(
     values: Array, roots: Roots, scatters: SigmaPair, alone: Array | None = None
 ) -> JointDifference | None:
-    """Test differences (m,); `roots` are square roots (m, r) of both campaigns' parts of their
-    covariance. None where none has a variance.
+    """Test differences (m,) with square roots (m, r) of both campaigns' parts of the covariance;
+    None without variance.
 
-    `alone` (m, k) is a square root of the covariance that there would be with nothing in common.
+    `alone` (m, k) is a square root of the covariance without common errors.
     """
     alone = np.hstack(roots) if alone is None else alone
     size = np.linalg.norm(alone, axis=1)
@@ -131,8 +130,8 @@ def joint_difference(
 
 
 def joint_chance(squares: Array, shares: Array, scatters: SigmaPair) -> float:
-    """The chance of so large `squares` (n,) of independent differences together, over variances of
-    which the first campaign has the estimated `shares` (n,).
+    """Return the joint p-value of `squares` (n,) of independent differences over their variances,
+    to which the first campaign contributes the estimated `shares` (n,).
 
     >>> known, few = EstimatedSigma(1.0, np.inf), EstimatedSigma(1.0, 4)
     >>> round(joint_chance(np.array([3.841459]), np.ones(1), (known, few)), 6)
@@ -155,8 +154,8 @@ def joint_chance(squares: Array, shares: Array, scatters: SigmaPair) -> float:
 
 
 def single_chances(limit: float, shares: Array, scatters: SigmaPair) -> Array:
-    """The chances (m,) that single differences are more than `limit` times their standard
-    uncertainty; the first campaign has the estimated `shares` (m,) of their variances.
+    """Return probabilities (m,) of single differences beyond `limit` standard uncertainties; the
+    first campaign contributes the estimated `shares` (m,) of the variances.
 
     >>> both = EstimatedSigma(1.0, 5), EstimatedSigma(2.0, 5)
     >>> single_chances(2.228, np.array([0.2]), both).round(3)
@@ -169,16 +168,16 @@ def single_chances(limit: float, shares: Array, scatters: SigmaPair) -> Array:
 
 
 def welch(share: Array | float, scatters: SigmaPair) -> Array:
-    """Effective degrees of freedom of a variance of which the first campaign has a share."""
+    """Return effective degrees of freedom of a variance, given the first campaign's share."""
     first, second = (scatter.degrees_of_freedom for scatter in scatters)
     with np.errstate(divide="ignore"):
         return np.asarray(1.0 / (np.square(share) / first + np.square(1.0 - share) / second))
 
 
 def _ratios(shares: Array, scatters: SigmaPair) -> tuple[Array, Array, Array, float]:
-    """At nodes (k,) of the ratio of both estimated sigmas where the true ones are the same: the
-    shares of the first campaign (k, n), the variances of differences over what they are estimated
-    as (k, n), weights (k,) of the nodes, and the degrees of freedom of both together.
+    """Return, at nodes (k,) of the ratio of estimated sigmas with equal true ones: shares of the
+    first campaign (k, n), ratios of true to estimated variances (k, n), weights (k,) of the nodes,
+    and total degrees of freedom.
     """
     first, second = _freedom(scatters)
     part, weights = _nodes(first, second)
@@ -206,8 +205,8 @@ def _nodes(first: float, second: float) -> tuple[Array, Array]:
 
 @lru_cache(maxsize=256)
 def _quantiles(count: int, first: float, second: float) -> tuple[Array, Array]:
-    """Shares of the first campaign, and Fisher's quantile of so many differences at each, by which
-    a sum of squares is larger for a scatter of few degrees of freedom.
+    """Return shares of the first campaign and, at each, Fisher's quantile of `count` differences,
+    which few degrees of freedom enlarge.
     """
     from scipy.special import betaincinv
 
@@ -217,8 +216,8 @@ def _quantiles(count: int, first: float, second: float) -> tuple[Array, Array]:
 
 
 def orthonormal(columns: Array, least: float = NO_DIRECTION, largest: float | None = None) -> Array:
-    """An orthonormal basis (m, r) of the space of columns (m, n); what is left of a column, up to
-    the part `least` of the `largest`, by default that of the columns, is rounding.
+    """Return an orthonormal basis (m, r) of the space of columns (m, n); residuals below `least`
+    times `largest`, by default that of the columns, are rounding.
     """
     if not columns.size:
         return np.zeros((len(columns), 0))

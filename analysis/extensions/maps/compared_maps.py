@@ -37,11 +37,11 @@ MOTIONS = {
 
 @dataclass(frozen=True, eq=False)
 class MappedValues:
-    """Functions (m,) with their `values`, a square `root` (m, r) of their covariance, and how much
-    undetermined directions change them, `null` (m, k), of what any could, `size` (m,).
+    """Functions (m,) with `values`, a square `root` (m, r) of their covariance, their changes
+    `null` (m, k) by undetermined directions, and bounds `size` (m,) of such changes.
 
-    `shared` (m, q) is what the standard deviations of values that both maps rest on make of them;
-    their part of the covariance is not in that of the root.
+    `shared` (m, q) are effects of the standard deviations of values common to both maps, excluded
+    from the root.
     """
 
     values: Array
@@ -51,7 +51,7 @@ class MappedValues:
     shared: Array
 
     def by(self, matrix: Array) -> MappedValues:
-        """Linear functions of these, by a matrix (k, m)."""
+        """Return linear functions by a matrix (k, m)."""
         return MappedValues(
             matrix @ self.values,
             matrix @ self.root,
@@ -76,19 +76,17 @@ class MappedValues:
 
 @dataclass(frozen=True, eq=False)
 class ComparedMap:
-    """The errors of a machine by a `model` with the parameters `values` (n,), of which `root`
-    (n, r) is a square root of the covariance and `undetermined` (n, k) what is open.
+    """Errors of a machine by a `model` with parameters `values` (n,), a square `root` (n, r) of
+    their covariance and `undetermined` directions (n, k).
 
-    `shared` (n, q) is the effect of one standard deviation of each value that both maps rest on,
-    which is not in the root; `absorbed` (q, r) are its rows of the root of the hat matrix. `sigma`
-    is a factor of both, and `degrees_of_freedom` are those that it comes from, infinite where
-    uncertainties are as stated. `offsets` are those of probes by name, `probe` the one that is
-    meant where none is named. Derivatives are taken at the parameters `about` (n,), by default the
-    values; two maps of the same model have them in common, as otherwise their spaces of errors
-    would differ by what is of second order. `fit` has the balls of plates, and `data` are the
-    readings that the map comes from with their `lack_of_fit`, where they are known; `cautions` are
-    those of the fit. `is_expected`: nothing was measured, and the map is exact but for what is
-    stated, of which `stated` is the standard uncertainty of lengths.
+    `shared` (n, q) is the effect of one standard deviation of each value common to both maps,
+    excluded from the root; `absorbed` (q, r) are its rows of the root of the hat matrix. `sigma` is
+    a factor of both with `degrees_of_freedom`, infinite if stated. `offsets` are those of probes by
+    name, `probe` the default one. Derivatives are taken at `about` (n,), by default the values; two
+    maps of one model share it, or their spaces of errors would differ to second order. `fit` has
+    the balls of plates, `data` the readings with their `lack_of_fit`, `cautions` those of the fit.
+    With `is_expected` the map is unmeasured and exact up to its stated uncertainties, with `stated`
+    that of lengths.
     """
 
     label: str
@@ -147,7 +145,7 @@ class ComparedMap:
         return self.model.jacobian(points, about, offsets).reshape(points.size, -1)
 
     def line(self, function: str, t: Array) -> MappedValues | None:
-        """An error function at fractions `t` (m,) of its axis; None where it has several lines."""
+        """Return an error function at fractions `t` (m,) of its axis; None for several lines."""
         lines = self.model.lines(function, t) if isinstance(self.model, HasLines) else ()
         if len(lines) != 1:
             return None
@@ -166,9 +164,7 @@ class ComparedMap:
 
     @cached_property
     def held(self) -> tuple[str, ...]:
-        """Motions of the frame, and turns of the probe, that conditions of the model's frame take
-        out: none of its parameters can make them.
-        """
+        """Motions of the frame and turns of the probe that no parameter can make."""
         return self._held_motions()
 
     @single_threaded
@@ -203,7 +199,7 @@ def without_shared(root: Array, absorbed: Array | None) -> tuple[Array, Array]:
 
 
 def in_common(first: ComparedMap, second: ComparedMap) -> InCommon:
-    """What two maps have of each other's readings, which fits compare one by one."""
+    """Return the overlap of the readings of two maps, compared singly for fits."""
     overlap = readings_in_common(first.data, second.data)
     first_fit, second_fit = first.fit, second.fit
     if overlap == "same" or first_fit is None or second_fit is None:
@@ -216,9 +212,7 @@ def in_common(first: ComparedMap, second: ComparedMap) -> InCommon:
 
 
 def positions_in_common(first: ComparedMap, second: ComparedMap) -> tuple[str, ...]:
-    """Positions whose readings two maps have in common, by their names where one is a fit, or how
-    many they are.
-    """
+    """Return names of positions with common readings or, without a fit, their number."""
     if first.fit is not None and second.fit is not None:
         positions = same_positions(first.fit.observed, second.fit.observed)
         if positions:
@@ -234,8 +228,8 @@ def positions_in_common(first: ComparedMap, second: ComparedMap) -> tuple[str, .
 
 
 def motions(points: Array) -> Array:
-    """What small motions of the frame do at `points` (n, d): (n, d, 6), or (n, d, 3) in the plane;
-    shifts in metres, turns about the origin in radians.
+    """Return the effects of small frame motions at `points` (n, d): (n, d, 6), or (n, d, 3) in the
+    plane; shifts in metres, turns about the origin in radians.
     """
     n, d = points.shape
     columns = np.zeros((n, d, pose_size(d)))
@@ -284,11 +278,10 @@ def expected_map(
     stated: LengthFunction | None = None,
     date: str | None = None,
 ) -> ComparedMap:
-    """The map that a machine file describes, of two dimensions that at its reference point.
+    """Return the map of a machine file; in two dimensions that at its reference point.
 
-    It is exact, but for squareness errors and temperatures of which the file states how well they
-    are known, and for `stated`, the standard uncertainty of lengths. Bandwidths are scatter of
-    single approaches, which no map has.
+    It is exact up to the stated uncertainties of squareness errors, temperatures and lengths
+    (`stated`). Bandwidths are noise of single approaches, absent from maps.
     """
     described = Volumetric(machine)
     model: ErrorModel = described.truth.model

@@ -1,4 +1,4 @@
-"""Comparison of two maps: by length, by place, by error function, and of plates by ball."""
+"""Comparison of two maps: lengths, errors at points, error functions, and balls of plates."""
 
 from __future__ import annotations
 
@@ -33,8 +33,8 @@ SAME = ("arrangement", "lower", "upper", "origin", "full_rotations", "spatial", 
 
 @dataclass(frozen=True)
 class ComparisonSettings:
-    """How maps are compared: with which `coverage_factor`, on a grid of so many points along each
-    axis, or at `points` (n, d) in metres or those of a file, and with which probe.
+    """Settings of a comparison: `coverage_factor`, `grid` points along each axis or `points` (n, d)
+    in metres or of a file, and the probe.
     """
 
     coverage_factor: float = 2.0
@@ -45,7 +45,7 @@ class ComparisonSettings:
 
 @dataclass(frozen=True, eq=False)
 class FunctionDifference:
-    """An error function: its figures along the axis at fractions `t`, and all of it together."""
+    """Differences of an error function along its axis, with their joint test."""
 
     name: str
     axis: str
@@ -83,7 +83,7 @@ class MapComparison:
 
     @property
     def groups(self) -> tuple[FigureGroup, ...]:
-        """All figures, in the order in which they are told."""
+        """All groups of values, in printed order."""
         of_functions = (compared_part.figures for compared_part in self.functions)
         return (
             *self.lengths,
@@ -94,7 +94,7 @@ class MapComparison:
 
 
 class NotComparableError(ValueError):
-    """Two maps that have nothing in common to be compared."""
+    """Two maps with no common ground for a comparison."""
 
 
 @single_threaded
@@ -168,7 +168,7 @@ def compared(
 
 
 def _linearised_alike(first: ComparedMap, second: ComparedMap) -> tuple[ComparedMap, ComparedMap]:
-    """Both maps with derivatives at the same parameters, where they have the same."""
+    """Return both maps, with derivatives at the same parameters if they share a model."""
     effects = [[(p.name, p.effect) for p in side.model.parameters] for side in (first, second)]
     if type(first.model) is not type(second.model) or effects[0] != effects[1]:
         return first, second
@@ -187,17 +187,15 @@ def _common_volume(first: ComparedMap, second: ComparedMap) -> Volume:
 def _offsets(
     first: ComparedMap, second: ComparedMap, probe: str | None
 ) -> tuple[str, dict[str, Array]]:
-    """The probe that is compared with, and offsets (d,) of all that the maps have in common.
-
-    An offset of the first map serves for both: it is shifted by less than matters wherever probes
-    were qualified anew.
-    """
+    """Return the probe for the comparison and offsets (d,) of all common probes."""
     has = [side for side in (first, second) if not side.is_expected]
     if not has:
         # Two described machines: the reference point itself.
         return "", {"": np.zeros(first.dimension)}
     offsets = {
         name: offset
+        # The first map's offset serves for both: requalified probes shift it by a negligible
+        # amount.
         for name, offset in has[0].offsets.items()
         if all(name in side.offsets for side in has)
     }
@@ -230,7 +228,7 @@ def _place(point: Array) -> str:
 
 
 def _of_corners(corners: Array) -> Iterator[tuple[str, Integers]]:
-    """Pairs of corners by the kind of their length, the longest first."""
+    """Yield pairs of corners by type of length, the longest first."""
     d = corners.shape[1]
     for apart in range(d, 0, -1):
         pairs = [
@@ -306,9 +304,7 @@ def _functions(
 
 
 def _have_same_functions(model: ErrorModel, other_model: ErrorModel) -> bool:
-    """Whether error functions of the same name are the same in both models: in the same frame and
-    volume, whatever their numbers of coefficients.
-    """
+    """Compare error functions by frame and volume, regardless of their numbers of coefficients."""
     if type(model) is not type(other_model):
         return False
     for name in SAME:
@@ -324,8 +320,8 @@ def _have_same_functions(model: ErrorModel, other_model: ErrorModel) -> bool:
 def _whole(
     difference_at: Any, volume: Volume, offsets: dict[str, Array], count: int
 ) -> JointTest | None:
-    """The test of errors through the volume with all common probes together, whatever the frame
-    and the offsets of the probes.
+    """Return the joint test of errors through the volume with all common probes, independent of the
+    frame and of probe offsets.
     """
     d = len(volume.lower)
     generator = np.random.default_rng(np.random.SeedSequence(1))

@@ -1,4 +1,4 @@
-"""A fitted map in another error model, and what is lost by that."""
+"""Fitted map in another error model, with the conversion residuals."""
 
 from __future__ import annotations
 
@@ -31,11 +31,11 @@ EXACT = 1e-12
 
 @dataclass(frozen=True, repr=False)
 class ConvertedMap(Result):
-    """A map in another error model: its parameters with their uncertainties, and the residuals.
+    """A map in another error model: parameters with their uncertainties, and residuals.
 
-    `points_searched` and `lengths_searched` have the largest differences of corrected points and of
-    lengths by both maps, and `length_uncertainty` the root mean square of the standard ones that
-    the old map gives, None where these are undetermined; all in metres.
+    `points_searched` and `lengths_searched` have the largest differences between both maps,
+    `length_uncertainty` the root mean square standard uncertainty of lengths by the old map, None
+    if undetermined; all in metres.
     """
 
     label: str
@@ -51,7 +51,7 @@ class ConvertedMap(Result):
 
     @property
     def map(self) -> FittedMap:
-        """The new map, which says what it was converted from."""
+        """The new map, with a record of its source."""
         converted = self.conversion.converted
         name = f"conversion from {self.old.settings['kind']}"
         residual = 0.0 if self.is_exact else self.residual[0]
@@ -75,7 +75,7 @@ class ConvertedMap(Result):
 
     @property
     def is_exact(self) -> bool:
-        """Whether the new model can do all that the old one did."""
+        """True if the new model reproduces the old one."""
         return self.residual[0] < EXACT + 1e-6 * self._largest
 
     @property
@@ -184,7 +184,7 @@ def _corrections(fitted: FittedMap) -> Differences:
 
 @single_threaded
 def convert(fitted: FittedMap, to: str, label: str) -> ConvertedMap:
-    """A map in the error model that a text states, see `stated_model`.
+    """Return a map in the error model of a text, see `stated_model`.
 
     :raises ExperimentError: it states none.
     """

@@ -107,7 +107,7 @@ def _add_lengths(parser: ArgumentParser) -> None:
 
 
 def run(options: Namespace) -> int:
-    """Print points and lengths, and write what was asked for; 1 if something is undetermined."""
+    """Print points and lengths and write the files; return 1 if a result is undetermined."""
     from ballplate.simulator.inputs import hint
 
     from .correction import MOST_CO_ORDINATES, correction
@@ -141,7 +141,6 @@ def run(options: Namespace) -> int:
 
 
 def _wanted(options: Namespace, fitted: FittedMap, scale_points: GivenPoints) -> Tasks:
-    """The lengths that the options ask for."""
     from ballplate.simulator.experiment import load
 
     from .selected_lengths import between_listed, between_named, tasks_of_experiment

@@ -1,4 +1,4 @@
-"""Corrected points of a fitted map, with their derivatives by what the map holds."""
+"""Corrected points of a fitted map, with derivatives by its parameters and offsets."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ POINTS_AT_ONCE = 1000
 def corrected(
     fitted: FittedMap, points: Array, probes: Integers | int | None = None
 ) -> tuple[Array, Array]:
-    """Corrected points x + e(x, a, p) (n, d) for scale readings `points` (n, d), in metres, and
-    their derivatives (n, d, m) by what the map holds.
+    """Return corrected points x + e(x, a, p) (n, d) for scale readings `points` (n, d), in metres,
+    and derivatives (n, d, m) by the contents of the map.
 
-    `probes` are indices (n,) of its probes, or one for all; by default that of the map. Where the
-    tip is less where the scales say, e, is the correction to be added.
+    `probes` are indices (n,) or one for all; default: the probe of the map. The correction e is tip
+    less scale reading.
     """
     offsets = fitted.probes.offsets[probe_indices(fitted, len(points), probes)]
     places = np.asarray(points + fitted.model.error(points, fitted.values, offsets))
@@ -31,8 +31,8 @@ def corrected(
 def drawn_rows(
     fitted: FittedMap, points: Array, probes: Integers | int | None = None
 ) -> Array | None:
-    """The derivatives of `corrected` on a machine without errors, which tell what is undetermined;
-    None where nothing is.
+    """Return derivatives of `corrected` on a machine without errors, which determine the
+    undetermined results; None without any.
     """
     if not fitted.undetermined.size:
         return None
@@ -64,7 +64,7 @@ def tips(fitted: FittedMap, points: Array, probes: Integers | int | None = None)
 
 
 def probe_indices(fitted: FittedMap, count: int, probes: Integers | int | None = None) -> Integers:
-    """Indices (count,) of probes, by default all of them that of the map."""
+    """Return indices (count,) of probes; default: the probe of the map."""
     indices = fitted.probes.names.index(fitted.probe) if probes is None else probes
     return np.broadcast_to(np.asarray(indices, np.int64), count)
 
@@ -87,8 +87,8 @@ def corrected_with_root(
 def corrected_with_blocks(
     fitted: FittedMap, points: Array, probes: Integers | int | None = None
 ) -> tuple[Array, Array]:
-    """Corrected points (n, d) and the covariance of each by itself (n, d, d), for any number of
-    points; metres, NaN where undetermined.
+    """Return corrected points (n, d) and the covariance of each (n, d, d); metres, NaN where
+    undetermined.
     """
     d = fitted.dimension
     places, blocks = np.zeros(points.shape), np.zeros((len(points), d, d))

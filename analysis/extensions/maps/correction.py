@@ -29,9 +29,8 @@ MOST_CO_ORDINATES = 2000
 
 @dataclass(frozen=True)
 class CorrectedLength:
-    """A length on the corrected machine: `read` is what the scales say, with the stated offsets of
-    probes. The standard uncertainty is NaN where the length is undetermined; all in metres.
-    `target` is what it is to be within, where that is stated.
+    """A length on the corrected machine, with `read`, the length by scales and stated probe
+    offsets, and its `target`, if any; metres. The standard uncertainty is NaN if undetermined.
     """
 
     name: str
@@ -42,7 +41,7 @@ class CorrectedLength:
 
     @property
     def is_met(self) -> bool | None:
-        """Whether the uncertainty is within the target; None without one."""
+        """True if the uncertainty is within the target; None without a target."""
         if self.target is None:
             return None
         return bool(self.standard_uncertainty <= self.target.at(self.value))
@@ -50,12 +49,12 @@ class CorrectedLength:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Correction(Result):
-    """Scale readings that were `given`, corrected: `points` (n, d) in metres and the covariance
-    `blocks` (n, d, d) of each by itself in square metres, NaN where undetermined.
+    """Corrected scale readings `given`: `points` (n, d) in metres and covariance `blocks` (n, d, d)
+    of each point in square metres, NaN where undetermined.
 
-    With `scatter`, by which the stated repeatability is multiplied, the readings' own scatter is
-    part of all uncertainties; without, it is 0. `coverage_factor` is that of expanded ones.
-    `outside` (n,) are points outside the volume, for which the map is extrapolated.
+    `scatter` multiplies the stated repeatability, whose variance is part of all uncertainties; 0
+    excludes it. `coverage_factor` applies to expanded uncertainties. `outside` (n,) flags
+    extrapolated points.
     """
 
     fitted: FittedMap
@@ -86,8 +85,8 @@ class Correction(Result):
 
     @property
     def corrections(self) -> Array:
-        """What is added (n, d) to where the tips are by the scales with the stated offsets of
-        probes, in metres; the error of indication has the opposite sign.
+        """Corrections (n, d) added to the tips by scales and stated probe offsets, in metres; the
+        error of indication has the opposite sign.
         """
         return np.asarray(self.points - tips(self.fitted, self.given.points, self.given.probes))
 
@@ -98,7 +97,7 @@ class Correction(Result):
 
     @property
     def is_open(self) -> bool:
-        """Whether a co-ordinate or a length is undetermined."""
+        """True if a co-ordinate or a length is undetermined."""
         lengths = [length.standard_uncertainty for length in self.lengths]
         return bool(np.isnan(self.points).any() or np.isnan(lengths).any())
 
@@ -132,9 +131,7 @@ class Correction(Result):
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """What a user of the points has to know: extrapolation, few degrees of freedom, what is not
-        applied.
-        """
+        """Warnings: extrapolation, few degrees of freedom, effects not applied."""
         fitted, cautions = self.fitted, [self.fitted.known_lack_of_fit.caution]
         outside = np.flatnonzero(self.outside)
         if len(outside):
@@ -218,14 +215,12 @@ class Correction(Result):
         return [*table, f"(and {more} more lengths, which --json has)"] if more > 0 else table
 
     def write_points(self, stream: TextIO) -> None:
-        """Write the points as a CSV file, in units that its columns name; what is undetermined is
-        empty.
-        """
+        """Write the points as CSV with units in column names; undetermined cells are empty."""
         CsvWriter(stream).writerows(self._point_cells())
 
     def write_covariance(self, stream: TextIO) -> None:
-        """Write the covariance of all co-ordinates as a CSV file, in square micrometres; what is
-        undetermined is empty.
+        """Write the covariance of all co-ordinates as CSV, in square micrometres; undetermined
+        cells are empty.
 
         :raises ValueError: there are too many.
         """
@@ -308,9 +303,8 @@ def correction(
     coverage_factor: float | None = None,
     with_repeatability: bool = False,
 ) -> Correction:
-    """Scale readings that are `given`, and lengths, corrected.
-
-    The coverage factor is that of the map where none is given.
+    """Return corrected scale readings `given`, and lengths; default coverage factor: that of the
+    map.
 
     :raises ValueError: both points of a length are at the same place.
     """

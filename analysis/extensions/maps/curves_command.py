@@ -80,7 +80,7 @@ def run(options: Namespace) -> int:
 def show_errors(
     options: Namespace, errors: MachineErrors | FittedErrorMap | ErrorCurves, draw: Writer
 ) -> None:
-    """Say what is to be known of errors, draw them, and print them in the form asked for."""
+    """Print notes, draw the errors, and print them in the chosen format."""
     for note in errors.notes:
         complain(note)
     # Before anything is printed that nobody may read to its end.

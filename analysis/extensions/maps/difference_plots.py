@@ -1,4 +1,4 @@
-"""A picture of what changed between two maps: vectors in the volume, and E_n of all figures."""
+"""Plot of changes between two maps: vectors in the volume, and E_n of all groups."""
 
 from __future__ import annotations
 
@@ -41,11 +41,11 @@ LEAST_END, MOST_MARKS = 2.0, 400
 def draw_difference(
     comparison: MapComparison, words: str, path: str | Path | None = None
 ) -> Figure:
-    """The difference at points of the volume, those of |E_n| > 1 in a colour, and |E_n| of all
-    figures in rows; it is written to the path, if there is one.
+    """Draw differences at points of the volume and |E_n| of all groups, those of |E_n| > 1 in a
+    colour; save to the path, if any.
 
     :raises ImportError: matplotlib is missing.
-    :raises ValueError: the name ends in none of the kinds of pictures.
+    :raises ValueError: the file name has no known picture format.
     :raises OSError: the file cannot be written.
     """
     groups = [group for group in comparison.groups if group.count]
@@ -103,7 +103,7 @@ def _vectors(axes: Axes, comparison: MapComparison) -> None:
 
 
 def _rows(axes: Axes, groups: list[FigureGroup]) -> None:
-    """A row for each group: |E_n| of its figures, those above 1 in a colour."""
+    """Draw one row per group: |E_n|, those above 1 in a colour."""
     largest = LEAST_END
     for k, group in enumerate(groups):
         values = np.sort(np.abs(group.normalised[group.is_compared]))[::-1]

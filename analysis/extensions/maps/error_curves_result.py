@@ -124,7 +124,7 @@ class ErrorCurves(Result):
         ]
 
     def point_lines(self) -> Iterator[str]:
-        """All curves and numbers as lines of a CSV file; what is undetermined is empty."""
+        """Yield all curves and numbers as lines of a CSV file; undetermined cells are empty."""
         text = io.StringIO()
         writer = CsvWriter(text)
         writer.writerow(HEADS)
@@ -162,7 +162,7 @@ class ErrorCurves(Result):
 def error_curves(
     fitted: FittedMap, label: str, names: Collection[str] = (), positions: int = POSITIONS
 ) -> ErrorCurves:
-    """The error functions of a map at so many positions, or those with some names.
+    """Return the error functions of a map at a number of positions, or those named.
 
     :raises ValueError: there is none of a name.
     """
@@ -181,7 +181,7 @@ def _cell(value: float) -> str:
 
 
 def _curve_table(curves: Sequence[FunctionCurve], k: float) -> list[str]:
-    """A line for each curve: where it runs, its least and largest value, and its largest U."""
+    """Return one row per curve: range of positions, least and largest value, largest U."""
     heads = ["error", "", "along", "from, mm", "to, mm", "least", "largest", "largest U", "unit"]
     rows, line_counts, omitted = [heads], dict[str, int](), 0
     for curve in curves:

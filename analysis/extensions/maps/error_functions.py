@@ -23,10 +23,9 @@ OF_ENDS = "from the ends of the volume's edges at its lower corner"
 @dataclass(frozen=True, eq=False)
 class FunctionCurve:
     """An error function along a line: `values` and standard `uncertainties` (m,) in `unit` at
-    `positions` (m,) in metres, of the `axis` that it runs along; NaN where undetermined.
+    `positions` (m,) in metres of its `axis`; NaN where undetermined.
 
-    Without an axis positions are fractions of the line, which `line` names where there are
-    several.
+    Without an axis, positions are fractions of the line; `line` names one of several.
     """
 
     name: str
@@ -40,14 +39,14 @@ class FunctionCurve:
 
     @property
     def is_undetermined(self) -> bool:
-        """Whether nothing is known of it but where the frame holds it at zero."""
+        """True if the curve is undetermined except where the frame fixes it at zero."""
         return not (self.uncertainties > 0.0).any() and bool(np.isnan(self.uncertainties).any())
 
 
 @dataclass(frozen=True)
 class EstimatedNumber:
-    """An error that is a single number in `unit`, with its standard uncertainty; NaN where
-    undetermined. `source` says what it is taken from.
+    """An error that is a single number in `unit`, with its standard uncertainty and `source`; NaN
+    if undetermined.
     """
 
     name: str
@@ -71,7 +70,7 @@ class ErrorFunctions:
 def error_functions(
     fitted: FittedMap, names: Collection[str] = (), positions: int = POSITIONS
 ) -> ErrorFunctions:
-    """The error functions of a map at so many positions, or those with some names.
+    """Return the error functions of a map at a number of positions, or those named.
 
     :raises ValueError: there is none of a name.
     """
@@ -112,7 +111,7 @@ def _columns(fitted: FittedMap, name: str) -> list[int]:
 
 
 def _curves(fitted: FittedMap, name: str, positions: int) -> Iterator[FunctionCurve]:
-    """The function along its lines; none where it is a single number."""
+    """Yield the function along its lines; empty for a single number."""
     model, t = fitted.model, np.linspace(0.0, 1.0, positions)
     if not isinstance(model, HasLines) or name in SQUARENESS_ERRORS:
         return

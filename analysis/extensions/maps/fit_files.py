@@ -12,7 +12,7 @@ from ballplate.simulator.readings import read_readings
 
 
 def kind_of_file(path: Path) -> Literal["map", "machine", "experiment"]:
-    """What a file is, a map where that cannot be told.
+    """Return the type of a file; a map if ambiguous.
 
     :raises ExperimentError: it cannot be read.
     """
@@ -28,7 +28,8 @@ def kind_of_file(path: Path) -> Literal["map", "machine", "experiment"]:
 
 
 def fit_of_file(path: Path, readings: Path | None = None) -> Fit:
-    """The fit of an experiment to a table of readings, by default to those that it names.
+    """Return the fit of an experiment to a table of readings; default: the readings that the file
+    names.
 
     :raises ExperimentError: the file is wrong, has variants or names no readings, or the estimate
         did not converge.

@@ -15,8 +15,8 @@ FITTED = "map file, as fit -o writes it, or experiment file that names its readi
 
 
 def fitted_map(path: Path) -> FittedMap:
-    """The map of a map file, or of an experiment file that names its readings, which are fitted;
-    says what is to be said of that fit.
+    """Return the map of a map file, or of a fit of an experiment file that names its readings;
+    print the notes of the fit.
 
     :raises ExperimentError: the file is wrong, or the estimate did not converge.
     """

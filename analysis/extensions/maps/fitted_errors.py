@@ -24,8 +24,8 @@ Probed = Integers | int
 
 @dataclass(frozen=True, eq=False)
 class FittedErrors:
-    """Estimated errors (m, d) where the axes stand at `points` (m, d), with standard
-    `uncertainties` (m, d), in metres; both are NaN where undetermined.
+    """Estimated errors (m, d) at scale readings `points` (m, d), with standard `uncertainties` (m,
+    d), in metres; NaN where undetermined.
     """
 
     points: Array
@@ -34,7 +34,7 @@ class FittedErrors:
 
     @property
     def resultant(self) -> Array:
-        """Length (m,) of the error, NaN where some co-ordinate is undetermined."""
+        """Length (m,) of the error, NaN if a co-ordinate is undetermined."""
         return np.asarray(np.linalg.norm(self.errors, axis=1))
 
 
@@ -53,8 +53,8 @@ class FittedLengths:
 
 @dataclass(frozen=True, eq=False)
 class ErrorRows:
-    """Derivatives (..., b) of functions by all that a map holds; `drawn`, those on a machine
-    without errors, tell what is undetermined, None where nothing is.
+    """Derivatives (..., b) of functions by the contents of a map; `drawn`, those on a machine
+    without errors, determine undetermined results, None without any.
     """
 
     rows: Array
@@ -78,7 +78,7 @@ def rows_of_errors(fitted: FittedMap, points: Array, probes: Probed) -> ErrorRow
 
 
 def errors_of(fitted: FittedMap, points: Array, probes: Probed) -> Array:
-    """Estimated errors (m, d) at points (m, d), also of what is undetermined."""
+    """Return estimated errors (m, d) at points (m, d), undetermined ones included."""
     offsets = fitted.probes.offsets[probe_indices(fitted, len(points), probes)]
     return np.asarray(fitted.model.error(points, fitted.values, offsets) - offsets)
 
@@ -97,8 +97,8 @@ def fitted_errors(fitted: FittedMap, points: Array, probes: Probed) -> FittedErr
 
 @single_threaded
 def fitted_lengths(fitted: FittedMap, places: MapPlaces, probe: int) -> FittedLengths:
-    """Errors of the lengths of places, both ends with the probe of an index unless they have their
-    own. Lengths are those between the tips; where these are by the scales, offsets are as stated.
+    """Return errors of lengths between tips, with stated offsets where the scales place them; both
+    ends use one probe unless they have their own.
     """
     first, last = (tips(fitted, *end) for end in length_ends(places, probe))
     corrected_ends = [corrected(fitted, *end)[0] for end in length_ends(places, probe)]
@@ -141,8 +141,8 @@ def _part(probes: Probed, some: slice) -> Probed:
 def drawn_errors(
     fitted: FittedMap, places: MapPlaces, draws: Draws, probes: Probed, probe: int
 ) -> Realisations:
-    """Errors at points and of lengths of machines that the readings may come from: what the
-    covariance leaves open is drawn, once for all points of a machine.
+    """Return errors at points and of lengths of machines drawn from the covariance, one draw for
+    all points of a machine.
     """
     draws.ensure_possible(places.points)
     (normal,) = draws.normal((len(fitted.scale),))

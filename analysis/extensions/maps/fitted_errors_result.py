@@ -55,7 +55,7 @@ if TYPE_CHECKING:
 
 
 def map_cautions(fitted: FittedMap) -> tuple[str, ...]:
-    """What is to be known of all uncertainties of a map."""
+    """Return cautions on all uncertainties of a map."""
     cautions = [fitted.known_lack_of_fit.caution]
     if fitted.sigma_is_estimated:
         remedy = "with few, take a larger coverage factor"
@@ -71,13 +71,12 @@ def map_cautions(fitted: FittedMap) -> tuple[str, ...]:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class FittedErrorMap(Result):
-    """Errors of a fitted machine at points: `errors`, and those of `lengths`: the body diagonals
-    or, along a line, the line's, and measuring tasks that were asked for.
+    """Errors of a fitted machine at points, and of `lengths`: body diagonals or the line's, and
+    measuring tasks.
 
-    `places` say where, `probes` (m,) are the indices of the points' probes, and `probe` that of the
-    lengths'. `realisations` are drawn where they
-    were asked for, and `with_budget` says whether the contributions of the parametric errors are
-    shown.
+    `places` are the locations, `probes` (m,) the indices of the points' probes, `probe` that of
+    lengths. `realisations` are optional draws; `with_budget` adds the contributions of parametric
+    errors.
     """
 
     label: str
@@ -108,9 +107,7 @@ class FittedErrorMap(Result):
 
     @cached_property
     def budget(self) -> tuple[PartBudget, ...]:
-        """What each parametric error contributes: to the errors at the points, and to each of the
-        lengths.
-        """
+        """Contributions of parametric errors to the errors at points and to each length."""
         return fitted_budget(self.fitted, self.places, self.probes, self.probe)
 
     def lines(self) -> list[str]:
@@ -170,7 +167,7 @@ class FittedErrorMap(Result):
         return columns, ()
 
     def _of_table(self) -> dict[str, list[str]]:
-        """What a table of points says of each: its name and probe."""
+        """Return names and probes of tabulated points."""
         probes = self.fitted.probes.names
         of_points = [] if self.places.probes is None else [probes[k] for k in self.probes]
         return given(point=list(self.places.names_of_points), probe=of_points)
@@ -182,7 +179,7 @@ class FittedErrorMap(Result):
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """What is to be known beside the figures."""
+        """Cautions of the map, and extrapolated points."""
         volume, points = self.fitted.volume, self.errors.points
         slightly = 1e-9 * volume.size
         is_outside = ((points < volume.lower - slightly) | (points > volume.upper + slightly)).any(
@@ -195,10 +192,10 @@ class FittedErrorMap(Result):
         return (*map_cautions(self.fitted), f"{words}, where errors are extrapolated")
 
     def plot(self, path: str | Path | None = None, magnification: float | None = None) -> Figure:
-        """The errors as a picture: magnified at points, with the bands of their expanded
-        uncertainty along a line. `magnification` is of a grid in three dimensions.
+        """Draw magnified errors at points or, along a line, errors with bands of expanded
+        uncertainty; `magnification` is for a grid in three dimensions.
 
-        With a path, which ends in .svg, .png or .pdf, the picture is written as well.
+        A path in .svg, .png or .pdf saves the plot.
 
         :raises ImportError: matplotlib is missing.
         :raises ValueError: the path ends in something else, or nothing is determined.
@@ -241,8 +238,8 @@ def fitted_map_errors(
     with_budget: bool = False,
     tasks: Tasks | None = None,
 ) -> FittedErrorMap:
-    """Errors of a fitted machine at the places asked for, with a probe by its name, by default that
-    of the map; the lengths of `tasks` come after the diagonals, or that of a line.
+    """Return errors of a fitted machine at places, with a named probe (default: that of the map);
+    lengths of `tasks` follow the diagonals or that of a line.
 
     :raises ValueError: what does not go together, is not in the volume, or no probe of the map.
     """

@@ -19,7 +19,7 @@ UNDETERMINED = "undetermined"
 
 
 def head_lines(label: str, fitted: FittedMap, probe: int | None = None) -> list[str]:
-    """What the map is, and what its figures state."""
+    """Return the title of a map and the conventions of its values."""
     lines = [f"{label}: {fitted.title}", CONVENTION]
     if probe is not None:
         name, offset = fitted.probes.names[probe], 1e3 * fitted.probes.offsets[probe]
@@ -102,7 +102,9 @@ def _largest(errors: FittedErrors, factor: float) -> list[str]:
 
 
 def realisation_lines(realisations: Realisations, names: Sequence[str]) -> list[str]:
-    """What each realisation has at most, and its length errors; all points are in CSV and JSON."""
+    """Return the largest error and the length errors of each realisation; CSV and JSON have all
+    points.
+    """
     largest = np.linalg.norm(realisations.errors, axis=2).max(axis=1)
     columns = [
         ("realisation", range(1, len(largest) + 1)),
@@ -125,8 +127,8 @@ def point_csv(
     realisations: Realisations | None,
     names: Sequence[str] = (),
 ) -> Iterator[str]:
-    """Errors as lines of a CSV file; with realisations, a column tells which one, 0 the estimate,
-    and only that has uncertainties.
+    """Yield errors as lines of a CSV file; with realisations a column numbers them, 0 for the
+    estimate, which alone has uncertainties.
     """
     letters = "xyz"[: errors.points.shape[1]]
     heads = [f"{letter}_mm" for letter in letters]

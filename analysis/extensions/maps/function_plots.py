@@ -44,10 +44,10 @@ DRAWN = ("low", "high")
 def draw_functions(
     functions: ErrorFunctions, title: str, k: float, path: str | Path | None = None
 ) -> Figure:
-    """A panel for each function and axis, all of a unit to the same scale, squareness errors below.
+    """Draw one panel per function and axis, with one scale per unit, squareness errors below.
 
     :raises ImportError: matplotlib is missing.
-    :raises ValueError: the name ends in none of the kinds of pictures.
+    :raises ValueError: the file name has no known picture format.
     :raises OSError: the file cannot be written.
     """
     panels = _panels(functions.curves)
@@ -94,8 +94,8 @@ Place = tuple[int, int]
 
 
 def _panels(curves: Sequence[FunctionCurve]) -> dict[Place, list[FunctionCurve]]:
-    """The curves of each panel, by row and column: errors of an axis in a column, displacements
-    above rotations; functions of the place in a row each.
+    """Return the curves of each panel, by row and column: a column per axis, displacements above
+    rotations, then a row per function of location.
     """
     other_names = list(
         dict.fromkeys(curve.name for curve in curves if curve.name not in AXIS_ERRORS)
@@ -115,7 +115,6 @@ def _panels(curves: Sequence[FunctionCurve]) -> dict[Place, list[FunctionCurve]]
 
 
 def _is_drawn(curve: FunctionCurve) -> bool:
-    """Whether a line of several is one of those that are drawn."""
     if not curve.line:
         return True
     _, _, levels_text = curve.line.partition(" at ")
@@ -124,7 +123,7 @@ def _is_drawn(curve: FunctionCurve) -> bool:
 
 
 def _limits(curves: Sequence[FunctionCurve], k: float) -> dict[str, float]:
-    """Largest values with their bands by unit, in millionths; 1 where nothing is known."""
+    """Return the largest values with their bands by unit, in millionths; 1 if undetermined."""
     limits: dict[str, float] = {}
     for curve in curves:
         ends = np.abs(curve.values) + k * curve.uncertainties
@@ -168,7 +167,6 @@ def _draw_panel(axes: Axes, curves: Sequence[FunctionCurve], k: float, limit: fl
 
 
 def _angle(squareness: EstimatedNumber, k: float) -> str:
-    """A squareness error in words."""
     if np.isnan(squareness.standard_uncertainty):
         return f"{squareness.name} {squareness.meaning}: undetermined"
     value = to_uncertainty(1e6 * squareness.value, 1e6 * squareness.standard_uncertainty)

@@ -46,8 +46,8 @@ if TYPE_CHECKING:
 
 
 def convert(fitted: Fit | FittedMap | PathLike, to: str) -> ConvertedMap:
-    """The map of a fit in another error model: a kind such as "empirical", settings such as "{kind:
-    kinematic, position_coefficients: 3}", or the path of an experiment file whose model is taken.
+    """Return the map of a fit in another error model: a kind such as "empirical", settings such as
+    "{kind: kinematic, position_coefficients: 3}", or the path of an experiment file with the model.
 
     Its `map` is the new one, with its covariance.
 
@@ -76,15 +76,14 @@ def diff(
     stated: str | None = None,
     dates: tuple[str | None, str | None] = (None, None),
 ) -> MapDifference:
-    """What the second of two maps says less what the first does: lengths, errors at points after
-    the free motion of the frame is taken out, error functions, and balls of plates of two fits.
+    """Return the second of two maps less the first: lengths, errors at points without the free
+    motion of the frame, error functions, and balls of plates of two fits.
 
-    Each is a fit, what `to_map()` of one gives, or the path of a map file, of a machine file (an
-    expected map, with the expanded uncertainty `stated` of lengths, such as "0.5 um + L/1000000"),
-    or of an experiment file that names its readings. `points` (n, d) are in metres, or a CSV file
-    with x_mm, y_mm and z_mm; without any a `grid` of so many along each axis is taken. With
-    `shared` both fits rest on the same certificate, whose errors cancel. `dates` are days of the
-    campaigns, such as "2026-11-22".
+    Each is a fit, its `to_map()`, or the path of a map file, of a machine file (an expected map,
+    with the expanded uncertainty `stated` of lengths, such as "0.5 um + L/1000000"), or of an
+    experiment file that names its readings. `points` (n, d) are in metres, or a CSV file with x_mm,
+    y_mm and z_mm; default: `grid` points along each axis. With `shared` both fits rest on the same
+    certificate, whose errors cancel. `dates` are days of the campaigns, such as "2026-11-22".
 
     :raises ValueError: the maps do not go together, or share no certificate.
 
@@ -131,11 +130,12 @@ def lengths(
     with_repeatability: bool = False,
     report: Report = unreported,
 ) -> LengthMap:
-    """Uncertainties of all lengths between points of a grid over the volume, against a target.
+    """Return uncertainties of all lengths between points of a grid over the volume, against a
+    target.
 
-    `target` replaces that of the experiment, as a text with a unit; `grid` has the number of points
-    along every axis, or along each. With `with_repeatability` the scatter of the two readings of a
-    length counts, too.
+    `target` replaces that of the experiment, as a text with a unit; `grid` is the number of points
+    along every axis, or along each. `with_repeatability` includes the repeatability of both
+    readings of a length.
 
     >>> import ballplate as bp
     >>> bp.lengths(bp.quickstart(), "1 um + L/1000000", grid=3).is_met
@@ -169,17 +169,16 @@ def map(
     budget: bool = False,
     tasks: Experiment | PathLike | None = None,
 ) -> MachineErrors | FittedErrorMap | ErrorCurves:
-    """Volumetric errors of a machine file, or of the map that a fit left behind, with expanded
-    uncertainties: on a grid over the volume, in a plane, along a line of so many points, at given
-    points, or one parametric error along its axis.
+    """Return volumetric errors of a machine file or of a map, with expanded uncertainties: on a
+    grid over the volume, in a plane, along a line, at points, or one parametric error along its
+    axis.
 
-    `line` is a text as in `ballplate map --line`, the places in metres of the two fixed
-    axes, or two points; `plane` the place of the axis across it. `points` is their number along a
-    line; or a table of points, as for the command; or their co-ordinates (m, d) in metres. Of a map
-    `probe` is the name of the probe, and the lengths of the measuring `tasks` of an experiment are
-    told, too. With `draw`, so many realisations of the random part, or of
-    what the covariance of a map leaves open, are drawn from a `seed`. With `budget` the result
-    shows what each parametric error contributes, which its `budget` has in any case.
+    `line` is a text as in `ballplate map --line`, co-ordinates in metres of the two fixed axes, or
+    two points; `plane` the co-ordinate of the axis across it. `points` is their number along a
+    line, a table as for the command, or co-ordinates (m, d) in metres. For a map, `probe` names the
+    probe, and `tasks` of an experiment add lengths. `draw` is the number of realisations of the
+    random part, or of the covariance of a map, from a `seed`. `budget` prints the contributions of
+    parametric errors, always present in the `budget` of the result.
 
     >>> import ballplate as bp
     >>> bp.map("designs/park/machines/npl-like.yaml", line="y = 300 mm, z = 200 mm", points=3)
@@ -237,10 +236,10 @@ def map(
 def curves(
     fitted: Fit | FittedMap | PathLike, errors: str | Iterable[str] = (), points: int = 41
 ) -> ErrorCurves:
-    """The error functions of a map at so many positions along each line, or some of them, with
-    their expanded uncertainties; squareness errors as angles, and other numbers of its model.
+    """Return the error functions of a map, or some of them, at a number of positions along each
+    line, with expanded uncertainties; squareness errors as angles; other numbers of the model.
 
-    `fitted` is a fit, what its `to_map()` gives, or the path of a map file.
+    `fitted` is a fit, its `to_map()`, or the path of a map file.
 
     >>> import ballplate as bp
     >>> bp.curves(bp.fit(bp.quickstart(), bp.simulate(bp.quickstart())).to_map())
@@ -263,12 +262,12 @@ def adjust(
     after: Fit | FittedMap | PathLike | None = None,
     share: float = 0.0,
 ) -> AdjustedMachine:
-    """What adjustments leave of a fitted machine's errors, and what a campaign `after` them says;
-    both are fits, maps, or files of maps.
+    """Return the errors left by adjustments of a fitted machine, compared with a campaign `after`
+    them; both are fits, maps, or files of maps.
 
     Changes are texts as those of `ballplate adjust`: `scale` such as "x=22 um/m", and `turn` such
-    as "y-x=12 arcsec" or "y-x=0.25 turns of 1 mm at 400 mm". The standard uncertainty of each is
-    the `share` of it.
+    as "y-x=12 arcsec" or "y-x=0.25 turns of 1 mm at 400 mm". `share` is the relative standard
+    uncertainty of each.
 
     :raises ValueError: a text that is no change, or a change that the error model cannot follow.
 
@@ -298,13 +297,13 @@ def correct(
     coverage_factor: float | None = None,
     with_repeatability: bool = False,
 ) -> Correction:
-    """Points corrected by a fit, its map, or the file of that, with their uncertainty.
+    """Return points corrected by a fit, its map, or the file of a map, with their uncertainty.
 
-    `points` are an array (n, d) in metres, or a table as `ballplate correct` reads it, with a
-    `probe` for those that name none; without any it is that of the map. They are `coordinates`
-    of the scales, or of centres of balls, which have the stated offset of the probe added.
-    `lengths` are pairs of names or of indices. The coverage factor is that of the map, or the one
-    given; `with_repeatability` the scatter of the readings that are corrected counts, too.
+    `points` are an array (n, d) in metres, or a table as for `ballplate correct`, with a default
+    `probe`, itself by default that of the map. `coordinates` are those of the scales, or of centres
+    of balls, which include the stated offset of the probe. `lengths` are pairs of names or of
+    indices. The coverage factor is by default that of the map; `with_repeatability` includes the
+    repeatability of the corrected readings.
 
     >>> import ballplate as bp
     >>> fitted = bp.fit(bp.quickstart(), bp.simulate(bp.quickstart()))

@@ -1,6 +1,7 @@
-"""Largest differences of the corrections of two maps of a machine, searched in the whole volume.
+"""Largest differences of the corrections of two maps, searched in the whole volume.
 
-A search from a grid, with corners and edges, and from there uphill: no bound, but what no grid has.
+The search climbs from the best points of a grid with corners and edges: no bound, but beyond any
+grid.
 """
 
 from __future__ import annotations
@@ -28,8 +29,8 @@ Differences = Callable[[Array, Array], Array]
 
 @dataclass(frozen=True)
 class LargestDifference:
-    """The largest difference that was found and the root mean square of those at random, both in
-    metres, and of how many `places` the search began.
+    """The largest difference in the search and the root mean square at random locations, both in
+    metres, with the number `places` of starting points.
     """
 
     largest: float

@@ -1,4 +1,4 @@
-"""Lengths throughout the volume in groups: by place, by length and by direction."""
+"""Groups of lengths throughout the volume: by location, length and direction."""
 
 from __future__ import annotations
 
@@ -12,11 +12,10 @@ from ballplate.simulator.machines import Array, Integers
 
 @dataclass(frozen=True)
 class LengthMapSettings:
-    """What lengths are looked at: `grid` points along each axis, with a probe, and how they are
-    compared.
+    """Settings of a length map: `grid` points along each axis, the probe and the comparison.
 
-    `with_repeatability`: whether the scatter of the two readings along the length adds to its
-    uncertainty. The `target` is meant for `target_factor` times the standard uncertainty.
+    `with_repeatability` adds the repeatability of both readings along the length. The `target`
+    applies to `target_factor` times the standard uncertainty.
     """
 
     grid: tuple[int, ...]
@@ -29,13 +28,13 @@ class LengthMapSettings:
 
 @dataclass(frozen=True, eq=False)
 class LengthGroups:
-    """Lengths in g groups; all arrays (g,), uncertainties in metres, NaN where no length is
-    determined.
+    """Lengths in g groups; all arrays (g,), uncertainties in metres, NaN without a determined
+    length.
 
-    `count` of them there are, `undetermined` of these are open; `average` and `maximum` are
-    standard uncertainties, `average_ratio` and `maximum_ratio` those to the target; `within` and
-    `within_expanded` count the lengths whose standard and expanded uncertainties are no larger than
-    the target, `within_target` those with the uncertainty that the target is meant for.
+    `count` and `undetermined` are numbers of lengths; `average` and `maximum` are standard
+    uncertainties, `average_ratio` and `maximum_ratio` their ratios to the target; `within` and
+    `within_expanded` count lengths with standard and expanded uncertainties up to the target,
+    `within_target` those by the uncertainty of the target.
     """
 
     count: Integers
@@ -85,12 +84,12 @@ class GroupedLengths:
 
     @property
     def is_met(self) -> bool:
-        """Whether all lengths are within the target, by the uncertainty that it is meant for."""
+        """True if all lengths are within the target, by the uncertainty of the target."""
         return bool(self.whole.within_target[0] == self.whole.count[0])
 
 
 def target_words(target: LengthFunction) -> str:
-    """The target in words.
+    """Return the target as text.
 
     >>> target_words(LengthFunction(5e-7, 1e-6))
     '0.5 µm + L/1000000'

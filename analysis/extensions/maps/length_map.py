@@ -1,4 +1,4 @@
-"""Lengths throughout the volume against a target: by place, by length and by direction."""
+"""Lengths throughout the volume against a target: by location, length and direction."""
 
 from __future__ import annotations
 
@@ -46,8 +46,8 @@ def length_settings(
     coverage_factor: float | None = None,
     with_repeatability: bool = False,
 ) -> LengthMapSettings:
-    """What is asked for, and where it is not what the file says; `grid` has one number of points,
-    or one for each axis.
+    """Return settings with defaults of the experiment; `grid` has one number of points, or one per
+    axis.
 
     :raises ValueError: a target, grid, probe or coverage factor that the experiment cannot have.
     """
@@ -88,9 +88,10 @@ def length_settings(
 def length_map(
     experiment: Experiment, settings: LengthMapSettings, report: Report = unreported
 ) -> LengthMap:
-    """Uncertainties of all lengths between points of a grid over the volume, at zero machine error.
+    """Return uncertainties of all lengths between points of a grid over the volume, at zero machine
+    error.
 
-    `report` is told the number of lengths done.
+    `report` gets the number of finished lengths.
     """
     design = lay_out(experiment)
     points = grid_points(design, settings.grid)
@@ -154,7 +155,7 @@ def length_pairs(
 
 
 def pair_csv(experiment: Experiment, settings: LengthMapSettings) -> Iterator[str]:
-    """A line for each length; what is undetermined is left empty."""
+    """Yield one row per length; undetermined cells are empty."""
     points, tiles = length_pairs(experiment, settings)
     axes = AXIS_NAMES[: points.shape[1]]
     heads = [

@@ -104,8 +104,8 @@ def draw_lengths(lengths: GroupedLengths, path: str | Path | None = None) -> Fig
 
 
 def marks(ratios: Array) -> tuple[NDArray[np.bool_], str]:
-    """Which points are marked, by their ratios to the target, and what the marks mean: the fewer of
-    both kinds are.
+    """Return the marked points by their ratios to the target, the smaller of both sets, and the
+    meaning of marks.
 
     >>> marks(np.array([0.5, 0.6, 1.2]))
     (array([False, False,  True]), 'crosses: above 1')
@@ -137,7 +137,7 @@ def _slice(  # type: ignore[no-untyped-def]
     marked: NDArray[np.bool_],
     limits: tuple[float, float],
 ):
-    """Ratios (x, y) as colours, crosses where `marked`, dashes where nothing is determined."""
+    """Draw ratios (x, y) as colours, crosses where `marked`, dashes where undetermined."""
     sides = [_centres(lengths, axis) for axis in (0, 1)]
     image = axes.pcolormesh(
         *(_borders(side) for side in sides),
@@ -172,7 +172,6 @@ def _millimetres(lengths: GroupedLengths, axis: int, level: int) -> str:
 
 
 def _borders(centres: Array) -> Array:
-    """Borders of cells about evenly spaced centres."""
     half = 0.5 * (centres[1] - centres[0])
     return np.append(centres - half, centres[-1] + half)
 

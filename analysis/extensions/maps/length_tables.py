@@ -43,7 +43,7 @@ class LengthMap(GroupedLengths, Result):
 
     @property
     def as_expected(self) -> bool:
-        """Whether the rank is the one that the file expects."""
+        """True if the rank equals that of the file."""
         return self.deficiency == (self.expected or 0)
 
     def headline(self) -> str:
@@ -113,7 +113,7 @@ class LengthMap(GroupedLengths, Result):
         ]
 
     def data(self) -> dict[str, Any]:
-        """The same as plain data in metres; what is undetermined is None."""
+        """Plain data in metres; None where undetermined."""
         settings, edges = self.settings, self.edges.tolist()
         classes = [{"from": low, "to": high} for low, high in zip(edges, edges[1:], strict=False)]
         directions = [{"direction": name} for name in self.directions]
@@ -233,7 +233,7 @@ def _table(
 
 
 def point_csv(lengths: LengthMap) -> Iterator[str]:
-    """A line for each point of the grid: of the lengths that start or end there."""
+    """Yield one row per point of the grid: the lengths that start or end there."""
     axes = AXES[: lengths.design.dimension]
     groups = lengths.by_point
     return csv_lines(

@@ -92,7 +92,7 @@ def _grid(text: str) -> tuple[int, ...]:
 
 
 def run(options: Namespace) -> int:
-    """Print the tables, and write and draw what was asked for; 1 if the rank is not as expected."""
+    """Print the tables, write and draw the files; return 1 if the rank is unexpected."""
     from ballplate.cli import progress
 
     from .length_map import length_map, length_settings, pair_csv

@@ -1,4 +1,4 @@
-"""Changes that are made to a machine, as they are stated: scales, and turns of guideways."""
+"""Changes of a machine as text: scales, and turns of guideways."""
 
 from __future__ import annotations
 
@@ -24,9 +24,8 @@ TURNS = re.compile(r"([+-]?[0-9.]+) turns? of (.+?) at (.+)")
 
 @dataclass(frozen=True)
 class MachineChange:
-    """A change that was made to a machine: the scale of an axis (0 to 2) that reads more by
-    `amount`, as a ratio, or the guideway of an axis that was turned by `amount` (rad) towards the
-    positive direction `towards`; that is None of a scale.
+    """A change of a machine: the scale of an axis (0 to 2) reads more by the ratio `amount`, or its
+    guideway turns by `amount` (rad) towards the positive direction `towards`, None for a scale.
     """
 
     axis: int
@@ -35,7 +34,7 @@ class MachineChange:
 
     @property
     def words(self) -> str:
-        """What was done.
+        """The change as text.
 
         >>> MachineChange(0, -2e-5).words
         'X made to read 20.00 µm per m less'
@@ -52,7 +51,7 @@ class MachineChange:
 
 
 def scale_change(text: str) -> MachineChange:
-    """Read a change of a scale.
+    """Return a change of a scale.
 
     :raises ValueError: it is none, or is too large for one.
 
@@ -69,8 +68,8 @@ def scale_change(text: str) -> MachineChange:
 
 
 def guideway_turn(text: str) -> MachineChange:
-    """Read a turn of a guideway, as an angle or as turns of a screw of some pitch at the end of an
-    arm.
+    """Return a turn of a guideway, from an angle or from turns of a screw with a pitch at the end
+    of an arm.
 
     :raises ValueError: it is none, or is too large for one.
 

@@ -155,7 +155,7 @@ def _plane(text: str) -> dict[str, float]:
 
 
 def run(options: Namespace) -> int:
-    """Print, and draw, what was asked for."""
+    """Print, and draw, the errors."""
     from ballplate.simulator.experiment import load
 
     from .fitted_errors_result import FittedErrorMap

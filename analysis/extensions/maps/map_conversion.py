@@ -23,11 +23,11 @@ OWN_MOTION, NOTHING = 1e-9, 1e-12
 
 @dataclass(frozen=True, eq=False)
 class MapConversion:
-    """A map in another error model, the nearest to it by least squares.
+    """The nearest map in another error model by least squares.
 
-    It was fitted at `places` (n, d), scale readings with probe offsets (n, d). Between the frames
-    of the two models lies a rigid `motion` (d shifts and turns), which changes no length. `tips`
-    (k, d) are the offsets of the map's probes and one along each axis.
+    The fit uses `places` (n, d), scale readings with probe offsets (n, d). Between the frames of
+    the two models lies a rigid `motion` (d shifts and turns), which changes no length. `tips` (k,
+    d) are the offsets of the map's probes and one along each axis.
     """
 
     old: FittedMap
@@ -38,8 +38,8 @@ class MapConversion:
     tips: Array
 
     def differences(self, x: Array, p: Array) -> Array:
-        """What corrections (n, d) of the new map exceed those of the old one by at scale readings
-        (n, d) with probe offsets (n, d), in metres, after the motion.
+        """Return corrections (n, d) of the new map less those of the old one at scale readings (n,
+        d) with probe offsets (n, d), in metres, after the motion.
         """
         old, new = self.old, self.converted
         arm = x + p - (self.places + self.offsets).mean(axis=0)
@@ -54,12 +54,12 @@ class MapConversion:
 def converted(
     fitted: FittedMap, model: ErrorModel, settings: Mapping[str, Any], frame: str
 ) -> MapConversion:
-    """The map in an error `model` of the same volume, whose `settings` are those of a file.
+    """Return the map in an error `model` of the same volume, with `settings` as in a file.
 
-    Corrections are compared at random places throughout the volume and at its corners, with the
-    probes of the map and with tips along each axis. To first order parameters of the new model are
-    linear in those of the old one, and so the covariance and the undetermined directions follow;
-    what the new model cannot do is no part of them.
+    The fit compares corrections at random locations throughout the volume and at its corners, with
+    the probes of the map and with tips along each axis. To first order new parameters are linear in
+    the old ones; the covariance and the undetermined directions follow. The residuals of the new
+    model are excluded.
     """
     x, p, tips = _places(fitted, model)
     zero, d = np.zeros(len(model.parameters)), fitted.dimension
@@ -104,8 +104,8 @@ def converted(
 
 
 def _places(fitted: FittedMap, model: ErrorModel) -> tuple[Array, Array, Array]:
-    """Scale readings (n, d) and probe offsets (n, d) at which corrections are fitted, and the
-    different ones (k, d) of these offsets.
+    """Return scale readings (n, d) and probe offsets (n, d) of the fit, and the distinct offsets
+    (k, d).
     """
     volume, d = fitted.volume, fitted.dimension
     generator = np.random.default_rng(np.random.SeedSequence(1))

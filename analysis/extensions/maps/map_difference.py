@@ -1,4 +1,4 @@
-"""The difference of two maps as a result: which figures changed, and whether anything did."""
+"""Difference of two maps as a result: changes, and the verdict of the joint tests."""
 
 from __future__ import annotations
 
@@ -50,10 +50,10 @@ SOME_READINGS = (
 
 @dataclass(frozen=True, repr=False, eq=False)
 class MapDifference(Result):
-    """What the map `second` says less what `first` does, for the same scale readings.
+    """Map `second` less `first`, for the same scale readings.
 
-    `comparison` has the figures. `shared` counts the values of certificates that both campaigns
-    rest on, whose errors cancel; None where the campaigns are taken to be independent.
+    `comparison` has the values. `shared` counts certified values common to both campaigns, whose
+    errors cancel; None for independent campaigns.
     """
 
     first: ComparedMap
@@ -73,9 +73,7 @@ class MapDifference(Result):
 
     @property
     def years(self) -> float | None:
-        """Time from the first campaign to the second; None where a date is unknown, or both are the
-        same.
-        """
+        """Time between the campaigns; None if a date is unknown, or both are equal."""
         if self.first.date is None or self.second.date is None:
             return None
         days = date.fromisoformat(self.second.date) - date.fromisoformat(self.first.date)
@@ -83,13 +81,13 @@ class MapDifference(Result):
 
     @cached_property
     def in_common(self) -> InCommon:
-        """What both maps have of each other's readings."""
+        """Overlap of the readings of both maps."""
         return in_common(self.first, self.second)
 
     @property
     def is_too_alike(self) -> bool:
-        """Whether two that were measured differ by less than independent ones do but by a rare
-        chance.
+        """True if two measured maps differ by less than independent ones, except with a small
+        probability.
         """
         test = self.comparison.test
         if test is None or len(self._measured()) < 2:
@@ -105,15 +103,14 @@ class MapDifference(Result):
 
     @property
     def is_changed(self) -> bool | None:
-        """Whether the joint test of the map shows a change; None where nothing can be tested, or
-        readings in common hide it.
-
-        What they have in common makes the sum of both covariances too large for the difference:
-        that of an estimate and its update has the covariance of the one less that of the other.
+        """True if the joint test of the map shows a change; None if untestable or hidden by common
+        readings.
         """
         test = self.comparison.test
         if test is None or self.in_common == "same":
             return None
+        # Common readings make the sum of both covariances too large: the difference of an
+        # estimate and its update has the covariance of one less that of the other.
         is_shown = test.p < LEVEL
         return is_shown if is_shown or self.in_common == "none" else None
 
@@ -229,7 +226,7 @@ class MapDifference(Result):
         return f"({side.label}: the conditions of its error model take out {motions})"
 
     def _shown_groups(self) -> tuple[FigureGroup, ...]:
-        """Groups of figures, those of all error functions as one."""
+        """Return the groups of values, with all error functions as one."""
         comparison = self.comparison
         lengths, plates = (
             comparison.lengths,
@@ -350,7 +347,7 @@ class MapDifference(Result):
         }
 
     def rows(self) -> list[dict[str, Any]]:
-        """One row for each figure that is compared, or undetermined."""
+        """Return one row per compared or undetermined value."""
         table = []
         for group in self.comparison.groups:
             normalised, is_compared = group.normalised, group.is_compared
@@ -374,10 +371,10 @@ class MapDifference(Result):
         return table
 
     def plot(self, path: str | Path | None = None) -> Figure:
-        """What changed: the difference at points of the volume as magnified vectors, and E_n of
-        lengths and error functions.
+        """Draw differences at points of the volume as magnified vectors, and E_n of lengths and
+        error functions.
 
-        With a path, which ends in .svg, .png or .pdf, the picture is written as well.
+        A path in .svg, .png or .pdf saves the plot.
 
         :raises ImportError: matplotlib is missing.
         :raises ValueError: the path ends in something else.
@@ -396,7 +393,7 @@ def _share(share: float) -> str:
 
 
 def _shown_places(group: FigureGroup) -> list[int]:
-    """Figures of a group that are told one by one."""
+    """Return indices of the lengths of a group that are printed singly."""
     if len(group.names) <= TOLD:
         return list(range(len(group.names)))
     sizes = comparable(np.nan_to_num(np.abs(group.normalised)))

@@ -24,7 +24,7 @@ OF_MAPS = re.compile(rb"^map\s*:", re.MULTILINE)
 
 
 def is_map_file(path: Path) -> bool:
-    """Whether a file is a map, by its name or by what it says.
+    """Identify a map file, by its name or contents.
 
     :raises ExperimentError: it cannot be read.
     """
@@ -32,7 +32,7 @@ def is_map_file(path: Path) -> bool:
 
 
 def map_of_source(source: Path | FittedMap) -> tuple[FittedMap, str]:
-    """A map as it is given, or of a file, with its label.
+    """Return a map, read from its file if needed, with its label.
 
     :raises ExperimentError: the file is wrong.
     """
@@ -48,8 +48,8 @@ def map_errors(
     with_budget: bool = False,
     tasks: Sequence[Experiment] = (),
 ) -> MachineErrors | FittedErrorMap | ErrorCurves:
-    """Errors of a machine file or of a map at the places asked for, and of the lengths of an
-    experiments with `tasks`, or one of its error functions.
+    """Return errors of a machine file or of a map at places, and of lengths of an experiment with
+    `tasks`, or one of its error functions.
 
     :raises ExperimentError: the file is wrong.
     :raises ValueError: what does not go together, or is not in the machine.

@@ -1,4 +1,4 @@
-"""Places at which errors of a machine are told: a grid, a plane, a line, or given points."""
+"""Locations for the errors of a machine: a grid, a plane, a line, or points."""
 
 from __future__ import annotations
 
@@ -29,9 +29,9 @@ Line = Mapping[str, float] | Sequence[Sequence[float]]
 
 @dataclass(frozen=True, eq=False)
 class PlacesAsked:
-    """Where errors are asked for: a `grid` of so many points along the axes; a `line` of so many
-    `points`; a `plane` by the place of the axis across it, with the grid's points along its axes;
-    points `at` (m, d), in metres or in a table. Without any, it is a grid.
+    """Requested locations: a `grid` with numbers of points along the axes; a `line` of `points`; a
+    `plane` by the co-ordinate of the axis across it, with the grid's points; points `at` (m, d), in
+    metres or in a table. Default: a grid.
     """
 
     grid: tuple[int, ...] | None = None
@@ -43,9 +43,11 @@ class PlacesAsked:
 
 @dataclass(frozen=True, eq=False)
 class MapPlaces:
-    """Points (m, d), with the number of them along the axes of a grid, and the `starts` and `ends`
-    (k, d) of lengths with `names`: the body diagonals, or the line's; metres. Points of a table may
-    have `names_of_points`, and `probes` (m,) by index; lengths may have `length_probes` (k, 2).
+    """Points (m, d), with numbers along the axes of a grid, and `starts` and `ends` (k, d) of
+    lengths with `names`: the body diagonals, or the line's; metres.
+
+    Points of a table may have `names_of_points`, and `probes` (m,) by index; lengths may have
+    `length_probes` (k, 2).
     """
 
     kind: PlaceKind
@@ -85,7 +87,7 @@ def _two(text: str) -> tuple[float, float]:
 
 
 def parse_plane(text: str) -> dict[str, float]:
-    """A plane by the place of the axis across it.
+    """Return a plane by the co-ordinate of the axis across it.
 
     :raises ValueError: written otherwise.
 
@@ -101,8 +103,8 @@ def parse_plane(text: str) -> dict[str, float]:
 def map_places(
     volume: Volume, asked: PlacesAsked, probes: tuple[str, ...] = ("",), probe: str = ""
 ) -> MapPlaces:
-    """The places that are asked for in a volume; a table of points may name one of the `probes` for
-    each, without that it is `probe`.
+    """Return the requested locations in a volume; a table of points may name one of the `probes`
+    for each, default `probe`.
 
     :raises ExperimentError: a table of points that is wrong.
     :raises ValueError: what does not go together, or is not in the volume.

@@ -17,9 +17,9 @@ LENGTHS_AT_ONCE = 2000
 
 @dataclass(frozen=True, eq=False)
 class MappedLengths:
-    """Lengths (m,) between corrected points and between the same as they were `read`, with
-    standard uncertainties, NaN where undetermined; `root` (m, r) is a square root of their joint
-    covariance. All in metres.
+    """Lengths (m,) between corrected points and between the same points as `read`, with standard
+    uncertainties, NaN where undetermined; `root` (m, r) is a square root of their joint covariance.
+    All in metres.
     """
 
     values: Array
@@ -32,10 +32,10 @@ class MappedLengths:
 def mapped_lengths(
     fitted: FittedMap, points: Array, probes: Integers, pairs: Integers, scatter: float = 0.0
 ) -> MappedLengths:
-    """Lengths between `pairs` (m, 2) of scale readings `points` (n, d) with `probes` (n,), in
-    metres.
+    """Return lengths between `pairs` (m, 2) of scale readings `points` (n, d) with `probes` (n,),
+    in metres.
 
-    Uncertainties have the scatter of both readings, so many times the stated repeatability.
+    Uncertainties include both readings' noise, `scatter` times the stated repeatability.
 
     :raises ValueError: both points of a pair are at the same place.
     """

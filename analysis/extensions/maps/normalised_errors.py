@@ -1,4 +1,4 @@
-"""Differences of figures with their uncertainties: normalised errors E_n, and joint tests."""
+"""Differences with their uncertainties: normalised errors E_n, and joint tests."""
 
 from __future__ import annotations
 
@@ -24,11 +24,10 @@ from .compared_maps import MappedValues
 
 @dataclass(frozen=True, eq=False)
 class FigureGroup:
-    """Figures (m,) of one kind, what the second map says less what the first does, with their
-    `names`.
+    """Differences (m,) of one kind, second map less first, with `names`.
 
-    `standard_uncertainties` (m,) are those of the differences, NaN where one is undetermined;
-    `chances` (m,) are those of |E_n| > 1 where nothing has changed. `unit` is m or rad.
+    `standard_uncertainties` (m,) are NaN where undetermined; `chances` (m,) are probabilities of
+    |E_n| > 1 without a change. `unit` is m or rad.
     """
 
     kind: str
@@ -41,7 +40,7 @@ class FigureGroup:
 
     @property
     def count(self) -> int:
-        """How many are compared: those that are determined, and not held by the frame."""
+        """Number of compared differences: determined, and not fixed by the frame."""
         return int(self.is_compared.sum())
 
     @property
@@ -56,23 +55,23 @@ class FigureGroup:
 
     @property
     def normalised(self) -> Array:
-        """E_n (m,): the difference over its expanded uncertainty; NaN where it is not compared."""
+        """E_n (m,): difference over expanded uncertainty; NaN if excluded from the comparison."""
         u = np.where(self.is_compared, self.standard_uncertainties, np.nan)
         return np.asarray(self.differences / (self.coverage_factor * u))
 
     @property
     def exceeding(self) -> int:
-        """How many have |E_n| > 1."""
+        """Number of |E_n| > 1."""
         return int((np.abs(self.normalised) > 1.0).sum())
 
     @property
     def by_chance(self) -> float:
-        """Share of |E_n| > 1 that is to be expected where nothing has changed."""
+        """Expected share of |E_n| > 1 without a change."""
         return float(self.chances[self.is_compared].mean()) if self.count else 0.0
 
     @property
     def largest(self) -> int | None:
-        """Place of the largest |E_n|; None where nothing is compared."""
+        """Index of the largest |E_n|; None without a comparison."""
         if not self.count:
             return None
         return int(comparable(np.nan_to_num(np.abs(self.normalised))).argmax())
@@ -80,7 +79,7 @@ class FigureGroup:
 
 @dataclass(frozen=True)
 class JointTest(JointDifference):
-    """One test of many figures together, with what they are."""
+    """Joint test of a group of differences, with its subject."""
 
     what: str = ""
 
@@ -95,11 +94,11 @@ class ValueDifference:
 
     @property
     def values(self) -> Array:
-        """What the second says less what the first does."""
+        """Second map less first (m,)."""
         return self.second.values - self.first.values
 
     def by(self, matrix: Array) -> ValueDifference:
-        """Linear functions of these, by a matrix (k, m)."""
+        """Return linear functions by a matrix (k, m)."""
         return ValueDifference(self.first.by(matrix), self.second.by(matrix), self.scatters)
 
     def without(self, basis: Array) -> ValueDifference:
@@ -108,7 +107,7 @@ class ValueDifference:
 
     @property
     def is_open(self) -> NDArray[np.bool_]:
-        """Which (m,) either map leaves undetermined."""
+        """Flags (m,) of undetermined functions of either map."""
         values = np.zeros(len(self.values))
         for mapped in (self.first, self.second):
             values = values + blank(np.zeros(len(values)), mapped.null, mapped.size)
@@ -128,7 +127,7 @@ class ValueDifference:
         return first, second
 
     def standard_uncertainties(self) -> Array:
-        """Of the differences (m,); NaN where one is undetermined."""
+        """Return those of the differences (m,); NaN where undetermined."""
         return np.where(self.is_open, np.nan, np.sqrt(sum(self.variances())))
 
     def group(
@@ -139,9 +138,7 @@ class ValueDifference:
         coverage_factor: float,
         stated: tuple[Array | float, Array | float] = (0.0, 0.0),
     ) -> FigureGroup:
-        """The differences as figures of one kind; `stated` variances (m,) of either side are
-        added.
-        """
+        """Return the differences as one group, plus `stated` variances (m,) of either side."""
         first, second = (
             variance + more for variance, more in zip(self.variances(), stated, strict=True)
         )
@@ -153,9 +150,7 @@ class ValueDifference:
 
     @single_threaded
     def joint_test(self, what: str) -> JointTest | None:
-        """The test of all of them together, in the space of what has an uncertainty less what is
-        undetermined; None where nothing is left of it.
-        """
+        """Return the joint test in the uncertain space less the undetermined one; None if empty."""
         sides = self.first, self.second
         difference = self.by(
             orthonormal(np.hstack([m for side in sides for m in (side.root, side.shared)])).T

@@ -1,9 +1,9 @@
-"""What each parametric error contributes to the errors of a machine and to their uncertainties.
+"""Contributions of parametric errors to the errors of a machine and to their uncertainties.
 
-The error of a point, and of a length to first order, is a sum over the parametric errors. Of a mean
-square the share of a part is its mean product with the whole, of a variance its covariance with the
-whole: such shares add to one. Estimates are correlated, so that a share may be negative, and a part
-alone less certain than the whole.
+The error of a point, and of a length to first order, is a sum over the parametric errors. The share
+of a part in a mean square is its mean product with the whole, in a variance its covariance with the
+whole: such shares add to one. Estimates are correlated: a share may be negative, and a part alone
+less certain than the whole.
 """
 
 from __future__ import annotations
@@ -27,13 +27,13 @@ PROBING = "probing", "what probing adds to each co-ordinate"
 
 @dataclass(frozen=True, eq=False)
 class PartBudget:
-    """Contributions of `parts` (k), names and meanings, to one figure; in metres.
+    """Contributions of `parts` (k), names and meanings, to one error; in metres.
 
-    Of a length `errors` (k,) add to its error `total`. Of the errors at points, whose root mean
-    square `total` is, they are those of the parts alone. `shares` (k,) of the total, or of its
-    square, add to one. `uncertainties` (k,) are standard ones of the parts alone, and `uncertainty`
-    that of the whole, of points the root of the mean sum of squares; `variance_shares` (k,) add to
-    one. All are NaN where undetermined.
+    For a length, `errors` (k,) add to its error `total`. For errors at points, with root mean
+    square `total`, they are those of the parts alone. `shares` (k,) of the total, or of its square,
+    add to one. `uncertainties` (k,) are standard ones of the parts alone, `uncertainty` that of the
+    whole, for points the root of the mean sum of squares; `variance_shares` (k,) add to one. All
+    are NaN where undetermined.
     """
 
     figure: str
@@ -56,8 +56,8 @@ class _Split:
     masks: Array
 
     def errors(self, points: Array, offset: Array) -> Array:
-        """Errors (k + 1, m, d) of each part alone, and of what is left of the whole, with offsets
-        of probes (m, d), or the same (d,) everywhere.
+        """Return errors (k + 1, m, d) of each part alone, and the remainder of the whole, with
+        offsets of probes (m, d), or one (d,).
         """
         probe = np.broadcast_to(offset, points.shape)
         by_part = [self.model.error(points, self.a * mask, probe) - probe for mask in self.masks]
@@ -67,8 +67,8 @@ class _Split:
 
 @dataclass(frozen=True, eq=False)
 class _End:
-    """An end of lengths: scale readings `points` (k, d), offsets of probes (k, d), and these as
-    they are stated.
+    """An end of lengths: scale readings `points` (k, d), offsets of probes (k, d), and stated
+    offsets.
     """
 
     points: Array
@@ -84,8 +84,8 @@ class _End:
 def _figures(
     split: _Split, places: MapPlaces, of_points: Array, ends: tuple[_End, _End], offset: int = -1
 ) -> Iterator[tuple[str, bool, Array, Array, float]]:
-    """Figures without uncertainties: the errors at points, with offsets of probes (m, d) or (d,),
-    then those of lengths, to which the part of the index `offset` contributes estimated offsets.
+    """Yield budgets without uncertainties: errors at points, with offsets of probes (m, d) or (d,),
+    then lengths, to which the part of index `offset` contributes estimated offsets.
     """
     points, (first, last) = places.points, ends
     at_points = split.errors(points, of_points)
@@ -132,7 +132,7 @@ def _ratio(parts: Array, whole: float) -> Array:
 def fitted_budget(
     fitted: FittedMap, places: MapPlaces, probes: Integers, probe: int
 ) -> tuple[PartBudget, ...]:
-    """Budgets of the errors of a fitted machine at points, and of the lengths beside them."""
+    """Return budgets of the errors of a fitted machine at points, and of lengths."""
     functions = {parameter.function: parameter.meaning for parameter in reversed(fitted.parameters)}
     functions_in_order = list(dict.fromkeys(parameter.function for parameter in fitted.parameters))
     masks = np.array(

@@ -30,7 +30,7 @@ OF_SOURCES = "share of variance: random parts are independent, and add in square
 def budget_lines(
     figures: Sequence[PartBudget], factor: float = 1.0, correlated: bool = True
 ) -> list[str]:
-    """What the parts contribute: to the errors at points, then to all lengths and to their
+    """Return contributions of the parts to the errors at points, then to all lengths and their
     variances.
     """
     shown = [

@@ -1,4 +1,4 @@
-"""Differences of plates that two fits have both estimated: ball by ball, whatever their frames."""
+"""Differences of plates estimated by two fits: ball by ball, independent of their frames."""
 
 from __future__ import annotations
 
@@ -20,8 +20,8 @@ MOST_BALLS = 500
 
 @dataclass(frozen=True, eq=False)
 class PlateDifference:
-    """A plate in two fits: the co-ordinates of its balls after the motion of its frame that fits
-    best, and all of them together.
+    """A plate in two fits: co-ordinates of its balls after the best-fit motion of its frame, with
+    their joint test.
     """
 
     artefact: str

@@ -29,8 +29,8 @@ NAMING, PROBE = ("name", "position", "ball"), "probe"
 
 @dataclass(frozen=True, eq=False)
 class GivenPoints:
-    """Scale readings `points` (n, d) in metres, their names, empty where there are none, and the
-    indices (n,) of their probes; `marks` are where they stand.
+    """Scale readings `points` (n, d) in metres, their names (may be empty), probe indices (n,), and
+    `marks`, their lines in the file.
     """
 
     points: Array
@@ -44,7 +44,7 @@ class GivenPoints:
 
     @cached_property
     def times(self) -> Counter[str]:
-        """How often each name is given."""
+        """Number of points of each name."""
         return Counter(name for name in self.names if name)
 
     @cached_property
@@ -60,9 +60,10 @@ def read_points(
     volume: Volume,
     offsets: Array | None = None,
 ) -> GivenPoints:
-    """Points of a CSV file with the columns x_mm, y_mm and z_mm, or in another unit, and if need
-    be name, or position and ball, and probe; without the latter it is `probe` of the `probes`.
-    Where `offsets` (l, d) of these are given, the points have them added already.
+    """Return points of a CSV file with the columns x_mm, y_mm and z_mm, or in another unit,
+    optionally name, or position and ball, and probe (default: `probe` of the `probes`).
+
+    With `offsets` (l, d) of probes, the points of the file already include them.
 
     :raises ExperimentError: a wrong table, unknown probes, or points far outside the volume.
     """
@@ -98,7 +99,7 @@ def read_points(
 
 
 def read_pairs(source: Path | GivenText) -> tuple[tuple[tuple[str, str], ...], tuple[Mark, ...]]:
-    """Pairs of names of a CSV file with the columns first and second, and where each stands.
+    """Return pairs of names of a CSV file with the columns first and second, and their lines.
 
     :raises ExperimentError: a wrong table.
     """

@@ -1,4 +1,4 @@
-"""Readings that two campaigns have in common: what was read once is compared with itself."""
+"""Readings that two campaigns have in common, which hide changes."""
 
 from __future__ import annotations
 
@@ -36,11 +36,11 @@ def same_positions(first: ObservedReadings, second: ObservedReadings) -> tuple[s
 
 
 def same_readings(first: ObservedReadings, second: ObservedReadings) -> InCommon:
-    """What two campaigns have of each other's readings: the same ones if most of both are, some if
+    """Return the overlap of two campaigns: "same" if most readings of both are common, "some" if
     most of a position are.
 
-    Single readings are compared, of a ball by a probe, whatever positions are called and however
-    many are left out, up to the last digit of the table that was rounded more coarsely.
+    Single readings are compared, of a ball by a probe, regardless of names of positions and of
+    missing readings, to the last digit of the more coarsely rounded table.
     """
     shared, chance = _same(first, second)
     if _are_most(np.array([is_shared.mean() for is_shared in shared]), chance).all():
@@ -49,8 +49,7 @@ def same_readings(first: ObservedReadings, second: ObservedReadings) -> InCommon
 
 
 def _are_most(share: Array, chance: float) -> Flags:
-    """Whether shares of readings are most of them: all, or nearer to all than to what chance makes
-    equal.
+    """Flag shares of readings that are 1, or nearer to 1 than to the share of accidental matches.
 
     >>> _are_most(np.array([0.5, 0.6, 1.0]), 0.0).tolist()
     [False, True, True]
@@ -59,8 +58,8 @@ def _are_most(share: Array, chance: float) -> Flags:
 
 
 def _same(first: ObservedReadings, second: ObservedReadings) -> tuple[tuple[Flags, Flags], float]:
-    """Which readings of two campaigns are in the other, and the chance that one is which was read
-    anew in the same place.
+    """Return flags of the readings of each campaign that are in the other, and the probability of
+    an accidental match.
     """
     from scipy.spatial import cKDTree
     from scipy.special import erf
@@ -92,7 +91,7 @@ def _places(observed: ObservedReadings, named: dict[tuple[str, str], int]) -> Ar
 
 
 def _last_digit(x: Array) -> float:
-    """The largest power of ten, in metres, of which all scale readings are multiples.
+    """Return the largest power of ten, in metres, of which all scale readings are multiples.
 
     >>> _last_digit(np.array([0.1234567, -0.25]))
     1e-07
@@ -105,7 +104,7 @@ def _last_digit(x: Array) -> float:
 
 
 def read_once_words(positions: tuple[str, ...]) -> str:
-    """What is to be said of positions whose readings two campaigns have in common.
+    """Return the caution for positions with readings common to two campaigns.
 
     >>> read_once_words(("low", "high")).partition(":")[0]
     'readings are the same in both campaigns in low, high'

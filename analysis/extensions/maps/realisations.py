@@ -15,7 +15,7 @@ MOST_DRAWS, MOST_NUMBERS = 1000, 20_000_000
 
 @dataclass(frozen=True)
 class Draws:
-    """How many realisations are drawn, and from which seed."""
+    """Number of realisations, and their seed."""
 
     count: int = 0
     seed: int = 1
@@ -46,7 +46,7 @@ class Realisations:
     lengths: Array
 
     def to_dict(self) -> dict[str, Any]:
-        """The same as plain data, None where undetermined."""
+        """Return plain data, None where undetermined."""
         return {
             "seed": self.draws.seed,
             "errors": as_data(self.errors),

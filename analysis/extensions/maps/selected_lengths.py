@@ -22,7 +22,7 @@ from .point_files import GivenPoints, read_pairs
 
 
 def between_named(points: GivenPoints, pairs: Sequence[Sequence[str | int]]) -> Tasks:
-    """Lengths between pairs of points by their names, or indices.
+    """Return lengths between pairs of points by their names, or indices.
 
     :raises ValueError: a name that no point has, or several; an index of none.
     """
@@ -30,7 +30,7 @@ def between_named(points: GivenPoints, pairs: Sequence[Sequence[str | int]]) -> 
 
 
 def between_listed(points: GivenPoints, source: Path | GivenText) -> Tasks:
-    """Lengths between the pairs of points that a CSV file names.
+    """Return lengths between the pairs of points of a CSV file.
 
     :raises ExperimentError: a wrong table, or a name that no point has, or several.
     """
@@ -49,7 +49,7 @@ def between_listed(points: GivenPoints, source: Path | GivenText) -> Tasks:
 
 
 def tasks_of_experiment(fitted: FittedMap, experiment: Experiment) -> Tasks:
-    """The measuring tasks of an experiment.
+    """Return the measuring tasks of an experiment.
 
     :raises ExperimentError: there is none, of other dimensions, or with a probe that the map does
         not have.

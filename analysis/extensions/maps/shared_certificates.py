@@ -28,15 +28,15 @@ SINGLE = (CalibratedDistances, CalibratedCoordinates)
 
 
 class NothingSharedError(ValueError):
-    """Two campaigns of which it is not known that they share anything."""
+    """Two campaigns without a known common certificate."""
 
 
 @dataclass(frozen=True, eq=False)
 class CertifiedErrors:
-    """Errors of certified values that have a common cause: what one standard deviation of each
-    cause, `errors` (causes, m), adds to `rows` (m,) of all whitened observations.
+    """Errors of certified values with a common cause: effects `errors` (causes, m) of one standard
+    deviation of each cause on `rows` (m,) of the whitened observations.
 
-    `key` identifies them: what they are, their values and their uncertainties.
+    `key` identifies them by type, values and uncertainties.
     """
 
     key: tuple[object, ...]
@@ -47,11 +47,10 @@ class CertifiedErrors:
 def with_shared_certificates(
     first: ComparedMap, second: ComparedMap
 ) -> tuple[ComparedMap, ComparedMap, int]:
-    """Two maps of fits with what errors of certified values that both have do to each, and the
-    number of these values.
+    """Return two maps of fits with the effects of common certified values, and the number of these
+    values.
 
-    Values are the same if they are of the same balls, or lengths, and certified alike with the same
-    uncertainty.
+    Common values have the same balls, or lengths, the same value and uncertainty.
 
     :raises NothingSharedError: a map without its fit, or campaigns that have no certified value in
         common.

@@ -30,12 +30,12 @@ def map_difference(
     stated: LengthFunction | None = None,
     dates: tuple[str | None, str | None] = (None, None),
 ) -> MapDifference:
-    """The second of two `sides` less the first: each a fit, a fitted map, or the path of a map
-    file, a machine file or an experiment that names its readings.
+    """Return the second of two `sides` less the first: each a fit, a fitted map, or the path of a
+    map file, a machine file or an experiment that names its readings.
 
-    With `shared` the errors of certified values that both fits have cancel. `stated` is the
-    standard uncertainty of lengths by a machine file; `dates` are days of the campaigns, by default
-    those that the maps state.
+    With `shared`, errors of certified values common to both fits cancel. `stated` is the standard
+    uncertainty of lengths by a machine file; `dates` are days of the campaigns, by default those of
+    the maps.
 
     :raises ExperimentError: a file is wrong.
     :raises NotComparableError: the maps, or what is asked for, do not go together.
@@ -75,8 +75,7 @@ def map_difference(
 
 
 def read_points(path: Path, dimension: int) -> Array:
-    """Points (n, d) in metres of a CSV file with the columns x_mm, y_mm and, in space, z_mm; their
-    names, if it has any, are not needed.
+    """Return points (n, d) in metres of a CSV file with the columns x_mm, y_mm and, in space, z_mm.
 
     :raises ExperimentError: the file is wrong.
     """

@@ -35,7 +35,7 @@ from ballplate.simulator.machines import (
 
 @dataclass(frozen=True, eq=False)
 class StatedModel:
-    """An error model with its `settings` as a file states them, paths in them absolute."""
+    """An error model with its `settings` as in a file, paths absolute."""
 
     settings: dict[str, Any]
     model: ErrorModel
@@ -46,8 +46,9 @@ class StatedModel:
 
 
 def stated_model(text: str, volume: Volume, source: str) -> StatedModel:
-    """The error model of a text for a volume: a kind such as "kinematic", settings such as "{kind:
-    kinematic, position_coefficients: 3}", or the path of a file with a section `error_model`.
+    """Return the error model of a text for a volume: a kind such as "kinematic", settings such as
+    "{kind: kinematic, position_coefficients: 3}", or the path of a file with a section
+    `error_model`.
 
     :raises ExperimentError: it is none, named by its file or as the `source`.
 
@@ -78,7 +79,7 @@ def _section(root: Node, source: str) -> Node:
 
 
 def _built(settings: Any, volume: Volume, folder: Path, problems: Problems) -> ErrorModel | None:
-    """The model, or None after saying what is wrong."""
+    """Return the model, or None after a message."""
     kind, d = kind_of(settings), len(volume.lower)
     if d not in kind.dimensions:
         problems.add(("kind",), f"{settings.kind} models have {kind.dimensions[0]} axes, not {d}")

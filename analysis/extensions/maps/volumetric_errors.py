@@ -44,8 +44,8 @@ ALONG = 101
 
 @dataclass(frozen=True, eq=False)
 class VolumetricErrors:
-    """Errors where the axes stand at `points` (m, 3): `systematic` (m, 3) and `deviation` (m, 3) of
-    the random part.
+    """Errors at scale readings `points` (m, 3): `systematic` (m, 3), and `deviation` (m, 3) of the
+    random part.
     """
 
     points: Array
@@ -89,10 +89,8 @@ class Volumetric:
 
     @cached_property
     def approach(self) -> tuple[VolumetricModel, tuple[float | Points, ...]]:
-        """The model whose parameters are the values of the functions with a random part, and their
-        deviations.
-
-        They are drawn anew whenever a point is approached.
+        """Model with one parameter per function with a random part, and the deviations, drawn again
+        at each approach of a point.
         """
         machine = self.machine
         random = [error for error in machine.errors if error.deviation is not None]
@@ -107,8 +105,8 @@ class Volumetric:
 
     @cached_property
     def lasting(self) -> tuple[VolumetricModel, Array]:
-        """The model of what is wrong alike at all points, with the deviations: squareness and
-        temperatures.
+        """Model of random errors common to all points, squareness and temperatures, with their
+        deviations.
         """
         machine = self.machine
         fields = [
@@ -133,18 +131,16 @@ class Volumetric:
 
     @property
     def is_random(self) -> bool:
-        """Whether anything has a random part."""
+        """True if any error has a random part."""
         return bool(self.approach[1] or len(self.lasting[1]) or self.machine.probing)
 
     def systematic(self, points: Array) -> Array:
-        """Systematic errors (m, 3) where the axes stand at points (m, 3)."""
+        """Return systematic errors (m, 3) at scale readings (m, 3)."""
         probe = np.broadcast_to(self.machine.probe, points.shape)
         return np.asarray(self.truth.model.error(points, self.truth.a, probe) - probe)
 
     def random_roots(self, points: Array) -> tuple[Array, Array]:
-        """Sensitivities times deviations: (m, 3, k) of what each approach draws, and (m, 3, l) of
-        what lasts.
-        """
+        """Return sensitivities times deviations: (m, 3, k) per approach, and (m, 3, l) lasting."""
         probe = np.broadcast_to(self.machine.probe, points.shape)
         model, deviations = self.approach
         columns = model.jacobian(points, np.zeros(len(deviations)), probe)
@@ -160,17 +156,16 @@ class Volumetric:
         )
 
     def errors(self, points: Array) -> VolumetricErrors:
-        """Errors where the axes stand at points (m, 3); random parts add in quadrature."""
+        """Return errors at scale readings (m, 3); random parts add in quadrature."""
         drawn, lasting = self.random_roots(points)
         deviation = np.sqrt((drawn**2).sum(axis=2) + (lasting**2).sum(axis=2))
         return VolumetricErrors(points, self.systematic(points), deviation)
 
     def lengths(self, starts: Array, ends: Array) -> LengthErrors:
-        """Errors of distances between points (m, 3).
+        """Return errors of distances between points (m, 3).
 
-        The two ends are approached one after the other: what an approach draws is independent at
-        the two, also of a function that has the same position at both. Squareness and temperature
-        are wrong alike at both.
+        The two ends are separate approaches with independent draws, even of a function with the
+        same position at both. Errors of squareness and temperature are common to both.
         """
         nominal = np.linalg.norm(ends - starts, axis=1)
         direction = (ends - starts) / nominal[:, None]
@@ -186,7 +181,7 @@ class Volumetric:
 
 
 def length_errors(starts: Array, ends: Array, moved: Array) -> Array:
-    """What distances (m,) between points (m, d) are longer where the ends have `moved` (m, d)
+    """Return the increase of distances (m,) between points (m, d) if the ends have `moved` (m, d)
     against the starts.
     """
     difference = ends - starts
@@ -198,8 +193,8 @@ def length_errors(starts: Array, ends: Array, moved: Array) -> Array:
 
 
 def drawn_machine_errors(built: Volumetric, places: MapPlaces, draws: Draws) -> Realisations:
-    """Errors with a random part that is drawn: of what lasts once for all points, of what each
-    approach draws at each point, and at both ends of a length, anew.
+    """Return errors with a drawn random part: lasting errors once for all points, those of an
+    approach at each point and each end of a length.
     """
     draws.ensure_possible(places.points)
     (drawn, lasting), (first, at_start), (last, at_end) = (
@@ -233,8 +228,8 @@ class AlongAxis:
     """A parametric error along its axis: at `positions` (m,), as stated, at the reference point,
     and deviation.
 
-    `stated` and `values` are None of an error that is random alone; `measured` has the positions
-    and values of a table.
+    `stated` and `values` are None for a purely random error; `measured` has the positions and
+    values of a table.
     """
 
     error: ParametricError

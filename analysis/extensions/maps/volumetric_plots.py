@@ -124,7 +124,7 @@ def _face(axes: Axes, face: Array, colour: str, width: float, is_near: bool) -> 
 
 
 def _spread(count: int, most: int) -> Integers:
-    """Indices of all, or of `most` evenly spread ones of them, both ends included."""
+    """Return `most` evenly spread indices, or all, both ends included."""
     return np.unique(np.linspace(0, count - 1, min(count, most)).round().astype(int))
 
 

@@ -90,10 +90,10 @@ class MachineErrors(Result):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class ErrorsAtPoints(MachineErrors):
-    """Volumetric errors at `places`: `errors` at its points, and the errors of its `lengths`.
+    """Volumetric errors at `places`: `errors` at points, and those of `lengths`.
 
-    `realisations` of the random part are drawn where they were asked for, and `with_budget` says
-    whether the contributions of the parametric errors are shown.
+    `realisations` are optional draws of the random part; `with_budget` adds the contributions of
+    parametric errors.
     """
 
     places: MapPlaces
@@ -108,13 +108,11 @@ class ErrorsAtPoints(MachineErrors):
 
     @cached_property
     def budget(self) -> tuple[PartBudget, ...]:
-        """What each parametric error contributes: to the errors at the points, and to each of the
-        lengths.
-        """
+        """Contributions of parametric errors to the errors at points and to each length."""
         return machine_budget(self.machine, self.places)
 
     def more_lines(self) -> list[str]:
-        """Realisations and budget as lines of text, where they were asked for."""
+        """Return requested realisations and budget as lines of text."""
         lines = []
         if self.realisations is not None:
             lines += ["", *realisation_lines(self.realisations, self.places.names)]
@@ -123,7 +121,7 @@ class ErrorsAtPoints(MachineErrors):
         return lines
 
     def more_data(self) -> dict[str, Any]:
-        """Realisations and budget as plain data, where they were asked for."""
+        """Return requested realisations and budget as plain data."""
         data: dict[str, Any] = {}
         if self.realisations is not None:
             data["realisations"] = self.realisations.to_dict()
@@ -219,7 +217,7 @@ class ErrorAlongAxis(MachineErrors):
         return along_data(self.along)
 
     def rows(self) -> list[dict[str, Any]]:
-        """One row for each place along the axis, in metres and radians."""
+        """Return one row per position along the axis, in metres and radians."""
         data = self.to_dict()
         names = [name for name in ("position", "stated", "value", "random") if data[name]]
         columns = zip(*(data[name] for name in names), strict=True)
@@ -239,7 +237,8 @@ def machine_errors(
     draws: Draws | None = None,
     with_budget: bool = False,
 ) -> MachineErrors:
-    """Errors of a machine file at the places asked for, or of one parametric error along its axis.
+    """Return errors of a machine file at requested locations, or of one parametric error along its
+    axis.
 
     :raises ExperimentError: the file is wrong.
     :raises ValueError: what does not go together, or is not in the machine.

@@ -52,7 +52,7 @@ RANDOM = (
 
 
 def machine_lines(built: Volumetric) -> list[str]:
-    """What the machine is and its parametric errors."""
+    """Return a description of the machine and its parametric errors."""
     machine = built.machine
     name = f"{machine.arrangement_name}: " if machine.arrangement_name else ""
     lines = [machine.title, f"{name}{_chain(machine.arrangement)}; {CONVENTION}", ""]
@@ -149,7 +149,6 @@ def _single_numbers(built: Volumetric) -> list[list[str]]:
 
 
 def _meaning_text(parameter: Parameter) -> str:
-    """What an error that is no function means."""
     is_droop = parameter.name in ("phi1", "phi2")
     return parameter.meaning + (", over the whole axis" if is_droop else "")
 
@@ -275,7 +274,7 @@ def error_csv(
 def with_drawn(
     errors: Array, uncertainties: Array, realisations: Realisations | None
 ) -> list[tuple[Array, Array]]:
-    """Errors (m, d) with their uncertainties, then those of realisations, which have none."""
+    """Return errors (m, d) with their uncertainties, then realisations without any."""
     drawn = [] if realisations is None else list(realisations.errors)
     none = np.full_like(uncertainties, np.nan)
     return [(errors, uncertainties), *((error, none) for error in drawn)]
@@ -287,8 +286,8 @@ def tables_csv(
     numbered: bool,
     names: Sequence[str] = (),
 ) -> Iterator[str]:
-    """Tables of the same columns as lines of one CSV file, with the `names` of their points; in
-    those that are `numbered` a column tells which realisation a row is of, 0 the estimate.
+    """Yield tables of the same columns as lines of one CSV file, with `names` of points; if
+    `numbered`, the first column is the realisation, 0 for the estimate.
     """
     yield ",".join([*(["realisation"] if numbered else []), *(["point"] if names else []), *heads])
     labels = io.StringIO()
@@ -310,9 +309,7 @@ def along_csv(along: AlongAxis) -> Iterator[str]:
 
 
 def _curve_columns(along: AlongAxis, name: str) -> dict[str, Array]:
-    """What there is of an error along its axis, where `name` is what it is at the reference
-    point.
-    """
+    """Return the columns of an error along its axis, `name` for the reference point."""
     columns = {"stated": along.stated, name: along.values, "random": along.deviation}
     return {key: values for key, values in columns.items() if values is not None}
 
@@ -322,7 +319,7 @@ def _unit(along: AlongAxis) -> str:
 
 
 def machine_data(built: Volumetric) -> dict[str, Any]:
-    """What the machine is and its parametric errors, in metres and radians."""
+    """Return the machine and its parametric errors, in metres and radians."""
     machine = built.machine
     functions = {
         function.error.name: {
