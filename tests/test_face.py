@@ -218,7 +218,7 @@ WRONG: list[tuple[Callable[[], object], type[Exception], str]] = [
     (lambda: bp.map(3), TypeError, r"machine=3; give a fit, what its to_map\(\) gives, or a path"),
     (lambda: bp.map(MACHINE, error="EXQ"), ValueError, 'states no error "EXQ"'),
     (lambda: bp.map(MACHINE, grid=(2, 2)), ValueError, "give three numbers of points"),
-    (lambda: bp.map(MACHINE, points=3), ValueError, "points go with a line"),
+    (lambda: bp.map(MACHINE, points=3), ValueError, "points need a line"),
     (lambda: bp.map(MACHINE, (2, 2, 2), error="EXX"), ValueError, "grid and error do not go"),
     (lambda: bp.map(MACHINE, line="y = 3"), ValueError, "y"),
     (lambda: bp.spline(TABLE, knot="none"), TypeError, '"knot" is unknown; did you mean "knots"'),

@@ -1,7 +1,7 @@
 """The wording that the tests of maps expect: a rewording is entered here alone."""
 
 AGAINST_A_LEVEL_OF_THE_MAP = "against a level of 0.25: the map is scaled with that"
-AGREE_WITH_ITS_MODEL_BUT = "agree with its model but for rounding"
+AGREE_WITH_ITS_MODEL_BUT = "agree with its model except for rounding"
 FITTED_HERE_TOO = "fitted here too (x high): they count twice"
 GIVE_IT_THE_ENDING_NPZ = "give it the ending .npz"
 HAS_CHANGED_SINCE_THE_MAP_WAS = "has changed since the map was written"

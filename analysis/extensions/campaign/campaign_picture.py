@@ -335,9 +335,7 @@ def _rows(selection: Selection) -> list[_Row]:
     ]
     left_out = [gain for gain in selection.left_out if not math.isnan(gain.relative)]
     if left_out:
-        rows.append(
-            _Row("", "left out; how much larger it is without each of these", "", None, MUTED)
-        )
+        rows.append(_Row("", "left out; increase without each", "", None, MUTED))
     return rows + [_row(selection, gain, {}) for gain in left_out[:MOST_LEFT_OUT]]
 
 

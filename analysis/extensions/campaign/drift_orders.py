@@ -111,7 +111,7 @@ def _orders(
         sequence = least_drift(experiment, chosen, pool.changes, request.seed)
         return [*orders, ReadingOrder("least-drift", request.seed, sequence)]
     if request.order == "least-drift":
-        text = "has length standards, whose drift is not followed; ask for another --order"
+        text = "has length standards, whose drift is not modelled; choose another --order"
         raise _impossible(experiment, text)
     return orders
 
@@ -146,7 +146,7 @@ def _order_table(size: DriftSize, effects: Sequence[DriftEffect], campaign: Camp
         return [*table, why]
     return [
         *table,
-        "what a drift that nobody knows of changes a distance between corrected points by at"
+        "an unmodelled drift changes a distance between corrected points by at"
         " most, and the mean uncertainty of these distances; µm",
         *_chosen_without_drift(campaign),
     ]
@@ -166,7 +166,7 @@ def _chosen_without_drift(campaign: Campaign) -> list[str]:
     if not drifts:
         return []
     return [
-        "positions were chosen as if nothing drifted; U1 to U6 are those with the drift of the"
+        "positions were chosen without drift; U1 to U6 are those with the drift of the"
         " file, in the order chosen"
     ]
 

@@ -52,7 +52,7 @@ def earlier_choice(chosen: Experiment, offered: Offer) -> tuple[int, ...]:
         )
     ]
     if moved:
-        remedy = "is elsewhere, or of another artefact, in the pool; give it another name"
+        remedy = "has another location or artefact in the pool; give it another name"
         raise ExperimentError(message(f'"{name}" {remedy}') for name in moved)
     starts = [
         _now(offered, places[named.get(position.name, position.name)], position)

@@ -78,7 +78,7 @@ def run(options: Namespace) -> int:
     from ballplate.simulator.inputs import QuantityError, Target, parse_length_function
 
     if options.interval is not None and options.watch is None:
-        raise UsageError("--interval goes with --watch; leave it out")
+        raise UsageError("--interval needs --watch; leave it out")
     if options.watch is not None and not options.watch.is_dir():
         raise UsageError(f"--watch {options.watch}: no such folder")
     refuse_wrong_order(options)

@@ -104,7 +104,7 @@ class NextStep(Result):
             return [f"nothing can be estimated yet ({self.why})"]
         freedom = self.fit.sum_freedom
         if freedom <= 0:
-            sigma_text = "sigma unknown, as nothing is read redundantly"
+            sigma_text = "sigma unknown: no redundant readings"
         else:
             sigma = math.sqrt(self.fit.sum_of_squares / freedom)
             sigma_text = f"sigma {number(sigma, 3)} of {freedom_words(freedom)}"
@@ -132,9 +132,7 @@ class NextStep(Result):
         if self.is_met:
             assert self.fit is not None
             by_itself = not can_stretch(self.fit.design, self.fit.solution.state)
-            limitation = (
-                " by the machine's own scales, which nothing here vouches for" if by_itself else ""
-            )
+            limitation = " by the machine's own scales: not traceable" if by_itself else ""
             return f"target met{limitation}: stop"
         reason = self._reason()
         if self.next is None:
@@ -147,11 +145,11 @@ class NextStep(Result):
         if self.now is None or not self.now.is_met:
             return "target not met"
         if self.suspected:
-            return "target met but for what is suspected: look at that first"
+            return "target met, but readings are flagged: inspect them first"
         if math.isinf(self.bound):
-            return "target met only if the scatter is as stated, which nothing shows yet"
+            return "target met if the repeatability is as stated: no evidence yet"
         return (
-            "target met only if the scatter is as stated: with so few degrees of freedom it may be"
+            "target met if the repeatability is as stated: with so few degrees of freedom it may be"
             f" {number(self.bound, 2)} times as large"
         )
 

@@ -75,7 +75,7 @@ def planned_readings(sheet: RunSheet, experiment: Experiment) -> list[PlannedRea
                     names = " and ".join(
                         f'"{", ".join(key_names)}"' for key_names in (first_key, key)
                     )
-                    text = f"{names} would both be the feature {name}; rename one of them"
+                    text = f"{names} would both be the feature {name}; rename one"
                     raise refused(experiment.source, text, "positions")
                 planned += [
                     PlannedReading(*key, name, centres[k, : experiment.dimension])

@@ -22,8 +22,8 @@ SHEETS, DMIS, POINTS = (".html", ".md", ".csv", ".txt"), (".dmi", ".dmis"), (".c
 DESCRIPTION = (
     "Write what goes to the laboratory with a design: a run sheet to print and tick off, a CSV"
     " file of the readings in order with empty cells, which fit reads when they are filled in, and"
-    " the nominal centres of the balls in order, as a table or as a DMIS program. Without any of"
-    " these the run sheet is printed."
+    " the nominal centres of the balls in order, as a table or as a DMIS program. By default the"
+    " run sheet is printed."
 )
 
 

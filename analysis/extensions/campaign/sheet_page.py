@@ -214,7 +214,7 @@ def _pictures(sheet: RunSheet, experiment: Experiment) -> str:
     names = {
         name: name if len(name) <= LONGEST_NAME else number for name, number in numbers.items()
     }
-    more = "; a long name is told by its number" if set(names.values()) != set(names) else ""
+    more = "; a number replaces a long name" if set(names.values()) != set(names) else ""
     return (
         f"{pictures}<h2>Positions in the volume</h2><figure>{volume_drawing(design, names)}"
         f"<figcaption>the dot is the first ball of each position{more}</figcaption></figure>"

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 DESCRIPTION = (
     "Apply stated changes of scales and turns of guideways to a fitted machine: of a map file, or"
-    " of an experiment with its readings. Predict what remains of scale errors, angles between the"
+    " of an experiment with its readings. Predict the remaining scale errors, angles between the"
     " axes and errors along the diagonals of the volume, with U, and compare with what a second"
     " campaign finds, as diff does. The exit status is 1 if that shows a change, or nothing can be"
     " compared, or a fit is not as expected, otherwise 0."
@@ -87,7 +87,7 @@ def run(options: Namespace) -> int:
     from .machine_changes import guideway_turn, scale_change
 
     if not options.scale and not options.turn:
-        raise UsageError("state what was changed, with --scale or --turn")
+        raise UsageError("state the changes, with --scale or --turn")
     try:
         changes = [scale_change(text) for text in options.scale]
         changes += [guideway_turn(text) for text in options.turn]

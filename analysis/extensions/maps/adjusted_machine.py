@@ -332,8 +332,8 @@ def adjusted_machine(
     """
     if second is not None and readings_in_common(fitted.data, second.data) != "none":
         raise ValueError(
-            "the second campaign has readings of the first, from before the changes; name what was"
-            " read after them, and nothing else"
+            "the second campaign has readings of the first, from before the changes; name only"
+            " readings after them"
         )
     corners, to_corners = (
         np.array(fitted_map.volume.corners) for fitted_map in (fitted, second or fitted)

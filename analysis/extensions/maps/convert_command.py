@@ -11,8 +11,8 @@ from .fitted_argument import FITTED, fitted_map
 
 DESCRIPTION = (
     "Convert a map that fit -o has written to another error model of the same volume: the nearest"
-    " corrections by least squares, their covariance, and what the new model cannot follow in the"
-    " whole volume. The exit status is 0 if it follows the old one exactly, otherwise 1."
+    " corrections by least squares, their covariance, and the largest residuals in the whole"
+    " volume. The exit status is 0 if it follows the old one exactly, otherwise 1."
 )
 
 

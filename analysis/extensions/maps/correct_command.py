@@ -30,8 +30,8 @@ if TYPE_CHECKING:
 DESCRIPTION = (
     "Correct the scale readings of a CSV file by a map that fit -o has written: corrected"
     " co-ordinates, the correction that was added, and expanded uncertainties; lengths between"
-    " named points, and measuring tasks. The exit status is 0 if everything asked for is"
-    " determined, otherwise 1."
+    " named points, and measuring tasks. The exit status is 0 if all results are determined,"
+    " otherwise 1."
 )
 READ, CENTRES = "scale readings", "ball centres"
 
@@ -43,8 +43,8 @@ def add_options(parser: ArgumentParser) -> None:
         metavar="POINTS",
         type=Path,
         help=(
-            "points: a CSV file with the columns x_mm, y_mm, z_mm (or another unit) and if need be"
-            " name, or position and ball, and probe"
+            "points: a CSV file with the columns x_mm, y_mm, z_mm (or another unit) and"
+            " optionally name, or position and ball, and probe"
         ),
     )
     parser.add_argument(
@@ -70,9 +70,9 @@ def add_options(parser: ArgumentParser) -> None:
     parser.add_argument(
         "--with-repeatability",
         action="store_true",
-        help="include the scatter of the readings that are corrected",
+        help="include the repeatability of the corrected readings",
     )
-    add_output(parser, "-o", "--output", metavar="CSV", help="write a line for each point")
+    add_output(parser, "-o", "--output", metavar="CSV", help="write one row per point")
     add_output(
         parser,
         "--covariance",

@@ -142,7 +142,7 @@ class Correction(Result):
             )
         if fitted.without_scatter:
             cautions.append(
-                "the readings of the map agree with its model but for rounding, as computed ones"
+                "the readings of the map agree with its model except for rounding, as computed ones"
                 " do: its uncertainties are zero, too, and cannot be relied on"
             )
         if fitted.sigma_is_estimated:
@@ -179,7 +179,7 @@ class Correction(Result):
         if not temperatures:
             return []
         words = ", ".join(f"{word} {value:.4g} °C" for word, value in temperatures.items())
-        return [f"temperatures of the campaign: {words}; corrected for none of the points"]
+        return [f"temperatures of the campaign: {words}; not applied to points"]
 
     def _columns(self, most: int | None = None) -> dict[str, Any]:
         """The columns of the first points."""
@@ -286,8 +286,8 @@ class Correction(Result):
 
 
 OWN_SCALES = (
-    "the error model cannot change the scale: lengths are those of the machine's own scales, and U"
-    " does not contain how wrong these may be"
+    "the error model cannot change the scale: lengths are those of the machine's own scales, and"
+    " U excludes their errors"
 )
 
 

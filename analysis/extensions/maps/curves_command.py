@@ -27,7 +27,8 @@ if TYPE_CHECKING:
     from .volumetric_results import MachineErrors
 
 DESCRIPTION = (
-    "Tell every error function of a map file (fit -o) along its axis with its expanded uncertainty,"
+    "Print every error function of a map file (fit -o) along its axis with its expanded"
+    " uncertainty,"
     " the squareness errors as angles, and other numbers of the error model. Errors are the"
     " position of the tip minus the position that the scales indicate."
 )
@@ -49,7 +50,7 @@ def add_options(parser: ArgumentParser) -> None:
         "--points",
         metavar="N",
         type=_points,
-        help="positions along each line, in CSV, JSON and the drawing; default 41",
+        help="positions along each line, in CSV, JSON and the plot; default 41",
     )
     add_picture(parser, "--plot", help="also draw all functions side by side")
     add_force(parser)

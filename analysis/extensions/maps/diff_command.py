@@ -48,7 +48,7 @@ def add_options(parser: ArgumentParser) -> None:
         metavar=("FIRST", "SECOND"),
         nargs=2,
         type=Path,
-        help="tables of readings of two experiment files, in place of those that they name",
+        help="tables of readings of two experiment files, instead of the named ones",
     )
     where = parser.add_mutually_exclusive_group()
     where.add_argument(
@@ -101,8 +101,8 @@ def add_options(parser: ArgumentParser) -> None:
     parser.add_argument(
         "--fail", action="store_true", help="end with exit status 1 if a change is shown"
     )
-    add_output(parser, "-o", "--output", metavar="FILE", help="write a line for each figure")
-    add_picture(parser, "--plot", help="draw what changed, and E_n of all figures")
+    add_output(parser, "-o", "--output", metavar="FILE", help="write one row per value")
+    add_picture(parser, "--plot", help="draw the changes, and all E_n")
     add_force(parser)
     add_json(parser)
 

@@ -125,7 +125,7 @@ def _rows(axes: Axes, groups: list[FigureGroup]) -> None:
     axes.set_ylim(0.6 - len(groups), 0.6)
     axes.set_yticks([-k for k in range(len(groups))], [_short(group.kind) for group in groups])
     axes.grid(True, axis="x")
-    axes.set_xlabel("|E_n|; about one in twenty exceeds 1 by chance")
+    axes.set_xlabel("|E_n|; without a change, about one in twenty exceeds 1")
 
 
 def _short(name: str) -> str:

@@ -282,7 +282,7 @@ def adjust(
     first = fitted_map_of("fitted", fitted)
     second = None if after is None else fitted_map_of("after", after)
     if not 0.0 <= share <= 1.0:
-        raise ValueError(f"share={share!r}; give a part of each change, from 0 to 1")
+        raise ValueError(f"share={share!r}; give a ratio from 0 to 1")
     changes = [scale_change(text) for text in _texts("scale", scale)]
     changes += [guideway_turn(text) for text in _texts("turn", turn)]
     return adjusted_machine(first.title, first, changes, second, share)

@@ -59,7 +59,9 @@ class LengthMap(GroupedLengths, Result):
         settings, whole = self.settings, self.whole
         k = f"{settings.coverage_factor:g}"
         rank = f"rank deficiency {self.deficiency}; " if self.deficiency else ""
-        scatter = ", the scatter of two readings included" if settings.with_repeatability else ""
+        scatter = (
+            ", the repeatability of two readings included" if settings.with_repeatability else ""
+        )
         count, n = int(whole.count[0]), len(self.points)
         lines = [
             self.heading,
@@ -84,7 +86,7 @@ class LengthMap(GroupedLengths, Result):
             )
         elif self.deficiency:
             lines.append(
-                "undetermined directions change none of these lengths, but may change those of"
+                "undetermined directions leave these lengths unchanged, but may change those of"
                 " another --grid"
             )
         if self.worst is not None:

@@ -30,9 +30,9 @@ MOST_PAIRS = 500_000
 DESCRIPTION = (
     "Compute the standard uncertainty u of the length between every two points of a"
     " grid over the volume, measured on the corrected machine, and compare it and the"
-    " expanded uncertainty k u with the target by length, direction and place. The"
+    " expanded uncertainty k u with the target by length, direction and location. The"
     " target applies to u, or to U = k u where the file states a coverage_factor. The"
-    " scatter of the readings that will measure a length is not part of u unless"
+    " repeatability of the readings that will measure a length is not part of u unless"
     " requested. The exit status is 0 if the rank is as expected and, with --fail, all"
     " lengths are within the target, otherwise 1."
 )
@@ -71,12 +71,10 @@ def add_options(parser: ArgumentParser) -> None:
     parser.add_argument(
         "--with-repeatability",
         action="store_true",
-        help="include the scatter of the two readings that measure a length",
+        help="include the repeatability of both readings of a length",
     )
-    add_output(
-        parser, "-o", "--output", metavar="FILE", help="write a line for each point of the grid"
-    )
-    add_output(parser, "--pairs", metavar="FILE", help="write a line for each length")
+    add_output(parser, "-o", "--output", metavar="FILE", help="write one row per point of the grid")
+    add_output(parser, "--pairs", metavar="FILE", help="write one row per length")
     add_picture(parser, "--plot", help="draw slices through the volume, and u against the length")
     add_force(parser)
     add_json(parser)

@@ -51,10 +51,7 @@ def add_options(parser: ArgumentParser) -> None:
         "--draw",
         metavar="N",
         type=_draw,
-        help=(
-            "draw so many realisations of the random part, or of what the covariance of a map"
-            " leaves open"
-        ),
+        help=("draw N realisations of the random part, or of the covariance of a map"),
     )
     parser.add_argument("--seed", metavar="N", type=whole, help="seed of --draw; default 1")
     parser.add_argument(
@@ -106,7 +103,7 @@ def _add_places(parser: ArgumentParser) -> None:
         type=_points,
         help=(
             "points along the line, at least 2, default 21; or a table of points, with the columns"
-            " x_mm, y_mm and z_mm (or another unit), where errors are told"
+            " x_mm, y_mm and z_mm (or another unit), for the errors"
         ),
     )
 
@@ -168,9 +165,9 @@ def run(options: Namespace) -> int:
     table = options.points if isinstance(options.points, Path) else None
     is_grid = table is None and all(option is None for option in exclusive)
     if options.magnification is not None and (options.plot is None or not is_grid):
-        raise UsageError("--magnification is for the drawing of the grid; leave it out")
+        raise UsageError("--magnification is for the plot of the grid; leave it out")
     if options.seed is not None and options.draw is None:
-        raise UsageError("--seed goes with --draw; leave it out")
+        raise UsageError("--seed needs --draw; leave it out")
     number = None if table is not None else options.points
     asked = PlacesAsked(options.grid, options.line, options.plane, number, table)
     seed = 1 if options.seed is None else options.seed

@@ -37,14 +37,14 @@ INDEPENDENT = (
 )
 
 SAME_READINGS = (
-    "both rest on the same readings: U and E_n, which take campaigns to be independent, say nothing"
-    " here, and differences are those of the evaluation alone"
+    "both rest on the same readings: U and E_n, which assume independent campaigns, are"
+    " meaningless here; differences come from the evaluation alone"
 )
 
 SOME_READINGS = (
     "both rest on some of the same readings: U here, which takes campaigns to be independent, is"
-    " too large, so that a change may be shown, but never that there is none; compare a map of what"
-    " was read anew alone"
+    " too large, so that a change may be shown, but never that there is none; compare a map of"
+    " new readings alone"
 )
 
 
@@ -119,7 +119,7 @@ class MapDifference(Result):
         if self.in_common == "same":
             return "the same readings on both sides: no change can be shown"
         if test is None:
-            return "nothing that is determined in both can be tested"
+            return "no value is determined in both"
         return f"{self._verdict(test)} (p = {_chance(test.p)})"
 
     def _verdict(self, test: JointTest) -> str:
@@ -161,7 +161,7 @@ class MapDifference(Result):
     def notes(self) -> tuple[str, ...]:
         cautions = [
             f"warning: sigma of {side.label} comes from {side.degrees_of_freedom:g} degrees of"
-            f" freedom; with so few, more than {_share(0.0455)} exceed |E_n| = 1 by chance"
+            f" freedom; with so few, more than {_share(0.0455)} exceed |E_n| = 1 without a change"
             for side in (self.first, self.second)
             if side.degrees_of_freedom < FEW
         ]
@@ -296,7 +296,7 @@ class MapDifference(Result):
         count = sum(function.test is not None for function in self.comparison.functions)
         remark = (
             f"({count} tests: the smallest p of as many is below {LEVEL / max(count, 1):.2g} once"
-            f" in {round(1 / LEVEL)} where nothing has changed)"
+            f" in {round(1 / LEVEL)} without a change)"
         )
         return [*aligned(rows, [False, True, False, True, True, True]), remark]
 

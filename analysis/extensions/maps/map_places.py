@@ -118,7 +118,7 @@ def map_places(
     if len(several) > 1:
         raise ValueError(f"{' and '.join(several)} do not go together; give one of them")
     if asked.points is not None and asked.line is None:
-        raise ValueError("points go with a line; leave them out")
+        raise ValueError("points need a line; leave them out")
     d, ends = len(volume.lower), volume.diagonals
     names = tuple(f"diagonal {k + 1}" for k in range(len(ends[0])))
     if asked.at is not None:

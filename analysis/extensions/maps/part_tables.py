@@ -68,9 +68,7 @@ def budget_lines(
     rows.append([whole, *(_shown(factor * budget.uncertainty) for budget in lengths)])
     lines += [*aligned(rows, right), ""]
     omitted = len(figures[0].parts) - len(shown)
-    omission = (
-        [f"(parts that contribute nothing, {omitted} of them, are left out)"] if omitted else []
-    )
+    omission = [f"(omitted: {omitted} parts without contribution)"] if omitted else []
     return [*lines, *omission, OF_POINTS, OF_LENGTHS, OF_ESTIMATES if correlated else OF_SOURCES]
 
 

@@ -47,10 +47,12 @@ def map_difference(
         for side in sides
     ]
     if all(described):
-        text = "both files describe machines, and nothing was measured; name a map, or a fit"
+        text = "both files describe machines; name at least one map or fit"
         raise NotComparableError(text)
     if stated is not None and not any(described):
-        raise NotComparableError("an uncertainty is stated of a machine file, and there is none")
+        raise NotComparableError(
+            "a stated uncertainty needs a machine file; name one, or leave it out"
+        )
     measured = [
         None if machine else _measured(side, label, day)
         for side, label, day, machine in zip(sides, labels, dates, described, strict=True)

@@ -481,7 +481,7 @@ def test_commands_print_what_results_say(
         (["--grid", "2,2"], "give three numbers of points"),
         (["--error", "EXQ"], 'the map has no error "EXQ"'),
         (["--error", "EXX", "--budget"], "budget and error do not go together"),
-        (["--seed", "3"], "--seed goes with --draw"),
+        (["--seed", "3"], "--seed needs --draw"),
     ],
 )
 def test_what_does_not_go_together_is_refused(

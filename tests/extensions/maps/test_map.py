@@ -287,16 +287,16 @@ def test_wrong_usage(
             "EC0Y is the squareness of Y to X, a single number: -45.00 µrad at the reference point",
         ),
         (("--error", "EEX"), 'states no error "EEX"; did you mean'),
-        (("--points", "10"), "points go with a line; leave them out"),
+        (("--points", "10"), "points need a line; leave them out"),
         (
             ("--line", "y = 600 mm"),
             "a line keeps two axes fixed; write for example y = 600 mm, z = 600 mm",
         ),
-        (("--magnification", "10"), "--magnification is for the drawing of the grid; leave it out"),
+        (("--magnification", "10"), "--magnification is for the plot of the grid; leave it out"),
         (("--line", "y = 5 m, z = 600 mm"), "the line is outside the volume in y"),
         (
             ("--error", "EXX", "--magnification", "10"),
-            "--magnification is for the drawing of the grid; leave it out",
+            "--magnification is for the plot of the grid; leave it out",
         ),
     ],
 )

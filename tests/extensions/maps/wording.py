@@ -9,7 +9,7 @@ CARRIES_CARRIES_THE_PROBE = (
     "FB1: x carries z carries the probe, y carries the workpiece; errors are the tip's position"
 )
 CHANGE_NONE_OF_THESE_LENGTHS = (
-    "change none of these lengths, but may change those of another --grid"
+    "leave these lengths unchanged, but may change those of another --grid"
 )
 DEGREES_OF_FREEDOM_IS_ITSELF_UNCERTAIN = "degrees of freedom is itself uncertain by"
 DOES_NOT_HOLD_WHAT_CERTIFICATES_DO = "does not hold what certificates do"
@@ -22,7 +22,7 @@ LENGTHS_ARE_UNDETERMINED_AND_MEET = "lengths are undetermined and meet no target
 LENGTHS_BETWEEN_POINTS = "153 lengths between 18 points of a grid, with the probe down"
 MADE_TO_READ_CANNOT_FOLLOW = "X made to read .* cannot follow"
 MET_BY_THE_STANDARD_UNCERTAINTY = "met by the standard uncertainty u of"
-NOTHING_THAT_IS_DETERMINED_IN_BOTH = "nothing that is determined in both can be tested"
+NOTHING_THAT_IS_DETERMINED_IN_BOTH = "no value is determined in both"
 NO_CERTIFIED_VALUE_IN_COMMON = "no certified value in common"
 NO_CHANGE_IS_SHOWN = "no change is shown"
 OF_POINTS_LIE_OUTSIDE_THE_VOLUME = "1 of 3 points lie outside the volume of the map"
