@@ -77,7 +77,7 @@ def _check_model(
         found = _machine_of_file(settings.file, steps, references)
         if found is None:
             return False
-        settings.of(found)
+        settings.set_machine(found)
     if isinstance(settings, PythonSettings):
         settings.beside(references.folder, references.trust)
         if machine is None:
@@ -126,7 +126,7 @@ def _true_machine_of_file(
     found = _machine_of_file(truth.file, ("true_machine",), references, references.problems.doubts)
     if found is None:
         return
-    truth.of(found)
+    truth.set_machine(found)
     random = random_part(found)
     if random and truth.random_part is None:
         text = (
@@ -239,7 +239,7 @@ def _read_curves(truth: CurvesSettings, machine: Machine | None, references: Ref
                 " of it"
             )
             problems.add(steps, text)
-    truth.of(curves)
+    truth.set_curves(curves)
 
 
 _TRUE_MODEL = ("true_machine", "error_model")

@@ -131,7 +131,7 @@ def _model(
         return None
     try:
         if isinstance(own, MachineFileSettings):
-            own.of(load_machine(trust.file(folder, own.file), trust=trust))
+            own.set_machine(load_machine(trust.file(folder, own.file), trust=trust))
         elif isinstance(own, PythonSettings):
             own.beside(folder, trust)
         wrong = list(kind.wrong(own, d))

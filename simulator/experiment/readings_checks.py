@@ -98,6 +98,8 @@ def _read_correction(settings: ReadingsSettings, references: References) -> None
     from .machine_file import load_machine
 
     try:
-        correction.of(load_machine(references.file(correction.file), trust=references.trust))
+        correction.set_machine(
+            load_machine(references.file(correction.file), trust=references.trust)
+        )
     except ExperimentError as error:
         references.problems.take(error, steps)

@@ -44,7 +44,7 @@ def read_true_map(truth: TrueMapSettings, machine: Machine | None, references: R
         root = found.root
         a = a + (root @ generator.standard_normal(root.shape[1]))[: len(a)]
     content = hashlib.sha256(read_bytes(references.file(truth.file))).hexdigest()
-    truth.of(TrueMachine(found.model, a), content)
+    truth.set_machine(TrueMachine(found.model, a), content)
     if found.undetermined.shape[1]:
         text = (
             f"has {found.undetermined.shape[1]} undetermined directions, in which the true machine"

@@ -1,4 +1,4 @@
-"""Places of balls: on their artefact, and in the machine for each position of the artefact."""
+"""Ball co-ordinates: on the artefact, and in the machine for each of its positions."""
 
 from __future__ import annotations
 

@@ -1,8 +1,7 @@
-"""Artefacts: their keys in an experiment file, and the places of their balls in their own
-frames.
+"""Artefacts: their keys in an experiment file and the co-ordinates of their balls.
 
-A further kind of the kernel is one file with a subclass of `ArtefactSettings` that has a
-``layout``, and one line in ``ARTEFACTS``; extensions have their own.
+A new artefact of the kernel is one file with a subclass of `ArtefactSettings` that has a
+``layout``, and one line in ``ARTEFACTS``; extensions provide their own.
 """
 
 from __future__ import annotations
@@ -50,8 +49,8 @@ class GridSettings(ArtefactSettings):
     def layout(self) -> BallLayout:
         """Return (columns × rows) balls, row by row."""
         columns, rows = self.balls
-        places = [(row, column) for row in range(rows) for column in range(columns)]
-        return _rectangle(places, (columns, rows), self.size)
+        cells = [(row, column) for row in range(rows) for column in range(columns)]
+        return _rectangle(cells, (columns, rows), self.size)
 
 
 class SquareSettings(ArtefactSettings):
@@ -64,12 +63,12 @@ class SquareSettings(ArtefactSettings):
     def layout(self) -> BallLayout:
         """Return 4 × (balls per side - 1) balls, row by row."""
         last = self.balls - 1
-        places = [
+        cells = [
             (row, column)
             for row in range(self.balls)
             for column in (range(self.balls) if row in (0, last) else (0, last))
         ]
-        return _rectangle(places, (self.balls, self.balls), (self.size, self.size))
+        return _rectangle(cells, (self.balls, self.balls), (self.size, self.size))
 
 
 def _form_of_coordinates(value: object) -> str:
@@ -110,7 +109,9 @@ class BallsSettings(ArtefactSettings):
     @model_validator(mode="after")
     def _one_source(self) -> Self:
         if (self.coordinates is None) == (self.file is None):
-            raise ValueError('needs either "coordinates" or "file"; give exactly one of them')
+            raise ValueError(
+                'neither or both of "coordinates" and "file" are given; give exactly one'
+            )
         return self
 
     def layout(self) -> BallLayout:
@@ -137,7 +138,7 @@ class TwoSpheresSettings(ArtefactSettings):
     length: PositiveLength = Field(description="distance between the two balls")
 
     def layout(self) -> BallLayout:
-        """Return two balls, whose only pair is corner sides, neighbours and all."""
+        """Return two balls; their only pair is in every set."""
         only: Pairs = ((0, 1),)
         return BallLayout(
             ("1", "2"),
@@ -148,7 +149,7 @@ class TwoSpheresSettings(ArtefactSettings):
 
 
 class SphereSettings(ArtefactSettings):
-    """A single ball, as the reference sphere that probes are qualified with; named 1."""
+    """A single ball, named 1, such as the reference sphere for qualifying probes."""
 
     kind: Literal["sphere"] = Field(description="a single ball, as the reference sphere of probes")
 
@@ -158,31 +159,29 @@ class SphereSettings(ArtefactSettings):
 
 
 class BryanGaugeSettings(ArtefactSettings):
-    """A ball that is carried around a fixed ball, which is not read, at the end of a bar."""
+    """A ball at the end of a bar that pivots about a fixed ball, which is not read."""
 
     kind: Literal["bryan_gauge"] = Field(
         description="a ball on a bar that pivots about a fixed ball"
     )
     role: Literal["plate", "length_standard"] = Field(
-        "length_standard", description="length_standard: a Bryan gauge only carries its radius"
+        "length_standard", description="length_standard: a Bryan gauge has only its radius"
     )
-    radius: PositiveLength = Field(description="distance of the two balls, as drawn")
+    radius: PositiveLength = Field(description="nominal distance between the two balls")
     directions: DirectionsSettings = Field(  # type: ignore[valid-type,unused-ignore]
-        description=f"of the bar in the places where its ball is read, named 1, 2, …: {DIRECTIONS}"
+        description=f"of the bar at each reading of its ball, named 1, 2, …: {DIRECTIONS}"
     )
 
     @model_validator(mode="after")
     def _no_plate(self) -> Self:
         if self.role == "plate":
-            raise ValueError(
-                "a Bryan gauge only carries its radius and is no plate; remove its role"
-            )
+            raise ValueError("a Bryan gauge is a length standard, not a plate; remove its role")
         return self
 
     def layout(self) -> BallLayout:
-        """Return the places where the ball is read, about the pivot."""
-        places = self.radius * directions(self.directions)
-        return BallLayout(tuple(str(i + 1) for i in range(len(places))), frozen(places))
+        """Return the read points of the ball, about the pivot."""
+        centres = self.radius * directions(self.directions)
+        return BallLayout(tuple(str(i + 1) for i in range(len(centres))), frozen(centres))
 
 
 ARTEFACTS: Mapping[str, type[ArtefactSettings]] = {
@@ -204,14 +203,14 @@ else:
 
 
 def _rectangle(
-    places: list[tuple[int, int]], shape: tuple[int, int], size: tuple[float, float]
+    cells: list[tuple[int, int]], shape: tuple[int, int], size: tuple[float, float]
 ) -> BallLayout:
     columns, rows = shape
-    index = {place: i for i, place in enumerate(places)}
+    index = {cell: i for i, cell in enumerate(cells)}
     coordinates = [
         # Multiplied before divided, so that the last ball is exactly at the size.
         (size[0] * column / (columns - 1), size[1] * row / (rows - 1), 0.0)
-        for row, column in places
+        for row, column in cells
     ]
     lower_left, lower_right = index[0, 0], index[0, columns - 1]
     upper_left, upper_right = index[rows - 1, 0], index[rows - 1, columns - 1]
@@ -234,9 +233,8 @@ def _rectangle(
         "corners": sides + diagonals,
         "neighbours": neighbours,
     }
-    if len(places) == columns * rows:
-        # From the upper left to the lower right; with these the net of distances is rigid in its
-        # plane.
+    if len(cells) == columns * rows:
+        # Braces make the net of distances rigid in its plane: upper left to lower right.
         braces = tuple(
             (index[row + 1, column], index[row, column + 1])
             for row in range(rows - 1)
@@ -245,7 +243,7 @@ def _rectangle(
         every = neighbours + braces + sides + diagonals
         sets["braced"] = tuple(dict.fromkeys((min(pair), max(pair)) for pair in every))
     return BallLayout(
-        tuple(f"r{row + 1}c{column + 1}" for row, column in places),
+        tuple(f"r{row + 1}c{column + 1}" for row, column in cells),
         frozen(coordinates),
         sets,
         (lower_left, lower_right, upper_left, upper_right),

@@ -1,8 +1,7 @@
-"""The axes of a plate itself, which two of its balls define: an origin, and a ball that lies on one
-of the axes.
+"""Axes of a plate, defined by two of its balls: the origin and a ball on one axis.
 
-They make co-ordinates comparable, whatever frame an estimate was made in (NBSIR 79-1752, section
-2). The axes are those of two dimensions.
+They make co-ordinates from fits in different frames comparable (NBSIR 79-1752, section 2). The
+axes are two-dimensional.
 """
 
 from __future__ import annotations
@@ -21,9 +20,7 @@ ON_AXIS = 1e-6
 
 @dataclass(frozen=True)
 class PlateAxes:
-    """The ball at the origin and the one on axis 0 (x) or 1 (y), on its negative half where `sign`
-    is -1.
-    """
+    """The balls at the origin and on axis 0 (x) or 1 (y); `sign` -1: on its negative half."""
 
     origin: int
     ball: int
@@ -32,14 +29,13 @@ class PlateAxes:
 
 
 def plate_axes(layout: BallLayout, settings: AxesSettings | None = None) -> PlateAxes | None:
-    """The axes of a plate as its settings state them, or sensible ones; None for a single ball.
+    """Return the stated axes of a plate or default ones; ``None`` for a single ball.
 
-    Without settings the first ball is the origin. The x axis goes through the farthest ball that
-    nominally lies on it; if there is none, the y axis through the farthest on that; otherwise the x
-    axis through the ball that is farthest along it. The half of the axis is the one where the ball
-    nominally is.
+    By default the first ball is the origin, and the axis goes through the farthest ball that
+    nominally lies on x, otherwise on y. If no ball lies on either, the x axis goes through the
+    ball farthest along x.
 
-    :raises KeyError: the settings name a ball that the layout has not.
+    :raises KeyError: a stated ball is not in the layout.
 
     >>> layout = BallLayout(("a", "b", "c"), np.array([[0.0, 0, 0], [0, 0.2, 0], [0.3, 0.1, 0]]))
     >>> plate_axes(layout)
@@ -60,21 +56,19 @@ def plate_axes(layout: BallLayout, settings: AxesSettings | None = None) -> Plat
     return PlateAxes(origin, ball, axis, -1.0 if along < 0.0 else 1.0)
 
 
-def _farthest(places: NDArray[np.float64]) -> tuple[int, int]:
-    """The ball that fixes an axis best, and which one, from places (n, 2) relative to the
-    origin.
-    """
-    distance = np.linalg.norm(places, axis=1)
+def _farthest(offsets: NDArray[np.float64]) -> tuple[int, int]:
+    """Return the ball that fixes an axis best, and the axis, from offsets (n, 2) to the origin."""
+    distance = np.linalg.norm(offsets, axis=1)
     for axis in (0, 1):
-        on_axis = np.abs(places[:, 1 - axis]) <= ON_AXIS * distance
-        reach = np.where(on_axis, np.abs(places[:, axis]), 0.0)
+        on_axis = np.abs(offsets[:, 1 - axis]) <= ON_AXIS * distance
+        reach = np.where(on_axis, np.abs(offsets[:, axis]), 0.0)
         if reach.max() > 0.0:
             return int(reach.argmax()), axis
-    return int(np.abs(places[:, 0]).argmax()), 0
+    return int(np.abs(offsets[:, 0]).argmax()), 0
 
 
 def axes_words(axes: PlateAxes, names: tuple[str, ...]) -> str:
-    """The axes in words.
+    """Return a description of the axes.
 
     >>> axes_words(PlateAxes(0, 1, 1), ("a", "b"))
     'origin: ball a, y axis through ball b'
@@ -87,8 +81,7 @@ def axes_words(axes: PlateAxes, names: tuple[str, ...]) -> str:
 def in_plate_axes(
     balls: NDArray[np.float64], axes: PlateAxes
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Co-ordinates (n, 2) of balls (n, 2) in the plate's axes, and the rotation (2, 2) that they
-    are turned by.
+    """Return co-ordinates (n, 2) of balls (n, 2) in the plate's axes, and their rotation (2, 2).
 
     >>> in_plate_axes(np.array([[1.0, 1.0], [1.0, 3.0]]), PlateAxes(0, 1, 0))[0].tolist()
     [[0.0, 0.0], [2.0, 0.0]]

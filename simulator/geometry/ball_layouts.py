@@ -1,6 +1,6 @@
-"""Balls of an artefact in its own frame, and what settings of artefacts of every kind have.
+"""Balls of an artefact in its own frame, and the keys that all artefacts have.
 
-Kinds of artefacts are built on this, each in a file of its own or in `artefacts`.
+Each artefact, in `artefacts` or a file of its own, builds on this.
 """
 
 from __future__ import annotations
@@ -31,13 +31,12 @@ class LayoutError(ValueError):
 class BallLayout:
     """The balls of an artefact in its own frame.
 
-    ``names``: (n,) texts. ``coordinates``: (n, 3) nominal centres in metres. ``pair_sets``: name of
-    a set → pairs of ball indices, without "all". ``corner_set``: indices of the corner balls, empty
-    where undefined.
+    ``names``: (n,) texts. ``coordinates``: (n, 3) nominal centres in metres. ``pair_sets``: name
+    of a set → pairs of ball indices, without "all". ``corner_set``: indices of the corner balls,
+    empty if undefined.
 
-    :raises LayoutError: there are no balls, names are not one for each place or not unique, places
-        are no finite co-ordinates (n, 3), or a set is called "all" or names balls that there are
-        not.
+    :raises LayoutError: no balls, names that are not unique or not n, co-ordinates that are not
+        finite or not (n, 3), or a set called "all" or with an index outside 0 to n - 1.
     """
 
     names: tuple[str, ...]
@@ -56,7 +55,7 @@ class BallLayout:
         if twice:
             raise LayoutError(f"several balls are named {listing(twice)}; give each its own name")
         if not np.isfinite(self.coordinates).all():
-            raise LayoutError("coordinates are not finite; give places in metres")
+            raise LayoutError("coordinates are not finite; give finite ones in metres")
         if "all" in self.pair_sets:
             raise LayoutError('"all" always is the set of all pairs; leave it out of pair_sets')
         for name, chosen in {**self.pair_sets, "corner_set": self.corner_set}.items():
@@ -67,14 +66,14 @@ class BallLayout:
                 or not 0 <= index.min() <= index.max() < n
                 or (tail and (index[:, 0] == index[:, 1]).any())
             ):
-                what = "pairs of two different indices" if tail else "indices"
-                raise LayoutError(f"{name} has others than balls 0 to {n - 1}; give {what}")
+                content = "pairs of two different indices" if tail else "indices"
+                raise LayoutError(f"{name} is not within balls 0 to {n - 1}; give {content}")
 
 
 def pairs(layout: BallLayout, set_name: str) -> NDArray[np.intp]:
     """Return the ball indices of a named pair set, (m, 2).
 
-    :raises ValueError: the set is not defined for this artefact; the message names those that are.
+    :raises ValueError: the set is undefined for this artefact; the message lists the defined ones.
     """
     if set_name == "all":
         return np.column_stack(np.triu_indices(len(layout.names), k=1))
@@ -100,24 +99,23 @@ def corners(layout: BallLayout) -> NDArray[np.intp]:
 
 
 def coincident_balls(layout: BallLayout, at_most: int = 3) -> list[tuple[int, int]]:
-    """Return pairs of balls nearer than a nanometre to each other, not many more than asked for."""
-    found: list[tuple[int, int]] = []
-    # Along a line askew to all that balls are usually in rows along, only coinciding balls are as
-    # far as one another.
+    """Return pairs of balls less than a nanometre apart, `at_most` or slightly more."""
+    coincident: list[tuple[int, int]] = []
+    # Projected on a line askew to all usual rows of balls, only coincident balls are equally far.
     along = layout.coordinates @ (0.6139, 0.5243, 0.5901)
     order = np.argsort(along, kind="stable")
     along = along[order]
     for shift in range(1, len(order)):
         near = np.flatnonzero(along[shift:] - along[:-shift] < COINCIDENT)
-        if not len(near) or len(found) >= at_most:
+        if not len(near) or len(coincident) >= at_most:
             break
         first, second = order[near], order[near + shift]
         differences = layout.coordinates[second] - layout.coordinates[first]
         near = np.flatnonzero(np.linalg.norm(differences, axis=1) < COINCIDENT)
-        found += [
+        coincident += [
             (int(min(pair)), int(max(pair))) for pair in zip(first[near], second[near], strict=True)
         ]
-    return sorted(found)
+    return sorted(coincident)
 
 
 def _text_of_whole_number(value: object) -> object:
@@ -132,24 +130,22 @@ BallsPerSide = Annotated[int, Field(ge=2, le=500)]
 
 
 class AxesSettings(Settings):
-    """The axes in which a plate's co-ordinates are reported: the ball at the origin, and one on the
-    x or the y axis.
+    """Axes in which a plate's co-ordinates are reported: the ball at the origin, and one on x or
+    y.
     """
 
     origin: Name = Field(description="the ball at the origin")
     x: Name | None = Field(
-        None, description="the ball on the x axis, on the half where it nominally is; this or y"
+        None, description="the ball on the x axis, on its nominal half; this or y"
     )
     y: Name | None = Field(
-        None, description="the ball on the y axis, on the half where it nominally is; this or x"
+        None, description="the ball on the y axis, on its nominal half; this or x"
     )
 
     @model_validator(mode="after")
     def _two_balls(self) -> Self:
         if (self.x is None) == (self.y is None):
-            raise ValueError(
-                'needs either "x" or "y", the ball that lies on that axis; give exactly one of them'
-            )
+            raise ValueError('neither or both of "x" and "y" are given; name one ball, on one axis')
         if self.origin in (self.x, self.y):
             raise ValueError(
                 f'ball "{self.origin}" cannot be the origin and fix an axis too; name another one'
@@ -158,13 +154,13 @@ class AxesSettings(Settings):
 
 
 class ArtefactSettings(Settings):
-    """What artefacts of every kind have."""
+    """Keys that all artefacts have."""
 
     kind: str
     role: Literal["plate", "length_standard"] = Field(
         "plate",
         description=(
-            "plate: its ball co-ordinates are estimated; length_standard: it only carries distances"
+            "plate: its ball co-ordinates are estimated; length_standard: it has only distances"
         ),
     )
     reads: Literal["in space", "in plane"] = Field(
@@ -200,7 +196,7 @@ class ArtefactSettings(Settings):
 
 
 def frozen(values: Any) -> NDArray[np.float64]:
-    """Return values as an array that cannot be changed."""
+    """Return values as a read-only array."""
     array = np.array(values, dtype=float)
     array.setflags(write=False)
     return array

@@ -10,7 +10,7 @@ from .motions import Array
 
 
 def grid_points(sides: Iterable[Array]) -> Array:
-    """Points (n, d) of a grid with co-ordinates along each of d axes, the last changing fastest.
+    """Return points (n, d) of a grid with co-ordinates along each of d axes, the last fastest.
 
     >>> grid_points([np.array([1.0, 2.0]), np.array([3.0, 4.0])]).tolist()
     [[1.0, 3.0], [1.0, 4.0], [2.0, 3.0], [2.0, 4.0]]
@@ -22,7 +22,7 @@ def grid_points(sides: Iterable[Array]) -> Array:
 def even_grid(
     lower: Sequence[float] | Array, upper: Sequence[float] | Array, counts: Iterable[int]
 ) -> Array:
-    """Points (n, d) of a grid of so many along each axis, evenly spread between two corners (d,).
+    """Return grid points (n, d), `counts` along each axis, evenly spread between two corners (d,).
 
     >>> even_grid(np.zeros(2), np.ones(2), (2, 1)).tolist()
     [[0.0, 0.0], [1.0, 0.0]]

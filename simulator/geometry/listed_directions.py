@@ -44,13 +44,15 @@ class GeneratedDirectionsSettings(Settings):
 
     @model_validator(mode="after")
     def _one_kind(self) -> Self:
-        stated = [key for key in (*LISTED, "random", *DRAWN) if getattr(self, key) is not None]
-        if self.random is None and not set(LISTED) <= set(stated):
+        stated_keys = [key for key in (*LISTED, "random", *DRAWN) if getattr(self, key) is not None]
+        if self.random is None and not set(LISTED) <= set(stated_keys):
             raise ValueError(
                 "needs either azimuths and elevations, or random; write {random: 60, lowest: 20"
                 " deg}"
             )
-        misplaced = [key for key in stated if key in (DRAWN if self.random is None else LISTED)]
+        misplaced = [
+            key for key in stated_keys if key in (DRAWN if self.random is None else LISTED)
+        ]
         if misplaced:
             kind = "a grid" if self.random is None else "random directions"
             raise ValueError(f'"{misplaced[0]}" has no meaning with {kind}; remove it')
@@ -90,7 +92,7 @@ DIRECTIONS = (
 def directions(
     settings: GeneratedDirectionsSettings | tuple[tuple[float, float], ...],
 ) -> NDArray[np.float64]:
-    """Unit vectors (m, 3).
+    """Return unit vectors (m, 3).
 
     >>> directions(((0.0, 0.0), (np.pi / 2, 0.0))).round(9).tolist()
     [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]
@@ -102,7 +104,7 @@ def directions(
             np.random.SeedSequence(1 if settings.seed is None else settings.seed)
         )
         turn, height = generator.random((2, settings.random))
-        # Equal heights of a sphere have equal areas.
+        # Zones of equal height on a sphere have equal areas.
         low, high = np.sin(settings._zone())
         return _unit_vectors(
             np.column_stack([2 * np.pi * turn, np.arcsin(low + (high - low) * height)])

@@ -1,6 +1,4 @@
-"""Rigid motions: their parameters, small rotations as vectors, and the motion that fits two sets of
-points best.
-"""
+"""Rigid motions: parameters, small rotations as vectors, and best fits of two point sets."""
 
 from __future__ import annotations
 
@@ -16,7 +14,7 @@ ACROSS = 1e-6
 
 
 def cross_matrices(v: Array) -> Array:
-    """Matrices (m, 3, 3) whose product with a small rotation is rotation x v.
+    """Return matrices (m, 3, 3) whose product with a small rotation is rotation x v.
 
     >>> cross_matrices(np.array([[1.0, 2.0, 3.0]]))[0].tolist()
     [[0.0, 3.0, -2.0], [-3.0, 0.0, 1.0], [2.0, -1.0, 0.0]]
@@ -29,8 +27,7 @@ def cross_matrices(v: Array) -> Array:
 
 
 def rotation_from_vector(vector: Array) -> Array:
-    """Rotation matrices (m, d, d) that turn by `vector`: (m, 3) about an axis in space, (m, 1) in
-    the plane.
+    """Return rotations (m, d, d) by `vector`: (m, 3) about an axis in space, (m, 1) in the plane.
 
     >>> rotation_from_vector(np.array([[np.pi / 2]])).round(12).tolist()
     [[[0.0, -1.0], [1.0, 0.0]]]
@@ -47,7 +44,7 @@ def rotation_from_vector(vector: Array) -> Array:
 
 
 def vector_from_rotation(rotation: Array) -> Array:
-    """Inverse of `rotation_from_vector` for turns below pi: (m, 3) or (m, 1) from (m, d, d).
+    """Invert `rotation_from_vector` for turns below pi: (m, 3) or (m, 1) from (m, d, d).
 
     >>> vector_from_rotation(rotation_from_vector(np.array([[0.1, -0.2, 0.3]]))).round(12).tolist()
     [[0.1, -0.2, 0.3]]
@@ -68,8 +65,8 @@ def vector_from_rotation(rotation: Array) -> Array:
 
 
 def vector_rate(vector: Array) -> Array:
-    """Derivative (m, q, q) of `vector_from_rotation` by a further small turn about the machine's
-    axes.
+    """Return the derivative (m, q, q) of `vector_from_rotation` by a small turn about the
+    machine's axes.
     """
     m, q = vector.shape
     if q == 1:
@@ -83,13 +80,15 @@ def vector_rate(vector: Array) -> Array:
 
 
 def fit_motion(source: Array, target: Array) -> tuple[Array, Array]:
-    """Rotation (d, d) and origin (d,) that bring points `source` (n, d) closest to `target` (n, d).
+    """Return rotation (d, d) and origin (d,) that bring points `source` (n, d) closest to `target`
+    (n, d).
 
-    Points in a plane fix a proper rotation in space all the same. Points on a line leave the turn
-    about it open; some rotation is then returned.
+    Points in a plane determine the rotation in space. Points on a line leave the turn about it
+    undetermined; one such rotation is returned.
     """
     centre_source, centre_target = source.mean(axis=0), target.mean(axis=0)
     u, _, vh = np.linalg.svd((target - centre_target).T @ (source - centre_source))
+    # The last sign makes the rotation proper, also if all points lie in a plane.
     sign = np.ones(source.shape[1])
     sign[-1] = np.sign(np.linalg.det(u @ vh))
     rotation = (u * sign) @ vh
@@ -97,7 +96,7 @@ def fit_motion(source: Array, target: Array) -> tuple[Array, Array]:
 
 
 def fixes_pose(points: Array) -> bool:
-    """Whether places of points (n, d) fix a motion: in space of three that are not in line.
+    """Return True if points (n, d) fix a motion: in space three that are not collinear.
 
     >>> fixes_pose(np.array([[0.0, 0.0], [1.0, 0.0]])), fixes_pose(np.zeros((1, 3)))
     (True, False)
@@ -109,45 +108,44 @@ def fixes_pose(points: Array) -> bool:
     return bool(extent[d - 2] > ACROSS * extent[0])
 
 
-def rigid_motions(places: Array) -> Array:
-    """Displacements (n, d, m) of places (n, d) by unit shifts along all axes and unit turns, to
-    first order.
+def rigid_motions(points: Array) -> Array:
+    """Return displacements (n, d, m) of points (n, d) by unit shifts and unit turns, to first
+    order.
     """
-    n, d = places.shape
+    n, d = points.shape
     motions = np.zeros((n, d, d * (d + 1) // 2))
     motions[:, range(d), range(d)] = 1.0
     planes = [(0, 1), (1, 2), (2, 0)] if d == 3 else [(0, 1)]
     for column, (i, j) in enumerate(planes, start=d):
-        motions[:, i, column], motions[:, j, column] = -places[:, j], places[:, i]
+        motions[:, i, column], motions[:, j, column] = -points[:, j], points[:, i]
     return motions
 
 
-def without_rigid_motion(places: Array, errors: Array) -> Array:
-    """Errors (n, d, r) less the small rigid motion of all places (n, d) that each column contains.
-
-    No distance changes by it to first order, and what is left is small where the distances are
-    known well, so that the differences formed from it keep their digits.
-    """
-    n, d = places.shape
+def without_rigid_motion(points: Array, errors: Array) -> Array:
+    """Return errors (n, d, r) less the small rigid motion of points (n, d) in each column."""
+    n, d = points.shape
     if n == 0 or errors.shape[2] == 0:
         return errors
-    motions = rigid_motions(places)
+
+    # A rigid motion changes no distance to first order. The remainder is small if distances are
+    # well determined, so that differences formed from it keep their digits.
+    motions = rigid_motions(points)
     basis, sizes, _ = np.linalg.svd(motions.reshape(n * d, -1), full_matrices=False)
     basis = basis[:, sizes > 1e-12 * sizes.max()]
     flat = errors.reshape(n * d, -1)
-    # Twice, because the second pass takes out what rounding left of a large motion in the first.
+    # The second pass subtracts what rounding left of a large motion in the first.
     for _ in range(2):
         flat = flat - basis @ (basis.T @ flat)
     return flat.reshape(errors.shape)
 
 
 def pose_size(dimension: int) -> int:
-    """Number of parameters of a rigid motion: 6 in space, 3 in the plane."""
+    """Return the number of parameters of a rigid motion: 6 in space, 3 in the plane."""
     return dimension * (dimension + 1) // 2
 
 
 def pose_parameter_names(dimension: int) -> tuple[str, ...]:
-    """Names of a pose's parameters in order.
+    """Return the names of a pose's parameters in order.
 
     >>> pose_parameter_names(2)
     ('origin x', 'origin y', 'rotation z')

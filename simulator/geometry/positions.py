@@ -1,6 +1,4 @@
-"""Positions of an artefact in the machine: conversion of their keys into a rotation and an
-origin.
-"""
+"""Positions of an artefact in the machine: a rotation and an origin from their keys."""
 
 from __future__ import annotations
 
@@ -75,10 +73,10 @@ class FreePlacement:
 def nominal_pose(
     placement: PlanePlacement | FreePlacement, layout: BallLayout, dimension: int
 ) -> Pose:
-    """Return the pose that a placement gives an artefact in a machine of 2 or 3 dimensions.
+    """Return the pose of a placement in a machine of 2 or 3 dimensions.
 
-    :raises ValueError: a placement in a plane other than z in two dimensions, or a free one of
-        another dimension.
+    :raises ValueError: in two dimensions a plane other than z, or a free placement of another
+        dimension.
     """
     if isinstance(placement, FreePlacement):
         if len(placement.origin) != dimension:
@@ -103,7 +101,7 @@ def nominal_pose(
 
 
 def plane_rotation(plane: str, turns: int, dimension: int = 3) -> NDArray[np.float64]:
-    """The rotation (d, d) of an artefact in a plane after quarter-turns."""
+    """Return the rotation (d, d) of an artefact in a plane after quarter-turns."""
     turn = QUARTER_TURNS[turns % 4]
     if dimension == 2:
         return turn.copy()
@@ -114,13 +112,11 @@ def plane_rotation(plane: str, turns: int, dimension: int = 3) -> NDArray[np.flo
 
 
 def bounding_rectangle(layout: BallLayout) -> NDArray[np.float64]:
-    """Return the lower and the upper corner, (2, 2) metres, of the balls in the artefact's x and
-    y.
-    """
+    """Return the lower and upper corner, (2, 2) metres, of the balls in the artefact's x and y."""
     plane = layout.coordinates[:, :2]
     return np.array([plane.min(axis=0), plane.max(axis=0)])
 
 
 def ball_coordinates(pose: Pose, layout: BallLayout) -> NDArray[np.float64]:
-    """Return the nominal co-ordinates (n, d) in metres of an artefact's balls in the machine."""
+    """Return the nominal co-ordinates (n, d) of an artefact's balls in the machine, in metres."""
     return layout.coordinates[:, : len(pose.origin)] @ pose.rotation.T + pose.origin

@@ -1,6 +1,4 @@
-"""Rotations: matrices from angles, and turns that are exact where the angle is a multiple of 90
-degrees.
-"""
+"""Rotation matrices from angles, exact at multiples of 90 degrees."""
 
 from __future__ import annotations
 

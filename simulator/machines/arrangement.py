@@ -1,4 +1,4 @@
-"""Arrangement of a machine's axes as a kinematic chain: which axis carries what."""
+"""Arrangement of a machine's axes as a kinematic chain."""
 
 from __future__ import annotations
 
@@ -9,11 +9,12 @@ AXES = ("x", "y", "z")
 
 @dataclass(frozen=True)
 class Arrangement:
-    """Axes on the probe's side and on the workpiece's side, each listed from the ground outwards.
+    """Axes on the probe's and on the workpiece's side, each listed from the ground outwards.
 
-    An axis on the probe's side carries all axes listed after it and the probe; one on the
-    workpiece's side carries those listed after it and the workpiece. Every axis is on exactly
-    one side.
+    An axis moves all axes listed after it on its side, and the probe or the workpiece. Every axis
+    is on exactly one side.
+
+    :raises ValueError: an axis is missing or repeated.
     """
 
     probe_side: tuple[str, ...]
@@ -21,7 +22,10 @@ class Arrangement:
 
     def __post_init__(self) -> None:
         if sorted(self.probe_side + self.workpiece_side) != list(AXES):
-            raise ValueError("an arrangement names each of the axes x, y, z exactly once")
+            raise ValueError(
+                "an axis is missing or named twice; name each of x, y and z exactly once on the"
+                " two sides together"
+            )
 
 
 ARRANGEMENTS: dict[str, Arrangement] = {

@@ -7,7 +7,7 @@ from typing import Annotated, Literal, Self
 from pydantic import Field, model_validator
 
 from ..inputs.settings import Settings
-from .arrangement import ARRANGEMENTS, AXES, Arrangement
+from .arrangement import ARRANGEMENTS, Arrangement
 
 AxisName = Literal["x", "y", "z"]
 
@@ -16,20 +16,16 @@ class ArrangementSettings(Settings):
     """An arrangement of the axes that has no name of its own."""
 
     probe_side: tuple[AxisName, ...] = Field(
-        default=(), description="Axes that carry the probe, listed from the ground to the probe."
+        default=(), description="Axes that move the probe, listed from the ground to the probe."
     )
     workpiece_side: tuple[AxisName, ...] = Field(
         default=(),
-        description="Axes that carry the workpiece, listed from the ground to the table.",
+        description="Axes that move the workpiece, listed from the ground to the table.",
     )
 
     @model_validator(mode="after")
     def _each_axis_once(self) -> Self:
-        if sorted(self.probe_side + self.workpiece_side) != list(AXES):
-            raise ValueError(
-                "an axis is missing or named twice; name each of x, y and z exactly once on the"
-                " two sides together"
-            )
+        arrangement_of(self)
         return self
 
 
@@ -50,14 +46,16 @@ ArrangementName = Annotated[
     Field(json_schema_extra={"enumDescriptions": list(MEANINGS.values())}),
 ]
 ARRANGEMENT = (
-    "Which axis carries which: a named arrangement, or the axes on either side. "
-    "MB2 (x carries y carries z carries the probe) is NPL's kinematic model."
+    "Order of the axes in the chain: a named arrangement, or the axes on either side. "
+    "MB2 (x moves y, y moves z, z moves the probe) is NPL's kinematic model."
 )
-ROTATIONS = "Whether products of small errors are left out or multiplied out."
+ROTATIONS = (
+    "Treatment of products of small errors: neglected (linearised) or multiplied out (full)."
+)
 
 
 def arrangement_of(settings: str | ArrangementSettings) -> Arrangement:
-    """The arrangement that settings name or list."""
+    """Return the named or listed arrangement."""
     if isinstance(settings, str):
         return ARRANGEMENTS[settings]
     return Arrangement(settings.probe_side, settings.workpiece_side)

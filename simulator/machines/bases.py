@@ -1,12 +1,12 @@
 """Univariate functions on [0, 1]: Chebyshev polynomials, monomials and B-splines behind one
 protocol.
 
-Every family contains 1 and t, or a function in place of t; the rest are interior functions, which
-vanish at both ends. An error function that is zero at 0 takes what vanishes there, one that is zero
-at both ends the interior functions alone: end conditions are met by construction, and so are slopes
-of zero and periodic ends. A slope other than zero is no condition on a basis, whose functions are
-multiplied by any number; `simulator/splines` has fits with such. NPL Report CISE 15/98, section
-2.1.1, has the families, section 2.6 why monomials will not do at high degrees.
+Every family contains 1, t or a substitute for t, and interior functions, which vanish at both
+ends. An error function that is zero at 0 uses those that vanish there; one that is zero at both
+ends uses the interior functions alone. So end conditions hold by construction, as do zero slopes
+and periodic ends. Other slopes would not survive multiplication by a coefficient; fits in
+`simulator/splines` have them. NPL Report CISE 15/98, section 2.1.1, has the families, section 2.6
+the ill-conditioning of monomials at high degrees.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from __future__ import annotations
 from collections import Counter
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Literal, Protocol
+from typing import ClassVar, Literal, Protocol
 
 import numpy as np
 from numpy.polynomial import chebyshev, polynomial
@@ -24,7 +24,7 @@ from .protocol import Array
 
 @dataclass(frozen=True)
 class Quoted:
-    """Functions in the form the field quotes: `matrix` (names, functions) goes to the coefficients
+    """Functions in the form usual in the field: `matrix` (names, functions) gives the coefficients
     of `names`.
     """
 
@@ -33,7 +33,7 @@ class Quoted:
 
 
 class Basis(Protocol):
-    """Functions that vanish at 0, with `zero_at_one` those of them that vanish at 1 too."""
+    """Functions that vanish at 0 and, with `zero_at_one`, at 1."""
 
     def __hash__(self) -> int: ...
 
@@ -46,26 +46,24 @@ class Basis(Protocol):
         ...
 
     def values(self, t: Array) -> Array:
-        """Functions at t (m,), as (m, size)."""
+        """Return the functions at t (m,), as (m, size)."""
         ...
 
     def interior(self) -> Basis:
-        """The interior functions of the family."""
+        """Return the interior functions of the family."""
         ...
 
     def quoted(self, variable: str = "t") -> Quoted:
-        """The functions by monomials of the variable or by B-splines, those left out that are zero
-        throughout.
-        """
+        """Return the functions by monomials or B-splines that are not zero throughout."""
         ...
 
     def quoted_whole(self, variable: str = "t") -> Quoted:
-        """The same for the whole family: 1, t and then the interior functions."""
+        """Return 1, t and the interior functions by monomials or B-splines."""
         ...
 
 
 def whole_values(basis: Basis, t: Array) -> Array:
-    """The whole family at t (m,): 1, t and the interior functions as columns.
+    """Return the whole family at t (m,): 1, t and the interior functions as columns.
 
     >>> whole_values(Polynomial(3), np.array([0.5]))
     array([[1.  , 0.5 , 0.25]])
@@ -74,7 +72,7 @@ def whole_values(basis: Basis, t: Array) -> Array:
 
 
 def power(variable: str, exponent: int) -> str:
-    """Name of a monomial.
+    """Return the name of a monomial.
 
     >>> power("t", 1), power("x", 2)
     ('t^1', 'x^2')
@@ -82,9 +80,33 @@ def power(variable: str, exponent: int) -> str:
     return f"{variable}^{exponent}"
 
 
+class SingleFunction:
+    """A basis of one stated function; `kind` is its source."""
+
+    kind: ClassVar[str]
+
+    @property
+    def zero_at_one(self) -> bool:
+        return False
+
+    @property
+    def size(self) -> int:
+        return 1
+
+    def interior(self) -> Basis:
+        raise TypeError(f"a {self.kind} function is a single one")
+
+    def quoted(self, variable: str = "t") -> Quoted:
+        """Return the function unchanged."""
+        return Quoted((f"as {self.kind}",), np.eye(1))
+
+    def quoted_whole(self, variable: str = "t") -> Quoted:
+        raise TypeError(f"a {self.kind} function is a single one")
+
+
 @dataclass(frozen=True)
 class _Polynomials:
-    """Polynomials with `coefficients` coefficients, the constant counted."""
+    """Polynomials with `coefficients` coefficients, the constant included."""
 
     coefficients: int
     zero_at_one: bool = False
@@ -95,7 +117,7 @@ class _Polynomials:
         return max(self.coefficients - 1 - int(self.zero_at_one), 0)
 
     def interior(self) -> Basis:
-        """The functions that vanish at both ends."""
+        """Return the functions that vanish at both ends."""
         whole: Basis = replace(self, zero_at_one=True)  # type: ignore[assignment]
         return whole
 
@@ -104,13 +126,13 @@ class _Polynomials:
         raise NotImplementedError
 
     def quoted(self, variable: str = "t") -> Quoted:
-        """Coefficients of t, t^2, ..."""
+        """Return coefficients of t, t^2, ..."""
         return Quoted(
             tuple(power(variable, k + 1) for k in range(len(self.monomials))), self.monomials
         )
 
     def quoted_whole(self, variable: str = "t") -> Quoted:
-        """Coefficients of 1, t, t^2, ... for 1, t and the interior functions."""
+        """Return coefficients of 1, t, t^2, ... for 1, t and the interior functions."""
         inner = self.interior().quoted().matrix
         matrix = np.zeros((max(self.coefficients, 2), 2 + inner.shape[1]))
         matrix[0, 0] = matrix[1, 1] = 1.0
@@ -128,7 +150,7 @@ class Polynomial(_Polynomials):
     """
 
     def values(self, t: Array) -> Array:
-        """Basis functions at t (m,), as (m, size)."""
+        """Return the functions at t (m,), as (m, size)."""
         envelope = t * (1.0 - t) if self.zero_at_one else t
         if self.size == 0:
             return np.zeros((len(t), 0))
@@ -169,15 +191,13 @@ class Monomial(_Polynomials):
     """
 
     def values(self, t: Array) -> Array:
-        """Basis functions at t (m,), as (m, size)."""
+        """Return the functions at t (m,), as (m, size)."""
         envelope = 1.0 - t if self.zero_at_one else np.ones_like(t)
         return t[:, None] ** np.arange(1, self.size + 1) * envelope[:, None]
 
     @cached_property
     def monomials(self) -> Array:
-        """Matrix (coefficients - 1, size) from this basis to the monomials t, t^2, ... on [0,
-        1].
-        """
+        """Matrix (coefficients - 1, size) from this basis to the monomials t, t^2, ..."""
         matrix = np.eye(max(self.coefficients - 1, 0), self.size)
         if self.zero_at_one:
             matrix -= np.eye(*matrix.shape, k=-1)
@@ -185,7 +205,7 @@ class Monomial(_Polynomials):
 
 
 Ends = Literal["free", "zero slope at start", "zero slope at end", "zero slopes", "periodic"]
-"""What holds for a spline at 0 and 1 besides its value."""
+"""End conditions of a spline at 0 and 1, beyond its value."""
 
 # Derivatives grow with the inverse of the distance, and are compared between the ends.
 SMALLEST_PIECE = 1e-4
@@ -195,15 +215,14 @@ SMALLEST_PIECE = 1e-4
 class Spline:
     """Splines of an order (degree plus one, at least 2) with interior knots.
 
-    A knot may stand in `knots` up to order - 1 times, each time with one continuous derivative
-    less; order - 2 times leaves value and slope, as between tangent features. Beyond [0, 1] the
+    A knot may occur in `knots` up to order - 1 times, each time with one continuous derivative
+    less; order - 2 times keeps value and slope, as between tangent features. Beyond [0, 1] the
     polynomial of the last piece continues.
 
-    `ends` holds for every function. With free ends, the functions are t and the B-splines N_2 to
-    N_last-1. A slope of zero takes N_2 or N_last-1 away, and t, whose slope is 1 everywhere, gives
-    way to the last B-splines. Periodic ends have the same derivatives 1 to order - 2: such a
-    function is t times some factor, a scale error or squareness, and one that goes on from 1 as
-    from 0.
+    Every function satisfies `ends`. With free ends, the functions are t and the B-splines N_2 to
+    N_last-1. A zero slope removes N_2 or N_last-1, and the last B-splines replace t, whose slope
+    is 1. Periodic ends have equal derivatives 1 to order - 2: t times a factor (a scale error or
+    squareness) plus a periodic function.
 
     >>> Spline(4, (0.5,)).size, Spline(4, (0.5,), zero_at_one=True).size
     (4, 3)
@@ -228,8 +247,8 @@ class Spline:
             )
         if max(Counter(self.knots).values(), default=0) >= self.order:
             raise ValueError(
-                f"a knot is repeated too often at one place; give it {self.order - 1} times at"
-                " most, one less than the order"
+                f"a knot is repeated too often; give it {self.order - 1} times at most, one less"
+                " than the order"
             )
         if self.ends != "free" and self.order < 3:
             raise ValueError(
@@ -262,7 +281,7 @@ class Spline:
 
     @property
     def contains_t(self) -> bool:
-        """Whether t, a straight line, is among the functions that vanish at 0."""
+        """True if t, a straight line, is among the functions that vanish at 0."""
         return self.ends in ("free", "periodic")
 
     @property
@@ -270,7 +289,7 @@ class Spline:
         return np.array([0.0] * self.order + list(self.knots) + [1.0] * self.order)
 
     def values(self, t: Array) -> Array:
-        """Basis functions at t (m,), as (m, size)."""
+        """Return the functions at t (m,), as (m, size)."""
         # SciPy takes longer to import than most experiments to check.
         from scipy.interpolate import BSpline
 
@@ -282,15 +301,15 @@ class Spline:
         return np.column_stack([t if self.contains_t else splines @ self._first, inner])
 
     def interior(self) -> Spline:
-        """The functions that vanish at both ends."""
+        """Return the functions that vanish at both ends."""
         return replace(self, zero_at_one=True)
 
     @cached_property
     def _first(self) -> Array:
-        """Coefficients (count,) of the function that is 1 at 1: of t means of order - 1 successive
-        knots.
-        """
+        """Coefficients (count,) of the function that is 1 at 1."""
+
         if self.contains_t:
+            # The B-spline coefficients of t are means of order - 1 successive knots.
             knots = self._all_knots
             return np.array([knots[j + 1 : j + self.order].mean() for j in range(self.count)])
         # The last B-spline has a slope at 1, and that before it the opposite one.
@@ -321,14 +340,14 @@ class Spline:
         return whole @ null
 
     def quoted(self, variable: str = "t") -> Quoted:
-        """Coefficients of the B-splines that are not zero by the end conditions."""
+        """Return coefficients of the B-splines that are not zero by the end conditions."""
         whole = self.quoted_whole(variable)
         matrix = self._inner if self.zero_at_one else np.column_stack([self._first, self._inner])
         used = np.flatnonzero(matrix.any(axis=1))
         return Quoted(tuple(whole.names[k] for k in used), matrix[used])
 
     def quoted_whole(self, variable: str = "t") -> Quoted:
-        """Coefficients of all B-splines for 1, t and the interior functions."""
+        """Return coefficients of all B-splines for 1, t and the interior functions."""
         t = replace(self, ends="free")._first
         matrix = np.column_stack([np.ones(self.count), t, self._inner])
         return Quoted(tuple(f"N{k + 1}({variable})" for k in range(self.count)), matrix)

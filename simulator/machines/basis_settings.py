@@ -1,4 +1,4 @@
-"""The keys of univariate functions: polynomials or splines along the axes."""
+"""Keys of univariate functions: polynomials or splines along the axes."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ class SlopesSettings(Settings):
                 )
         if self.start is None and self.end is None:
             raise ValueError(
-                "neither start nor end is given; give 0 for one of them or both, or remove the key"
+                "neither start nor end is given; give 0 for one or both, or remove the key"
             )
         return self
 
@@ -59,14 +59,14 @@ class SplineSettings(Settings):
     slopes: SlopesSettings | None = Field(
         default=None,
         description=(
-            "Slopes of zero, as {start: 0, end: 0} or one of them. In an empirical model they hold"
-            " for the functions besides 1, x, y and z."
+            "Slopes of zero, as {start: 0, end: 0} or either. In an empirical model they hold"
+            " for all functions except 1, x, y and z."
         ),
     )
     periodic: bool = Field(
         default=False,
         description=(
-            "Slope and further derivatives are the same at both ends; values are, but for a"
+            "Slope and further derivatives are equal at both ends; values are, except for a"
             " straight line."
         ),
     )
@@ -81,10 +81,10 @@ class SplineSettings(Settings):
             raise ValueError(
                 "boundaries of features are out of order; give each once, in ascending order"
             )
-        both = sorted(set(self.features) & set(self.knots))
-        if both:
+        shared = sorted(set(self.features) & set(self.knots))
+        if shared:
             raise ValueError(
-                f"{both[0]:g} is among the knots and the features; leave it out of the knots"
+                f"{shared[0]:g} is among the knots and the features; leave it out of the knots"
             )
         if self.periodic and self.slopes is not None:
             raise ValueError("periodic ends have slopes of their own; remove slopes or periodic")
@@ -92,7 +92,7 @@ class SplineSettings(Settings):
         return self
 
     def spline(self) -> Spline:
-        """The functions described.
+        """Return the spline.
 
         >>> SplineSettings(features=(0.5,)).spline().knots
         (0.5, 0.5)
@@ -122,17 +122,17 @@ BASIS = (
 
 
 def basis_of(settings: Any, coefficients: int) -> Basis:
-    """The functions that settings describe; polynomials have so many coefficients."""
+    """Return the described functions; polynomials have the given number of coefficients."""
     if isinstance(settings, SplineSettings):
         return settings.spline()
     return Monomial(coefficients) if settings == "monomial" else Polynomial(coefficients)
 
 
 def without(settings: Settings, keys: tuple[str, ...], instead: str) -> None:
-    """Refuse keys that are stated and have no meaning with something else.
+    """Refuse stated keys that have no meaning with `instead`.
 
-    :raises ValueError: one of them is stated.
+    :raises ValueError: a key is stated.
     """
-    stated = [key for key in keys if key in settings.model_fields_set]
-    if stated:
-        raise ValueError(f'"{stated[0]}" has no meaning with {instead}; remove it')
+    stated_keys = [key for key in keys if key in settings.model_fields_set]
+    if stated_keys:
+        raise ValueError(f'"{stated_keys[0]}" has no meaning with {instead}; remove it')

@@ -1,9 +1,7 @@
-"""A machine with measured error curves: a kinematic model whose functions are the curves
-themselves.
+"""A machine with measured error curves: a kinematic model whose functions are the curves.
 
-Values are taken as they are: nothing is subtracted, so that curves which are not zero at the lower
-corner, or straightness curves which are not zero at the far end, belong to another frame than the
-estimated models'.
+Values remain unchanged. Curves that are not zero at the lower corner, or straightness curves that
+are not zero at the far end, therefore belong to another frame than estimated models.
 """
 
 from __future__ import annotations
@@ -19,7 +17,7 @@ from ..splines.polynomial_pieces import pieces
 from ..splines.space import SplineSpace
 from ..splines.spline_fit import SplineFit, fit
 from .arrangement import Arrangement
-from .bases import Basis, Quoted
+from .bases import SingleFunction
 from .error_names import AXIS_ERRORS
 from .kinematic import ErrorFunction, KinematicModel
 from .plane import PlaneModel, in_space
@@ -31,15 +29,13 @@ NAMES = tuple(AXIS_ERRORS)
 
 @dataclass(frozen=True)
 class Points:
-    """A measured curve: values, in metres or radians, at ascending positions along the axis in
-    metres.
-    """
+    """A measured curve: values (m or rad) at ascending positions along the axis in metres."""
 
     positions: tuple[float, ...]
     values: tuple[float, ...]
 
     def curve(self, interpolation: Interpolation, lower: float, upper: float) -> Curve:
-        """The function of t that is 0 at `lower` and 1 at `upper`, both in metres."""
+        """Return the function of t that is 0 at `lower` and 1 at `upper`, both in metres."""
         # Positions may differ by less than fractions of a long axis can.
         t, first = np.unique(
             (np.array(self.positions) - lower) / (upper - lower), return_index=True
@@ -47,35 +43,9 @@ class Points:
         return Curve(tuple(t.tolist()), tuple(self.values[k] for k in first), interpolation)
 
 
-class SingleFunction:
-    """What a basis of one function, a stated one, has in common; `kind` says where it comes
-    from.
-    """
-
-    kind: ClassVar[str]
-
-    @property
-    def zero_at_one(self) -> bool:
-        return False
-
-    @property
-    def size(self) -> int:
-        return 1
-
-    def interior(self) -> Basis:
-        raise TypeError(f"a {self.kind} function is a single one")
-
-    def quoted(self, variable: str = "t") -> Quoted:
-        """The function as it is."""
-        return Quoted((f"as {self.kind}",), np.eye(1))
-
-    def quoted_whole(self, variable: str = "t") -> Quoted:
-        raise TypeError(f"a {self.kind} function is a single one")
-
-
 @dataclass(frozen=True)
 class Curve(SingleFunction):
-    """One function, through values at ascending t; beyond its ends it keeps its end values.
+    """One function, through values at ascending t; constant beyond its ends.
 
     >>> Curve((0.0, 1.0), (0.0, 2e-6), "linear").values(np.array([0.5, 1.2]))
     array([[1.e-06],
@@ -89,7 +59,7 @@ class Curve(SingleFunction):
     kind: ClassVar[str] = "measured"
 
     def values(self, t: Array) -> Array:
-        """The curve at t (m,), as (m, 1)."""
+        """Return the curve at t (m,), as (m, 1)."""
         if self.interpolation == "linear" or len(self.t) < 3:
             return np.interp(t, self.t, self.y)[:, None]
         # SciPy takes longer to import than most experiments to check.
@@ -101,8 +71,10 @@ class Curve(SingleFunction):
 
 @dataclass(frozen=True)
 class SmoothCurve(Curve):
-    """Polynomials in place of the values, which are then those fitted: `pieces` are coefficients of
-    1, u, u^2, … with u the distance in t from each of the `breaks` but the last.
+    """Polynomials fitted to the values.
+
+    `pieces` are coefficients of 1, u, u^2, … with u the distance in t from each of the `breaks`
+    except the last.
     """
 
     breaks: tuple[float, ...] = ()
@@ -111,20 +83,22 @@ class SmoothCurve(Curve):
     kind: ClassVar[str] = "fitted"
 
     def values(self, t: Array) -> Array:
-        """The polynomials at t (m,), as (m, 1)."""
-        held = np.clip(t, self.t[0], self.t[-1])
-        piece = np.clip(np.searchsorted(self.breaks, held, "right") - 1, 0, len(self.pieces) - 1)
-        u = held - np.asarray(self.breaks)[piece]
-        found = np.zeros(len(u))
+        """Return the polynomials at t (m,), as (m, 1)."""
+        clipped = np.clip(t, self.t[0], self.t[-1])
+        piece = np.clip(np.searchsorted(self.breaks, clipped, "right") - 1, 0, len(self.pieces) - 1)
+        u = clipped - np.asarray(self.breaks)[piece]
+        result = np.zeros(len(u))
         for coefficients in np.asarray(self.pieces).T[::-1]:
-            found = found * u + coefficients[piece]
-        return found[:, None]
+            result = result * u + coefficients[piece]
+        return result[:, None]
 
 
 @dataclass(frozen=True)
 class SmoothedPoints(Points):
-    """A measured curve of which the least-squares spline of an `order` (degree plus one) counts,
-    with interior `knots` in metres; without knots it is one polynomial.
+    """A measured curve, replaced by its least-squares spline.
+
+    `order` is degree plus one, `knots` are interior knots in metres; without knots the spline is
+    one polynomial.
     """
 
     order: int = 4
@@ -140,19 +114,19 @@ class SmoothedPoints(Points):
         return fit(space, np.asarray(self.positions), np.asarray(self.values))
 
     def curve(self, interpolation: Interpolation, lower: float, upper: float) -> SmoothCurve:
-        """The function of t that is 0 at `lower` and 1 at `upper`, both in metres.
+        """Return the fitted function of t that is 0 at `lower` and 1 at `upper`, both in metres.
 
         :raises SplineError: the points do not determine it.
         """
-        found, length = pieces(self.fitted), upper - lower
+        fitted, length = pieces(self.fitted), upper - lower
         powers = length ** np.arange(self.order)
         plain = super().curve(interpolation, lower, upper)
         return SmoothCurve(
             plain.t,
             plain.y,
             interpolation,
-            tuple(((found.breaks - lower) / length).tolist()),
-            tuple(map(tuple, (found.coefficients * powers).tolist())),
+            tuple(((fitted.breaks - lower) / length).tolist()),
+            tuple(map(tuple, (fitted.coefficients * powers).tolist())),
         )
 
 
@@ -164,10 +138,10 @@ def curves_model(
     upper: tuple[float, ...],
     full_rotations: bool = False,
 ) -> ErrorModel:
-    """The machine with the given curves by ISO 230-1 name, each multiplied by a parameter; other
-    functions are zero.
+    """Return the machine with curves by ISO 230-1 name, each times a parameter; other functions
+    are zero.
 
-    In a volume of two dimensions those count that move points of the plane of x and y within it.
+    In two dimensions, errors count that move points of the xy plane within it.
     """
     plane = len(lower) == 2
     functions = []

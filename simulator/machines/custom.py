@@ -1,7 +1,7 @@
-"""A user's own error model: found by name, called, and checked against the protocol.
+"""A user's own error model: imported by name, called, and checked against the protocol.
 
-Whatever goes wrong in the user's code is told as a message about the experiment file, with the
-place in that code.
+Errors in the user's code become messages about the experiment file, with their location in that
+code.
 """
 
 from __future__ import annotations
@@ -24,8 +24,7 @@ from .protocol import Array, ErrorModel, Line, Parameter, Reported
 GROUP = "ballplate.error_models"
 MEMBERS = ("dimension", "parameters", "error", "jacobian", "reported")
 
-# The packages that ballplate consisted of at first, and what models written then are to import in
-# their place.
+# Former names of ballplate's packages, and the line that replaces their imports in old models.
 FORMER_PACKAGES = ("simulator", "analysis")
 NEW_LINE = "from ballplate.models import Parameter, Reported"
 
@@ -42,9 +41,7 @@ Result = TypeVar("Result")
 
 
 class CustomModelError(ValueError):
-    """A user's error model cannot be used; `key` of its settings, "object" or "options", is where
-    to look.
-    """
+    """A user's error model is unusable; `key` is the key at fault, "object" or "options"."""
 
     def __init__(self, text: str, key: str = "object") -> None:
         self.key = key
@@ -59,13 +56,12 @@ def custom_model(
     lower: tuple[float, ...],
     upper: tuple[float, ...],
 ) -> ErrorModel:
-    """The model that the object `name`, module:function or an entry point's name, returns for a
-    volume.
+    """Return the model that the object `name` makes for a volume.
 
-    Modules are looked for where Python finds them and then in `folder`. Options that are
-    quantities, such as "200 mm", arrive in metres, radians, kelvins or as ratios.
+    `name` is module:function or an entry point's name. Modules are searched where Python finds
+    them, then in `folder`. Quantities in options, such as "200 mm", arrive in SI units.
 
-    :raises CustomModelError: no such object, or what it returns is no error model.
+    :raises CustomModelError: no such object, or its result is no error model.
     """
     build = named_object(name, folder, trust)
     key = "options" if options else "object"
@@ -79,7 +75,7 @@ def custom_model(
 
 @dataclass(frozen=True)
 class GuardedModel:
-    """A user's error `model`, whose every answer is checked."""
+    """A user's error `model`; every array it returns is checked."""
 
     model: ErrorModel
     parameters: tuple[Parameter, ...]
@@ -96,32 +92,32 @@ class GuardedModel:
         return own_array(self.model.jacobian, shape, x, a, p, is_plausible=self._is_plausible(a))
 
     def _is_plausible(self, a: Array) -> bool:
-        """Whether a machine may have such errors; a fit that diverges tries others."""
+        # Diverging fits try parameters of no real machine; their errors are not the user's.
         effects = (parameter.effect for parameter in self.parameters)
         moved = (abs(value) * effect for value, effect in zip(a.tolist(), effects, strict=True))
         return all(length <= IMPLAUSIBLE for length in moved)
 
     def reported(self) -> Reported:
-        found: Reported = own_result(self.model.reported)
-        return found
+        reported: Reported = own_result(self.model.reported)
+        return reported
 
 
 class GuardedModelWithLines(GuardedModel):
-    """The same of a model whose error functions can be drawn."""
+    """A guarded model whose error functions can be drawn."""
 
     def lines(self, function: str, t: Array) -> tuple[Line, ...]:
-        found: tuple[Line, ...] = own_result(self.model.lines, function, t)  # type: ignore[attr-defined]
-        return found
+        lines: tuple[Line, ...] = own_result(self.model.lines, function, t)  # type: ignore[attr-defined]
+        return lines
 
 
 def named_object(
     name: str, folder: Path | None, trust: Trust, group: str = GROUP
 ) -> Callable[..., Any]:
-    """The object `name`, module:function or an entry point's name of a `group`.
+    """Return the callable `name`, module:function or an entry point's name of a `group`.
 
-    Nothing else imports code that a file names.
+    All imports of code that a file names happen here.
 
-    :raises CustomModelError: there is none, it cannot be called, or it is not trusted.
+    :raises CustomModelError: it is missing, not callable, or not trusted.
     """
     if not trust.modules:
         text = "is code in Python that loading the file would run, and modules are not allowed here"
@@ -130,22 +126,23 @@ def named_object(
     if not colon:
         from importlib.metadata import entry_points
 
-        found = entry_points(group=group)
-        if name not in found.names:
-            known = sorted(found.names)
-            text = f'no entry point "{name}" of the group {group} is installed; {hint(name, known)}'
-            raise CustomModelError(f"{text}; for an object of a module write module:name")
-        built = attempt(f'the entry point "{name}" cannot be loaded', found[name].load)
+        points = entry_points(group=group)
+        if name not in points.names:
+            raise CustomModelError(
+                f'no entry point "{name}" of the group {group} is installed;'
+                f" {hint(name, sorted(points.names))}; for an object of a module write module:name"
+            )
+        target = attempt(f'the entry point "{name}" cannot be loaded', points[name].load)
     else:
-        built = _imported(module_name, folder)
+        target = _imported(module_name, folder)
         for part in path.split("."):
-            if not hasattr(built, part):
-                known = [word for word in vars(built) if not word.startswith("_")]
-                raise CustomModelError(f'{module_name} has no "{part}"; {hint(part, known)}')
-            built = getattr(built, part)
-    if not callable(built):
+            if not hasattr(target, part):
+                members = [word for word in vars(target) if not word.startswith("_")]
+                raise CustomModelError(f'{module_name} has no "{part}"; {hint(part, members)}')
+            target = getattr(target, part)
+    if not callable(target):
         raise CustomModelError(f"{name} cannot be called; name a function or a class")
-    return built
+    return target
 
 
 def _imported(name: str, folder: Path | None) -> Any:
@@ -153,9 +150,9 @@ def _imported(name: str, folder: Path | None) -> Any:
     if beside is not None:
         # For other processes too, which are given this process's path; last, so that nothing else
         # is hidden.
-        own = str(folder.resolve()) if folder is not None else ""
-        if own not in sys.path:
-            sys.path.append(own)
+        search_path = str(folder.resolve()) if folder is not None else ""
+        if search_path not in sys.path:
+            sys.path.append(search_path)
         # A file may be newer than what was listed of the folder.
         importlib.invalidate_caches()
     try:
@@ -174,43 +171,47 @@ def _imported(name: str, folder: Path | None) -> Any:
                 f"no module {name} is installed{where}; install it, or correct its name"
             ) from None
         raise
-    found = getattr(module, "__file__", None)
-    if beside is not None and found is not None and Path(found).resolve() != beside:
-        raise CustomModelError(f"another module {name} was found at {found}; rename {beside.name}")
+    origin = getattr(module, "__file__", None)
+    if beside is not None and origin is not None and Path(origin).resolve() != beside:
+        raise CustomModelError(f"another module {name} was found at {origin}; rename {beside.name}")
     return module
 
 
 def module_source(name: str, folder: Path | None) -> Path | None:
-    """The file of the module of an object, module:function or an entry point's name; None where
-    there is none. Nothing of it is run, nor of the packages that it is in.
+    """Return the file of an object's module; ``None`` if there is no such file.
+
+    `name` is module:function or an entry point's name. Neither the module nor its packages are
+    run.
     """
     module, colon, _ = name.partition(":")
     if not colon:
         from importlib.metadata import entry_points
 
         points = entry_points(name=name)
-        module = next((one.module for one in points if one.group.startswith("ballplate.")), "")
+        module = next(
+            (point.module for point in points if point.group.startswith("ballplate.")), ""
+        )
     if not module:
         return None
     beside = None if folder is None else module_file(folder.resolve(), module)
     if beside is not None:
         return beside
-    places: Sequence[str] | None = None
+    locations: Sequence[str] | None = None
     spec = None
     parts = module.split(".")
     for count in range(1, len(parts) + 1):
         finders = (getattr(finder, "find_spec", None) for finder in sys.meta_path)
         whole = ".".join(parts[:count])
-        specs = (find(whole, places) for find in finders if find is not None)
-        spec = next((one for one in specs if one is not None), None)
+        specs = (find(whole, locations) for find in finders if find is not None)
+        spec = next(filter(None, specs), None)
         if spec is None:
             return None
-        places = spec.submodule_search_locations
+        locations = spec.submodule_search_locations
     return None if spec is None or not spec.has_location else Path(str(spec.origin))
 
 
 def module_file(folder: Path, name: str) -> Path | None:
-    """The file of a module in a folder, None where it is not there."""
+    """Return the file of a module in a folder, if any."""
     path = folder.joinpath(*name.split("."))
     for candidate in (path.with_suffix(".py"), path / "__init__.py"):
         if candidate.is_file():
@@ -218,23 +219,25 @@ def module_file(folder: Path, name: str) -> Path | None:
     return None
 
 
-def attempt(what: str, call: Callable[[], Result], key: str = "object") -> Result:
-    """The result of a call of a user's code.
+def attempt(failure: str, call: Callable[[], Result], key: str = "object") -> Result:
+    """Return the result of a call of a user's code.
 
-    :raises CustomModelError: it fails; says where.
+    `failure` opens the message.
+
+    :raises CustomModelError: the call fails; the message has the location.
     """
     try:
         with running_own_code():
             return call()
     except (Exception, SystemExit) as error:
-        # Without a place in the user's code, the call itself was wrong.
+        # Without a frame in the user's code, the call itself is at fault.
         text = error_text(error, own_frame(error))
-        raise CustomModelError(f"{what}: {text}", key) from error
+        raise CustomModelError(f"{failure}: {text}", key) from error
 
 
-# In one piece: each check of a model relies on those before it.
+# In one piece: each check relies on the checks before it.
 def _check(name: str, model: Any, lower: Array, upper: Array) -> None:
-    """Raise what is wrong with a model, the first thing that is."""
+    """Raise the first fault of a model."""
     missing = [
         member
         for member in MEMBERS
@@ -258,15 +261,17 @@ def _check(name: str, model: Any, lower: Array, upper: Array) -> None:
     effect = np.array([parameter.effect for parameter in parameters])
     n = len(parameters)
 
-    def values(what: str, call: Callable[[], Any], shape: tuple[int, ...]) -> Array:
-        found = np.asarray(attempt(f"{name}: {what} has failed", call))
-        if found.shape != shape:
+    def values(call_text: str, call: Callable[[], Any], shape: tuple[int, ...]) -> Array:
+        returned = np.asarray(attempt(f"{name}: {call_text} has failed", call))
+        if returned.shape != shape:
             raise CustomModelError(
-                f"{name}: {what} returns the shape {found.shape}; {shape} is needed"
+                f"{name}: {call_text} returns the shape {returned.shape}; return {shape}"
             )
-        if found.dtype.kind not in "fiu" or not np.isfinite(found).all():
-            raise CustomModelError(f"{name}: {what} returns values that are not finite numbers")
-        return np.asarray(found, float)
+        if returned.dtype.kind not in "fiu" or not np.isfinite(returned).all():
+            raise CustomModelError(
+                f"{name}: {call_text} returns values that are not finite numbers"
+            )
+        return np.asarray(returned, float)
 
     without = values("error(x, 0, p)", lambda: model.error(x, np.zeros(n), p), (7, d))
     if np.abs(without - p).max() > 1e-12:
@@ -275,14 +280,14 @@ def _check(name: str, model: Any, lower: Array, upper: Array) -> None:
         )
     a = USUAL_ERROR / effect * generator.standard_normal(n)
     jacobian = values("jacobian(x, a, p)", lambda: model.jacobian(x, a, p), (7, d, n))
-    one, other = (
+    first, second = (
         attempt(f"{name}: jacobian has failed", lambda: model.jacobian(x, a, p)) for _ in range(2)
     )
     if (
-        not isinstance(one, np.ndarray)
-        or one.dtype != float
-        or not one.flags.writeable
-        or np.shares_memory(one, other)
+        not isinstance(first, np.ndarray)
+        or first.dtype != float
+        or not first.flags.writeable
+        or np.shares_memory(first, second)
     ):
         raise CustomModelError(
             f"{name}: jacobian returns no new array of floats; make one at each call"
@@ -330,8 +335,8 @@ def _check_parameters(name: str, parameters: tuple[Any, ...]) -> None:
                 f'{name}: the effect of "{parameter.name}" is {parameter.effect}; give one above 0'
             )
     names = [parameter.name for parameter in parameters]
-    twice = sorted({one for one in names if names.count(one) > 1})
-    if twice:
+    repeated = sorted({name for name in names if names.count(name) > 1})
+    if repeated:
         raise CustomModelError(
-            f"{name}: several parameters are called {listing(twice)}; names must differ"
+            f"{name}: several parameters are called {listing(repeated)}; names must differ"
         )

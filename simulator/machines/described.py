@@ -1,4 +1,4 @@
-"""Settings that name a machine file."""
+"""Keys that name a machine file."""
 
 from __future__ import annotations
 
@@ -13,17 +13,17 @@ if TYPE_CHECKING:
 
 
 class OfMachineFile(Settings):
-    """Settings of a machine that a file describes."""
+    """A machine that a file describes."""
 
-    # What the file says; filled in when the experiment is loaded.
+    # Content of the file; set when the experiment is loaded.
     _machine: MachineDescription | None = PrivateAttr(default=None)
 
-    def of(self, machine: MachineDescription) -> None:
-        """Take the machine that the file describes."""
+    def set_machine(self, machine: MachineDescription) -> None:
+        """Set the machine of the file."""
         self._machine = machine
 
     @property
     def described(self) -> MachineDescription:
-        """The machine that the file describes."""
+        """The machine of the file."""
         assert self._machine is not None
         return self._machine

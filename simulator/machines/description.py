@@ -1,8 +1,8 @@
-"""A machine as a file describes it, and the error functions at its reference point that follow.
+"""A machine as a file describes it, and the resulting error functions at its reference point.
 
 Source: Park, Burdekin and Peggs, sections 3 to 5 and Appendix A.2. A parametric error measured on
-some line differs from that on the line through the reference point by its axis's rotations, times
-what separates the two lines.
+another line than that through the reference point contains the rotations of its axis, times the
+distance of the lines.
 """
 
 from __future__ import annotations
@@ -14,8 +14,8 @@ from typing import ClassVar
 import numpy as np
 
 from .arrangement import Arrangement
-from .bases import Basis, Polynomial, Spline
-from .curves import Curve, Interpolation, Points, SingleFunction, SmoothedPoints
+from .bases import Basis, Polynomial, SingleFunction, Spline
+from .curves import Curve, Interpolation, Points, SmoothedPoints
 from .error_names import AXIS_ERRORS, ROTATIONS, SQUARENESS_ERRORS, TRANSLATIONS, AxisError
 from .kinematic import KinematicModel, carried_vectors, error_function
 from .protocol import Array, TrueMachine
@@ -35,7 +35,7 @@ class PowerSeries:
     coefficients: tuple[float, ...]
 
     def values(self, t: Array) -> Array:
-        """The polynomial at t (m,), as (m, 1).
+        """Return the polynomial at t (m,), as (m, 1).
 
         >>> PowerSeries((1.0, 0.0, 2.0)).values(np.array([0.5]))
         array([[1.5]])
@@ -45,8 +45,8 @@ class PowerSeries:
 
 @dataclass(frozen=True)
 class Lever:
-    """A rotation times the distance of its axis from the reference point, in metres: `length` (t -
-    `t0`).
+    """A rotation times the distance of its axis from the reference point: `length` (t - `t0`)
+    metres.
     """
 
     rotation: Combination
@@ -54,14 +54,14 @@ class Lever:
     t0: float
 
     def values(self, t: Array) -> Array:
-        """The product at t (m,), as (m, 1)."""
+        """Return the product at t (m,), as (m, 1)."""
         return self.length * (t - self.t0)[:, None] * self.rotation.values(t)
 
 
 @dataclass(frozen=True)
 class Combination(SingleFunction):
-    """A single function: a sum of multiples of others, less a straight line; beyond the ends `held`
-    it is constant.
+    """A single function: a weighted sum of functions less a straight line, constant beyond
+    `held`.
     """
 
     parts: tuple[tuple[float, PowerSeries | Curve | Combination | Lever], ...]
@@ -72,15 +72,15 @@ class Combination(SingleFunction):
     kind: ClassVar[str] = "stated"
 
     def values(self, t: Array) -> Array:
-        """The function at t (m,), as (m, 1)."""
+        """Return the function at t (m,), as (m, 1)."""
         t = t if self.held is None else np.clip(t, *self.held)
-        found = -self.intercept - self.slope * t[:, None]
+        total = -self.intercept - self.slope * t[:, None]
         for factor, part in self.parts:
-            found = found + factor * part.values(t)
-        return found
+            total = total + factor * part.values(t)
+        return total
 
     def less(self, intercept: float, slope: float = 0.0) -> Combination:
-        """The function less another straight line."""
+        """Return the function less another straight line."""
         return replace(self, intercept=self.intercept + intercept, slope=self.slope + slope)
 
 
@@ -88,12 +88,12 @@ class Combination(SingleFunction):
 class ParametricError:
     """An error of an axis, as stated or measured.
 
-    `line` has the positions of the axes on the line of measurement, its own axis's without meaning,
-    and `probe` the offset of what was measured, a tip or a reflector, from the machine's own point
-    that the scales tell; None for the line through the reference point. `on_table` says that a
-    table, which the axis moves, held the straightedge; otherwise a point fixed to what the axis
-    moves was followed. `deviation` is the standard deviation of the random part, along the axis or
-    at points of it.
+    `line` has the positions of the axes on the line of measurement (that of its own axis is
+    ignored); ``None`` is the line through the reference point. `probe` is the offset of the
+    measured tip or reflector from the point whose position the scales indicate. `on_table`: the
+    straightedge was on a table that the axis moves; otherwise a point fixed to the moved part was
+    measured. `deviation` is the standard deviation of the random part, along the axis or at
+    points.
     """
 
     name: str
@@ -106,7 +106,7 @@ class ParametricError:
 
     @property
     def error(self) -> AxisError:
-        """What the name stands for."""
+        """The error by its name."""
         return AXIS_ERRORS[self.name]
 
     @property
@@ -124,8 +124,8 @@ class ParametricError:
 
 @dataclass(frozen=True)
 class Squareness:
-    """A squareness error by its ISO 230-1 name, and where the two lines cross on which it was
-    measured.
+    """A squareness error by its ISO 230-1 name, and the crossing `at` of its two lines of
+    measurement.
     """
 
     name: str
@@ -136,9 +136,7 @@ class Squareness:
 
 @dataclass(frozen=True)
 class AxisTemperature:
-    """Expansion (1/K) of an axis whose temperature is off by `deviation` (K), known to
-    `uncertainty` (K).
-    """
+    """Expansion (1/K) of an axis at a temperature `deviation` (K) with its `uncertainty` (K)."""
 
     expansion: float
     deviation: float
@@ -149,9 +147,8 @@ class AxisTemperature:
 class MachineDescription:
     """A machine's arrangement and errors, in metres and radians.
 
-    `arrangement_name` is one of the ten or "". `droop` has phi1 and phi2, in radians for each metre
-    that the arm is moved out; `probing` is the standard deviation of each co-ordinate that probing
-    adds.
+    `arrangement_name` is one of the ten or "". `droop` has phi1 and phi2, in radians per metre of
+    arm extension; `probing` is the standard deviation that probing adds to each co-ordinate.
     """
 
     title: str
@@ -170,29 +167,26 @@ class MachineDescription:
     probing: float = 0.0
 
     def scaled(self, axis: int, position: Array | float) -> Array:
-        """Positions along an axis as fractions of it."""
+        """Return positions along an axis as fractions of it."""
         return np.asarray((position - self.lower[axis]) / (self.upper[axis] - self.lower[axis]))
 
     @property
     def arm_length(self) -> float:
-        """Length of the axis that is an arm, for machines that have one."""
+        """Length of the axis that is an arm, for machines with an arm."""
         axis = DROOP[self.arrangement_name][0]
         return self.upper[axis] - self.lower[axis]
 
 
 def random_part(machine: MachineDescription) -> tuple[str, ...]:
-    """What of a machine is random, in words: bandwidths, uncertain temperatures, and probing."""
+    """Return descriptions of a machine's random parts: bandwidths, temperatures and probing."""
 
     def is_random(deviation: float | Points | None) -> bool:
         return any(deviation.values) if isinstance(deviation, Points) else bool(deviation)
 
-    stated: list[tuple[str, float | Points | None]] = [
-        (one.name, one.deviation) for one in machine.errors
-    ]
-    stated += [(one.name, one.deviation) for one in machine.squareness]
-    bandwidths = [name for name, deviation in stated if is_random(deviation)]
+    errors: list[ParametricError | Squareness] = [*machine.errors, *machine.squareness]
+    bandwidths = [error.name for error in errors if is_random(error.deviation)]
     uncertain = [
-        axis for axis, one in machine.temperature.items() if one.uncertainty and one.expansion
+        axis for axis, state in machine.temperature.items() if state.uncertainty and state.expansion
     ]
     return (
         *(f"bandwidth of {name}" for name in bandwidths),
@@ -202,12 +196,12 @@ def random_part(machine: MachineDescription) -> tuple[str, ...]:
 
 
 def coupling(machine: MachineDescription, error: ParametricError) -> Array:
-    """What the three rotations of an error's axis add to it on its line of measurement, (3,) in
-    metres per radian.
+    """Return effects of the three rotations of an error's axis on its line of measurement, (3,)
+    m/rad.
 
-    The rotation turns what the axis carries of the distance to the line through the reference
-    point, and the probe. Displacements along the axis itself count on both lines alike; what they
-    do to a straightedge on a table comes in addition.
+    The lever is the part of the distance to the line through the reference point that the axis
+    moves, plus the probe. Displacements along the axis itself are equal on both lines; their
+    effect on a straightedge on a table is added separately.
     """
     offset = np.zeros((1, 3))
     if error.line is not None:
@@ -220,7 +214,7 @@ def coupling(machine: MachineDescription, error: ParametricError) -> Array:
 def stated_function(
     machine: MachineDescription, error: ParametricError
 ) -> PowerSeries | Curve | None:
-    """The error as stated in the file, a function of the fraction of the axis."""
+    """Return the error as stated in the file, a function of the fraction of the axis."""
     if isinstance(error.shape, Points):
         return error.shape.curve(
             machine.interpolation, machine.lower[error.axis], machine.upper[error.axis]
@@ -229,20 +223,19 @@ def stated_function(
 
 
 def reference_functions(machine: MachineDescription) -> dict[str, Combination]:
-    """Errors on lines through the reference point, zero there, by ISO 230-1 name.
+    """Return errors on lines through the reference point, zero there, by ISO 230-1 name.
 
-    Rotations first, as displacements measured elsewhere need them; then straightness errors lose
-    their straight line. Where a rotation is not stated it counts as zero. Beyond the ends of a
-    table what is left there goes on.
+    Unstated rotations are zero. Beyond the ends of a table the corrected error stays constant.
     """
-    found: dict[str, Combination] = {}
-    for error in sorted(machine.errors, key=lambda one: not one.is_rotation):
+    functions: dict[str, Combination] = {}
+    # Rotations first: displacements on other lines need them.
+    for error in sorted(machine.errors, key=lambda error: not error.is_rotation):
         shape = stated_function(machine, error)
         if shape is None:
             continue
-        held = (shape.t[0], shape.t[-1]) if isinstance(shape, Curve) else None
-        elsewhere = (*_by_rotations(machine, error, found), *_by_droop(machine, error))
-        function = Combination(((1.0, shape), *elsewhere), held=held)
+        ends = (shape.t[0], shape.t[-1]) if isinstance(shape, Curve) else None
+        line_effects = (*_by_rotations(machine, error, functions), *_by_droop(machine, error))
+        function = Combination(((1.0, shape), *line_effects), held=ends)
         if error.is_straightness:
             t = (
                 np.asarray(shape.t)
@@ -250,26 +243,26 @@ def reference_functions(machine: MachineDescription) -> dict[str, Combination]:
                 else np.linspace(0.0, 1.0, REDUCTION_POINTS)
             )
             function = function.less(*reference_line(t, function.values(t)[:, 0], error.criterion))
-        at_reference = machine.scaled(error.axis, machine.reference[error.axis])
-        found[error.name] = function.less(float(function.values(np.atleast_1d(at_reference))[0, 0]))
-    return found
+        at_reference = function.values(
+            np.atleast_1d(machine.scaled(error.axis, machine.reference[error.axis]))
+        )
+        functions[error.name] = function.less(float(at_reference[0, 0]))
+    return functions
 
 
 def _by_rotations(
-    machine: MachineDescription, error: ParametricError, known: Mapping[str, Combination]
+    machine: MachineDescription, error: ParametricError, functions: Mapping[str, Combination]
 ) -> list[tuple[float, Combination | Lever]]:
-    """What the rotations of its axis have added to an error where it was measured, with the
-    opposite sign.
-    """
+    """Return the effects of its axis's rotations on a measured error, with opposite sign."""
     if error.is_rotation:
         return []
-    own = np.eye(3)[error.axis]
-    turned = np.cross(np.eye(3), own)[:, error.error.component]
+    direction = np.eye(3)[error.axis]
+    turned = np.cross(np.eye(3), direction)[:, error.error.component]
     length = machine.upper[error.axis] - machine.lower[error.axis]
     t0 = float(machine.scaled(error.axis, machine.reference[error.axis]))
     parts: list[tuple[float, Combination | Lever]] = []
     for letter, factor, lever in zip(ROTATIONS, coupling(machine, error), turned, strict=True):
-        rotation = known.get(f"E{letter}{TRANSLATIONS[error.axis]}")
+        rotation = functions.get(f"E{letter}{TRANSLATIONS[error.axis]}")
         if rotation is not None and factor:
             parts.append((-float(factor), rotation))
         if rotation is not None and error.on_table and lever:
@@ -281,14 +274,11 @@ def _by_rotations(
 def _by_droop(
     machine: MachineDescription, error: ParametricError
 ) -> list[tuple[float, PowerSeries]]:
-    """What the tilt of the column has added to a displacement where it was measured, with the
-    opposite sign.
-
-    It is linear along the line, and zero on the one through the reference point. The bend of the
-    arm is the same on all lines: it counts besides what is stated.
-    """
+    """Return the effect of the column's tilt on a measured displacement, with opposite sign."""
     if error.is_rotation or error.line is None or "phi1" not in machine.droop:
         return []
+    # Linear along the line, zero on the line through the reference point. The arm's bend is equal
+    # on all lines and is added to stated errors.
     tilt = droop_field(machine.arrangement_name, "phi1", 1.0)
     ends = np.array([error.line, error.line])
     ends[:, error.axis] = machine.lower[error.axis], machine.upper[error.axis]
@@ -300,35 +290,34 @@ def _by_droop(
 
 
 def true_volumetric(machine: MachineDescription) -> TrueMachine:
-    """The machine as an error model with its parameters: 1 for each function, and the numbers of
-    the fields.
+    """Return the machine as an error model with parameters: 1 per function, and values of the
+    fields.
     """
     functions = reference_functions(machine)
     chain = _chain(machine, functions)
     fields = [*_thermal(machine), *_droop(machine)]
     values = [value for _, value in fields]
-    model = VolumetricModel(chain, tuple(one for one, _ in fields))
+    model = VolumetricModel(chain, tuple(field for field, _ in fields))
     square = [
-        (squareness_field(one.name), _at_reference(one, machine, model, values))
-        for one in machine.squareness
+        (squareness_field(angle.name), _at_reference(angle, machine, model, values))
+        for angle in machine.squareness
     ]
     every = [*square, *fields]
     a = np.array([1.0] * len(chain.parameters) + [value for _, value in every])
-    return TrueMachine(VolumetricModel(chain, tuple(one for one, _ in every)), a)
+    return TrueMachine(VolumetricModel(chain, tuple(field for field, _ in every)), a)
 
 
 def _chain(machine: MachineDescription, functions: Mapping[str, Basis]) -> KinematicModel:
-    found = tuple(error_function(name, function) for name, function in functions.items())
+    error_functions = tuple(error_function(name, basis) for name, basis in functions.items())
     return KinematicModel(
-        machine.arrangement, found, machine.lower, machine.upper, origin=machine.reference
+        machine.arrangement, error_functions, machine.lower, machine.upper, origin=machine.reference
     )
 
 
 def _thermal(machine: MachineDescription) -> list[tuple[Field, float]]:
-    known = machine.temperature
     return [
-        (thermal_field("xyz".index(axis)), known[axis].expansion * known[axis].deviation)
-        for axis in known
+        (thermal_field("xyz".index(axis)), state.expansion * state.deviation)
+        for axis, state in machine.temperature.items()
     ]
 
 
@@ -337,27 +326,24 @@ def _droop(machine: MachineDescription) -> list[tuple[Field, float]]:
         return []
     length = machine.arm_length
     return [
-        (droop_field(machine.arrangement_name, which, length), value * length)
-        for which, value in machine.droop.items()
+        (droop_field(machine.arrangement_name, name, length), value * length)
+        for name, value in machine.droop.items()
     ]
 
 
 def _at_reference(
     squareness: Squareness, machine: MachineDescription, model: VolumetricModel, values: list[float]
 ) -> float:
-    """The squareness error between lines through the reference point.
-
-    Rotations of the axes, and the droop, tilt the two lines of measurement: the angle alpha that is
-    measured between them shows as a sum of slopes -alpha, which is the sum at the reference point,
-    -alpha*, plus the tilts. Displacements tilt nothing, as straightness errors have lost their
-    straight line.
-    """
+    """Return the squareness error between lines through the reference point."""
     if squareness.at is None:
         return squareness.value
+    # Axis rotations and droop tilt the two lines of measurement. The measured angle alpha is a sum
+    # of slopes -alpha: that at the reference point, -alpha*, plus the tilts. Displacements tilt
+    # neither line: straightness errors have lost their straight line.
     error = SQUARENESS_ERRORS[squareness.name]
     first, second, sign = error.to, error.axis, -error.sign
     a = np.array([float(f.rotation) for f in model.chain.functions] + values)
-    a[len(model.chain.functions) :] *= [one.unit == "rad" for one in model.fields]
+    a[len(model.chain.functions) :] *= [field.unit == "rad" for field in model.fields]
     tilt = 0.0
     for along, across in ((first, second), (second, first)):
         t = np.linspace(0.0, 1.0, REDUCTION_POINTS)
@@ -369,12 +355,14 @@ def _at_reference(
 
 
 def fitted_in_plane(machine: MachineDescription) -> MachineDescription:
-    """The machine with those errors only that move points of the plane of x and y within it."""
+    """Return the machine with only the errors that move points of the xy plane within it."""
     return replace(
         machine,
-        errors=tuple(one for one in machine.errors if one.error.in_plane),
-        squareness=tuple(one for one in machine.squareness if SQUARENESS_ERRORS[one.name].in_plane),
-        temperature={axis: one for axis, one in machine.temperature.items() if axis != "z"},
+        errors=tuple(error for error in machine.errors if error.error.in_plane),
+        squareness=tuple(
+            angle for angle in machine.squareness if SQUARENESS_ERRORS[angle.name].in_plane
+        ),
+        temperature={axis: state for axis, state in machine.temperature.items() if axis != "z"},
         droop={},
     )
 
@@ -382,15 +370,14 @@ def fitted_in_plane(machine: MachineDescription) -> MachineDescription:
 def fitted_volumetric(
     machine: MachineDescription, lower: tuple[float, ...], upper: tuple[float, ...], knots: int
 ) -> VolumetricModel:
-    """The error model that estimates what the file states, in a volume from `lower` to `upper`;
-    values are not used.
+    """Return the model that estimates the errors in a file, in a volume from `lower` to `upper`.
 
-    Polynomials have the stated numbers of coefficients, and fitted splines their knots; other
-    tables become cubic splines with so many interior `knots`, evenly spaced. The frame is that of
-    the equations: functions are zero at the lower corner, straightness errors at both ends;
-    squareness errors that are not stated are zero. Expansion is part of the positioning errors, and
-    the arm's bend phi2 of its straightness where that is stated; neither is a parameter then. An
-    axis with a temperature has a positioning error that is linear at least.
+    Stated values are not used. Polynomials have the stated numbers of coefficients, fitted splines
+    their knots; other tables become cubic splines with `knots` evenly spaced interior knots.
+    Functions are zero at the lower corner, straightness errors at both ends, unstated squareness
+    errors everywhere. Positioning errors include expansion, and the arm's straightness, if stated,
+    its bend phi2; neither is a parameter then. An axis with a temperature has at least a linear
+    positioning error.
     """
     expanding = {f"E{axis.upper()}{axis.upper()}" for axis in machine.temperature}
     functions: dict[str, Basis] = {}
@@ -415,10 +402,11 @@ def fitted_volumetric(
         if basis.size:
             functions[error.name] = basis
     functions |= {name: Polynomial(2) for name in sorted(expanding) if name not in functions}
-    found = tuple(error_function(name, basis) for name, basis in functions.items())
-    fields = [squareness_field(one.name) for one in machine.squareness]
-    for which in machine.droop:
+    error_functions = tuple(error_function(name, basis) for name, basis in functions.items())
+    fields = [squareness_field(angle.name) for angle in machine.squareness]
+    for name in machine.droop:
         axis, _, _ = DROOP[machine.arrangement_name]
-        if which == "phi1" or f"EZ{TRANSLATIONS[axis]}" not in functions:
-            fields.append(droop_field(machine.arrangement_name, which, upper[axis] - lower[axis]))
-    return VolumetricModel(KinematicModel(machine.arrangement, found, lower, upper), tuple(fields))
+        if name == "phi1" or f"EZ{TRANSLATIONS[axis]}" not in functions:
+            fields.append(droop_field(machine.arrangement_name, name, upper[axis] - lower[axis]))
+    chain = KinematicModel(machine.arrangement, error_functions, lower, upper)
+    return VolumetricModel(chain, tuple(fields))

@@ -1,10 +1,10 @@
-"""The empirical error model: six functions of three variables, for displacement and rotation of the
+"""The empirical error model: six functions of three variables, displacement and rotation of the
 probe.
 
-Sources: NPL Report CISE 15/98, sections 2.1 and 2.4.1. A corrected point is x + e(x) + p + u(x) x p
-with the three positional functions e and the three rotational functions u, right-handed about the
-machine's axes and of opposite sign to those of the report. Unlike the kinematic model's, rotations
-move the probe's tip only.
+Sources: NPL Report CISE 15/98, sections 2.1 and 2.4.1. A corrected point is x + e(x) + p + u(x) x
+p with three positional functions e and three rotational functions u, right-handed about the
+machine's axes (opposite sign to the report). Unlike in the kinematic model, rotations move only
+the probe's tip.
 """
 
 from __future__ import annotations
@@ -12,6 +12,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import product
 
 import numpy as np
 
@@ -42,28 +43,26 @@ FRAME: tuple[Condition, ...] = (
     ("EZ", (0.0, 1.0, 0.0)),
 )
 
-# Rotations move the tip of the probe alone. What they do is stated for an offset of this fraction
-# of the volume.
+# Rotations move only the probe's tip. Their effect is stated for this offset, a fraction of the
+# volume.
 USUAL_OFFSET = 0.1
 
-# Where a function is looked at for its size and shape: lines parallel to the axes at these
-# fractions.
+# Lines parallel to the axes that show a function's size and shape, by fractions of the volume.
 LEVELS = (0.0, 0.25, 0.5, 0.75, 1.0)
 AXES = ("x", "y", "z")
 
 
 class FrameError(ValueError):
-    """The terms cannot be held at zero at a corner by leaving one of them out."""
+    """The terms cannot be held at zero at a corner by omitting one term."""
 
 
 @dataclass(frozen=True)
 class EmpiricalModel:
-    """e(x, a, p) of six functions in the same `terms`, each with the `columns` of them that are
-    free; the rotations are in terms `of_rotations` where these are given.
+    """e(x, a, p) of six functions in the same `terms`, each with its free `columns`.
 
-    `lower` and `upper` (3,) bound the volume in metres; the functions depend on the place scaled to
-    [0, 1] in it. `full_rotations` turns the probe offset by rotation matrices instead of adding the
-    cross product.
+    Rotations may have their own terms `of_rotations`. `lower` and `upper` (3,) bound the volume in
+    metres; the functions depend on the position scaled to [0, 1]. `full_rotations` turns the probe
+    offset by rotation matrices instead of cross products.
     """
 
     terms: Terms
@@ -79,30 +78,35 @@ class EmpiricalModel:
 
     @property
     def _terms(self) -> tuple[Terms, ...]:
-        """The terms of each function."""
+        """Terms of each function."""
         return _of_six(self.terms, self.of_rotations)
 
     def _values(self, t: Array) -> list[Array]:
-        """The free terms of each function at places t (m, 3), each (m, number)."""
+        """Return the free terms of each function at scaled positions t (m, 3), each (m,
+        number).
+        """
         displacing = self.terms.values(t)
         turning = displacing if self.of_rotations is None else self.of_rotations.values(t)
-        return [(turning if k >= 3 else displacing)[:, own] for k, own in enumerate(self._chosen)]
+        return [
+            (turning if k >= 3 else displacing)[:, columns]
+            for k, columns in enumerate(self._chosen)
+        ]
 
     @cached_property
     def parameters(self) -> tuple[Parameter, ...]:
-        places = even_grid(np.zeros(3), np.ones(3), (9, 9, 9))
-        peaks = [np.abs(values).max(axis=0, initial=0.0) for values in self._values(places)]
+        grid = even_grid(np.zeros(3), np.ones(3), (9, 9, 9))
+        peaks = [np.abs(values).max(axis=0, initial=0.0) for values in self._values(grid)]
         arm = USUAL_OFFSET * float(np.subtract(self.upper, self.lower).max())
-        found = []
+        parameters = []
         for k, (function, meaning) in enumerate(FUNCTIONS.items()):
             unit: Unit = "rad" if k >= 3 else "m"
             names = self._terms[k].names
             for column, peak in zip(self.columns[k], peaks[k].tolist(), strict=True):
                 effect = peak * (arm if k >= 3 else 1.0)
-                found.append(
+                parameters.append(
                     Parameter(f"{function} {names[column]}", unit, function, meaning, effect)
                 )
-        return tuple(found)
+        return tuple(parameters)
 
     @cached_property
     def slices(self) -> tuple[slice, ...]:
@@ -117,23 +121,23 @@ class EmpiricalModel:
         return tuple(map(list, self.columns))
 
     def scaled(self, x: Array) -> Array:
-        """Places x (m, 3) scaled to [0, 1] over the volume."""
+        """Return positions x (m, 3) scaled to [0, 1] over the volume."""
         lower = np.asarray(self.lower)
         return (x - lower) / (np.asarray(self.upper) - lower)
 
     def functions(self, x: Array, a: Array) -> Array:
-        """The six functions at x (m, 3), as (m, 6)."""
+        """Return the six functions at x (m, 3), as (m, 6)."""
         values = self._values(self.scaled(x))
-        parts = [own @ a[part] for own, part in zip(values, self.slices, strict=True)]
+        parts = [block @ a[part] for block, part in zip(values, self.slices, strict=True)]
         return np.stack(parts, axis=1)
 
     def error(self, x: Array, a: Array, p: Array) -> Array:
-        found = self.functions(x, a)
+        functions = self.functions(x, a)
         if self.full_rotations:
-            return found[:, :3] + np.einsum(
-                "mij,mj->mi", rotation_and_derivatives(found[:, 3:])[0], p
+            return functions[:, :3] + np.einsum(
+                "mij,mj->mi", rotation_and_derivatives(functions[:, 3:])[0], p
             )
-        return found[:, :3] + p + np.cross(found[:, 3:], p)
+        return functions[:, :3] + p + np.cross(functions[:, 3:], p)
 
     def jacobian(self, x: Array, a: Array, p: Array) -> Array:
         values = self._values(self.scaled(x))
@@ -146,38 +150,36 @@ class EmpiricalModel:
         else:
             by_rotation = cross_matrices(p)
         result = np.zeros((len(x), 3, len(self.parameters)), np.result_type(*values, a, p))
-        for k, (own, part) in enumerate(zip(values, self.slices, strict=True)):
+        for k, (block, part) in enumerate(zip(values, self.slices, strict=True)):
             if k < 3:
-                result[:, k, part] = own
+                result[:, k, part] = block
             else:
-                result[:, :, part] = by_rotation[:, :, k - 3, None] * own[:, None]
+                result[:, :, part] = by_rotation[:, :, k - 3, None] * block[:, None]
         return result
 
     def lines(self, function: str, t: Array) -> tuple[Line, ...]:
-        """The function along lines parallel to the axes, those along the edges of the volume
-        first.
-        """
+        """Return the function along lines parallel to the axes, edges of the volume first."""
         index = list(FUNCTIONS).index(function)
-        pairs = [(one, two) for one in LEVELS for two in LEVELS]
+        pairs = list(product(LEVELS, repeat=2))
         pairs.sort(key=lambda pair: sum(level not in (0.0, 1.0) for level in pair))
-        words, places, axes = [], [], []
+        words, points, axes = [], [], []
         for pair in pairs:
             for axis in range(3):
-                others = [k for k in range(3) if k != axis]
-                at = " and ".join(
-                    f"{AXES[k]} {_level(level)}" for k, level in zip(others, pair, strict=True)
+                fixed = [k for k in range(3) if k != axis]
+                location = " and ".join(
+                    f"{AXES[k]} {_level(level)}" for k, level in zip(fixed, pair, strict=True)
                 )
-                words.append(f"along {AXES[axis].upper()} at {at}")
+                words.append(f"along {AXES[axis].upper()} at {location}")
                 line = np.zeros((len(t), 3))
-                line[:, axis], line[:, others] = t, pair
-                places.append(line)
+                line[:, axis], line[:, fixed] = t, pair
+                points.append(line)
                 axes.append(axis)
-        values = self._values(np.concatenate(places))[index].reshape(len(words), len(t), -1)
+        values = self._values(np.concatenate(points))[index].reshape(len(words), len(t), -1)
         return tuple(map(Line, words, values, axes))
 
     def reported(self) -> Reported:
-        """Coefficients of monomials where the terms are polynomials, otherwise the parameters
-        themselves.
+        """Return coefficients of monomials if the terms are polynomials, otherwise the
+        parameters.
         """
         displacing = self.terms.quoted()
         turning = displacing if self.of_rotations is None else self.of_rotations.quoted()
@@ -207,8 +209,11 @@ def empirical_model(
     frame: Sequence[Condition] = FRAME,
     of_rotations: Terms | None = None,
 ) -> EmpiricalModel:
-    """The model whose functions vanish where `frame` says: the terms that are not zero there are
-    left out. The rotations have terms of their own where these are given.
+    """Return the model whose functions vanish at the conditions of `frame`.
+
+    Terms that are not zero there are omitted.
+
+    :raises FrameError: a condition has several such terms.
 
     >>> from .bases import Polynomial
     >>> from .terms import sums
@@ -216,21 +221,21 @@ def empirical_model(
     87
     """
     columns = []
-    for function, own in zip(FUNCTIONS, _of_six(terms, of_rotations), strict=True):
-        left = list(range(len(own.names)))
+    for function, own_terms in zip(FUNCTIONS, _of_six(terms, of_rotations), strict=True):
+        columns_left = list(range(len(own_terms.names)))
         for name, corner in frame:
             if name == function:
-                at_corner = own.values(np.array([corner]))[0, left]
+                at_corner = own_terms.values(np.array([corner]))[0, columns_left]
                 touched = np.flatnonzero(np.abs(at_corner) > 1e-9)
                 if len(touched) > 1:
                     raise FrameError(f"{len(touched)} terms of {function} are not zero at {corner}")
-                left = [column for k, column in enumerate(left) if k not in touched]
-        columns.append(tuple(left))
+                columns_left = [column for k, column in enumerate(columns_left) if k not in touched]
+        columns.append(tuple(columns_left))
     return EmpiricalModel(terms, tuple(columns), lower, upper, full_rotations, of_rotations)
 
 
 def _of_six(terms: Terms, of_rotations: Terms | None) -> tuple[Terms, ...]:
-    """The terms of each of the six functions."""
+    """Return the terms of each of the six functions."""
     return (terms,) * 3 + (terms if of_rotations is None else of_rotations,) * 3
 
 

@@ -1,4 +1,4 @@
-"""The keys of the empirical error model."""
+"""Keys of the empirical error model."""
 
 from __future__ import annotations
 
@@ -72,7 +72,7 @@ class RadialSettings(Settings):
         return self
 
     def terms(self) -> Radial:
-        """The functions described."""
+        """Return the radial functions."""
         return Radial(self.centres, self.constant, self.function)
 
 
@@ -109,7 +109,10 @@ class EmpiricalSettings(Settings):
     coefficients: int = Field(default=3, ge=2, le=12, description=COEFFICIENTS)
     rotations: Literal["linearised", "full"] = Field(
         default="linearised",
-        description="Whether the probe offset is turned by cross products or rotation matrices.",
+        description=(
+            "Rotation of the probe offset: by cross products (linearised) or rotation matrices"
+            " (full)."
+        ),
     )
     rotation_functions: (
         Forms[Literal["none"], RotationFunctionsSettings, RotationFunctionsSettings] | None
@@ -128,9 +131,9 @@ class EmpiricalSettings(Settings):
 
 
 def _check(settings: EmpiricalSettings | RotationFunctionsSettings) -> None:
-    """Refuse keys that do not belong together.
+    """Refuse keys that contradict each other.
 
-    :raises ValueError: some do not.
+    :raises ValueError: some do.
     """
     terms, basis = settings.terms, settings.basis
     if isinstance(terms, RadialSettings):
@@ -159,9 +162,13 @@ def _terms(settings: EmpiricalSettings | RotationFunctionsSettings) -> Terms:
 
 
 def _empirical(settings: EmpiricalSettings, lower: Corner, upper: Corner) -> ErrorModel:
-    other = settings.rotation_functions
+    functions = settings.rotation_functions
     of_rotations = (
-        None if other is None else no_terms() if isinstance(other, str) else _terms(other)
+        None
+        if functions is None
+        else no_terms()
+        if isinstance(functions, str)
+        else _terms(functions)
     )
     return empirical_model(
         _terms(settings),

@@ -1,6 +1,7 @@
-"""The errors of a machine of three axes and their ISO 230-1 names: 18 of the axes, 3 of squareness.
+"""The errors of a machine of three axes and their ISO 230-1 names: 18 of the axes, 3 of
+squareness.
 
-What a name says is looked up here, and never read from its letters elsewhere.
+The meaning of a name is always looked up here, never parsed from its letters.
 """
 
 from __future__ import annotations
@@ -16,8 +17,8 @@ ROTATIONS = ("A", "B", "C")
 
 @dataclass(frozen=True)
 class AxisError:
-    """An error of an axis: as `axis` (0 to 2) moves, it displaces along `component` (0 to 2), or
-    turns about it.
+    """An error of an axis: as `axis` (0 to 2) moves, it displaces along or turns about `component`
+    (0 to 2).
     """
 
     axis: int
@@ -44,28 +45,28 @@ class AxisError:
 
     @property
     def in_plane(self) -> bool:
-        """Whether it moves points of the plane of x and y within that plane."""
+        """True if it moves points of the xy plane within that plane."""
         return self.axis < 2 and self.is_rotation == (self.component == 2)
 
     @property
     def meaning(self) -> str:
-        """Words for it.
+        """Description.
 
         >>> [AXIS_ERRORS[name].meaning for name in ("EXX", "EYX", "ECZ")]
         ['positioning error of X', 'straightness of X in Y', 'yaw of Z about Z']
         """
-        axis, other = TRANSLATIONS[self.axis], TRANSLATIONS[self.component]
+        axis, component = TRANSLATIONS[self.axis], TRANSLATIONS[self.component]
         if not self.is_rotation:
             if self.is_straightness:
-                return f"straightness of {axis} in {other}"
+                return f"straightness of {axis} in {component}"
             return f"positioning error of {axis}"
-        if axis == other:
+        if axis == component:
             word = "roll" if axis != "Z" else "yaw"
         elif axis == "Z":
             word = "tilt"
         else:
-            word = "yaw" if other == "Z" else "pitch"
-        return f"{word} of {axis} about {other}"
+            word = "yaw" if component == "Z" else "pitch"
+        return f"{word} of {axis} about {component}"
 
 
 @dataclass(frozen=True)
@@ -95,21 +96,21 @@ class SquarenessError:
 
     @property
     def sign(self) -> float:
-        """Component `to` of the vector about which is turned, crosswise with that of the axis.
+        """Component `to` of the cross product of the axes `about` and `axis`.
 
-        >>> [one.sign for one in SQUARENESS_ERRORS.values()]
+        >>> [error.sign for error in SQUARENESS_ERRORS.values()]
         [-1.0, 1.0, -1.0]
         """
         return 1.0 if (self.about + 1) % 3 == self.axis else -1.0
 
     @property
     def in_plane(self) -> bool:
-        """Whether it moves points of the plane of x and y within that plane."""
+        """True if it moves points of the xy plane within that plane."""
         return self.about == 2
 
     @property
     def meaning(self) -> str:
-        """Words for it.
+        """Description.
 
         >>> SQUARENESS_ERRORS["EC0Y"].meaning
         'squareness of Y to X'
@@ -118,17 +119,17 @@ class SquarenessError:
 
 
 AXIS_ERRORS = {
-    one.name: one
+    error.name: error
     for axis in range(3)
     for is_rotation in (False, True)
     for component in range(3)
-    for one in (AxisError(axis, component, is_rotation),)
+    for error in (AxisError(axis, component, is_rotation),)
 }
 """The 18 errors of the axes by name, all of X first, its displacements before its rotations."""
 
 SQUARENESS_ERRORS = {
-    one.name: one
-    for one in (SquarenessError(1, 0, 2), SquarenessError(2, 0, 1), SquarenessError(2, 1, 0))
+    error.name: error
+    for error in (SquarenessError(1, 0, 2), SquarenessError(2, 0, 1), SquarenessError(2, 1, 0))
 }
 """The three squareness errors by name: of Y to X, of Z to X and of Z to Y."""
 

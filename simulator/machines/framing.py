@@ -1,10 +1,9 @@
-"""A true machine in the frame of the fitted model: a rigid motion of the frame changes nothing that
-is measured.
+"""A true machine in the frame of the fitted model: a rigid motion of the frame changes no
+measurement.
 
-A machine file tells its errors from its reference point and its own straight lines, a fitted model
-from the lower corner of the volume and from lines of its own. Poses are told from that frame and
-offsets of probes as they are there, so that estimates can be compared with a true machine in the
-same frame only.
+A machine file states errors relative to its reference point and straight lines, a fitted model
+relative to the lower corner and lines of its own. Estimated poses and probe offsets depend on this
+frame: compare estimates with a true machine in the same frame only.
 """
 
 from __future__ import annotations
@@ -17,8 +16,7 @@ import numpy as np
 from ..geometry.motions import cross_matrices
 from .protocol import Array, ErrorModel, Parameter, Reported, TrueMachine, Unit
 
-# Points at which the two are compared, at random in the volume, and largest probe offset there, in
-# metres.
+# Number of random points of the comparison, and their largest probe offset in metres.
 POINTS, OFFSET = 400, 0.1
 
 _IN_SPACE: tuple[tuple[str, Unit], ...] = (
@@ -34,11 +32,10 @@ _IN_PLANE: tuple[tuple[str, Unit], ...] = (*_IN_SPACE[:2], _IN_SPACE[-1])
 
 @dataclass(frozen=True)
 class FramedModel:
-    """The errors of `model` in a frame that is shifted and turned, with offsets of probes as at
-    `corner` (d,).
+    """The errors of `model` in a shifted and turned frame, with probe offsets as at `corner` (d,).
 
     e(x, a, p) = m(x, a, p) - (m(corner, a, p) - p) + shift + turn x (x - corner), where m is the
-    model's error and the last parameters are the shift and the turn: six, or in a plane three.
+    model's error and the last parameters are shift and turn: six, or three in a plane.
     """
 
     model: ErrorModel
@@ -59,50 +56,52 @@ class FramedModel:
 
     def error(self, x: Array, a: Array, p: Array) -> Array:
         n, d = len(self.model.parameters), self.dimension
-        own, shift, turn = a[:n], a[n : n + d], a[n + d :]
-        found = self.model.error(x, own, p) - self.model.error(self._at_corner(x), own, p) + p
+        of_model, shift, turn = a[:n], a[n : n + d], a[n + d :]
+        relative = (
+            self.model.error(x, of_model, p) - self.model.error(self._at_corner(x), of_model, p) + p
+        )
         from_corner = x - self._at_corner(x)
         if d == 2:
-            return found + shift + (_by_turn(from_corner) @ turn)
-        return found + shift + np.cross(turn, from_corner)
+            return relative + shift + (_by_turn(from_corner) @ turn)
+        return relative + shift + np.cross(turn, from_corner)
 
     def jacobian(self, x: Array, a: Array, p: Array) -> Array:
-        own, corner = a[: len(self.model.parameters)], self._at_corner(x)
-        by_own = self.model.jacobian(x, own, p) - self.model.jacobian(corner, own, p)
+        of_model, corner = a[: len(self.model.parameters)], self._at_corner(x)
+        by_model = self.model.jacobian(x, of_model, p) - self.model.jacobian(corner, of_model, p)
         d = self.dimension
-        shifts = np.broadcast_to(np.eye(d, dtype=by_own.dtype), (len(x), d, d))
+        shifts = np.broadcast_to(np.eye(d, dtype=by_model.dtype), (len(x), d, d))
         by_turn = cross_matrices(x - corner) if d == 3 else _by_turn(x - corner)
-        return np.concatenate([by_own, shifts, by_turn], axis=2)
+        return np.concatenate([by_model, shifts, by_turn], axis=2)
 
     def reported(self) -> Reported:
-        """As the model reports itself, with the frame's shift and turn."""
+        """Return the model's report with shift and turn of the frame."""
         of_frame = self.parameters[len(self.model.parameters) :]
         return self.model.reported().beside(Reported.as_is(of_frame))
 
 
 def _by_turn(v: Array) -> Array:
-    """Derivative (m, 2, 1) of a turn of v (m, 2) in the plane."""
+    """Return the derivative (m, 2, 1) of a turn of v (m, 2) in the plane."""
     return np.stack([-v[:, 1], v[:, 0]], axis=1)[:, :, None]
 
 
 def in_frame_of(
     fitted: ErrorModel, machine: TrueMachine, lower: tuple[float, ...], upper: tuple[float, ...]
 ) -> TrueMachine:
-    """The machine in the frame of a model that is fitted in the volume from `lower` to `upper`, in
-    metres.
+    """Return the machine in the frame of a model fitted in the volume from `lower` to `upper`
+    (metres).
 
-    That is where the machine comes nearest, by least squares over the volume, to what the model can
-    be: exactly the model's own frame if the model can follow the machine.
+    Shift and turn minimise the squared distance, over the volume, of the machine to the span of
+    the model.
     """
     framed = FramedModel(machine.model, lower)
     generator = np.random.default_rng(np.random.SeedSequence(0))
     x = generator.uniform(lower, upper, (POINTS, len(lower)))
     p = generator.uniform(-OFFSET, OFFSET, x.shape)
-    own = len(machine.a)
-    a = np.concatenate([machine.a, np.zeros(len(framed.parameters) - own)])
+    count = len(machine.a)
+    a = np.concatenate([machine.a, np.zeros(len(framed.parameters) - count)])
     wanted = framed.error(x, a, p) - p
     by_model = fitted.jacobian(x, np.zeros(len(fitted.parameters)), p)
-    by_frame = framed.jacobian(x, a, p)[:, :, own:]
+    by_frame = framed.jacobian(x, a, p)[:, :, count:]
     columns = np.concatenate([by_frame, by_model], axis=2).reshape(wanted.size, -1)
-    a[own:] = -np.linalg.lstsq(columns, wanted.ravel(), rcond=None)[0][: len(a) - own]
+    a[count:] = -np.linalg.lstsq(columns, wanted.ravel(), rcond=None)[0][: len(a) - count]
     return TrueMachine(framed, a)

@@ -13,8 +13,8 @@ from .protocol import Array, ErrorModel, Parameter, Reported
 class JoinedModel:
     """e(x, a, p) = e1(x, a1, p) + e2(x, a2, p) - p, with a = (a1, a2).
 
-    What both models can say is said by two sets of parameters: such a model tells ranks and sums of
-    squares.
+    Errors common to both models have two sets of parameters: use the sum for ranks and sums of
+    squares only.
     """
 
     first: ErrorModel
@@ -26,9 +26,9 @@ class JoinedModel:
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:
-        """Those of the first model, then those of the second with a name that says so."""
-        others = tuple(replace(one, name=f"second {one.name}") for one in self.second.parameters)
-        return self.first.parameters + others
+        """Parameters of the first model, then those of the second, named "second …"."""
+        renamed = (replace(p, name=f"second {p.name}") for p in self.second.parameters)
+        return (*self.first.parameters, *renamed)
 
     def error(self, x: Array, a: Array, p: Array) -> Array:
         n = len(self.first.parameters)

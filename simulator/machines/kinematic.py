@@ -1,20 +1,21 @@
-"""The kinematic error model: 18 functions of one variable on a chain of axes, and perhaps three
+"""The kinematic error model: 18 functions of one variable on a chain of axes, optionally 3
 squareness errors.
 
 Sources: NPL Report CISE 15/98, section 2.2; Park, Burdekin and Peggs, Appendix A. Rotations are
 right-handed about the machine's axes (ISO 230-1: EAX, EBX, ECX about X, Y, Z as the X axis moves),
-of opposite sign to those of the NPL report.
+of opposite sign to the NPL report.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
+from typing import ClassVar
 
 import numpy as np
 
 from .arrangement import AXES, Arrangement
-from .bases import Basis, Polynomial, Quoted
+from .bases import Basis, Polynomial, Quoted, SingleFunction
 from .error_names import AXIS_ERRORS, SQUARENESS_ERRORS, AxisError, SquarenessError
 from .protocol import Array, Line, Parameter, Reported, Unit
 from .rigid_chain import RigidChain
@@ -26,37 +27,25 @@ HELD_AT_FAR_END = ("EYX", "EZX", "EZY")
 
 
 @dataclass(frozen=True)
-class Slope:
-    """The one function `rise` t: the straight part of a straightness error, by its angle."""
+class Slope(SingleFunction):
+    """The function `rise` t: the straight part of a straightness error, by its angle."""
 
     rise: float
 
-    @property
-    def zero_at_one(self) -> bool:
-        return False
-
-    @property
-    def size(self) -> int:
-        return 1
+    kind: ClassVar[str] = "straight"
 
     def values(self, t: Array) -> Array:
-        """The line at t (m,), as (m, 1)."""
+        """Return the line at t (m,), as (m, 1)."""
         return self.rise * t[:, None]
 
-    def interior(self) -> Basis:
-        raise TypeError("a slope has no part that vanishes at both ends")
-
     def quoted(self, variable: str = "t") -> Quoted:
-        """The angle as it is."""
+        """Return the angle unchanged."""
         return Quoted(("",), np.eye(1))
-
-    def quoted_whole(self, variable: str = "t") -> Quoted:
-        raise TypeError("a slope is a single function")
 
 
 @dataclass(frozen=True)
 class ErrorFunction:
-    """One of the 18 functions, or a squareness error, with the functions it is made of."""
+    """One of the 18 functions, or a squareness error, with its basis."""
 
     error: AxisError | SquarenessError
     basis: Basis
@@ -72,18 +61,18 @@ class ErrorFunction:
 
     @property
     def component(self) -> int:
-        """Along what (0 to 2) it displaces, or about what it turns."""
+        """The direction of a displacement (0 to 2), or the axis of a rotation."""
         error = self.error
         return error.to if isinstance(error, SquarenessError) else error.component
 
     @property
     def rotation(self) -> bool:
-        """Whether it turns what the axis carries."""
+        """True for a rotation."""
         return isinstance(self.error, AxisError) and self.error.is_rotation
 
     @property
     def parameter_names(self) -> tuple[str, ...]:
-        """Names of its coefficients; a squareness error is its own only one."""
+        """Names of its coefficients; a squareness error has its own name."""
         if isinstance(self.error, SquarenessError):
             return (self.name,)
         return tuple(f"{self.name}[{k + 1}]" for k in range(self.basis.size))
@@ -93,8 +82,8 @@ class ErrorFunction:
 class KinematicModel:
     """e(x, a, p) of a chain of axes; `full_rotations` multiplies rotation matrices out.
 
-    `lower` and `upper` (3,) bound the volume in metres: the error functions depend on the position
-    along their axis scaled to [0, 1], and the chain starts from `origin` (3,), by default the lower
+    `lower` and `upper` (3,) bound the volume in metres: error functions depend on the position
+    along their axis scaled to [0, 1]. The chain starts from `origin` (3,), by default the lower
     corner.
     """
 
@@ -112,29 +101,29 @@ class KinematicModel:
     @cached_property
     def parameters(self) -> tuple[Parameter, ...]:
         span = np.subtract(self.upper, self.lower)
-        found = []
+        parameters = []
         for function in self.functions:
             grid = np.linspace(0.0, 1.0, 65)
             peaks = np.abs(function.basis.values(grid)).max(axis=0, initial=0.0)
             arm = float(span.max()) if function.rotation else 1.0
             error = function.error
-            found += [
+            parameters += [
                 Parameter(name, error.unit, error.name, error.meaning, arm * peak)
                 for name, peak in zip(function.parameter_names, peaks, strict=True)
             ]
-        return tuple(found)
+        return tuple(parameters)
 
     @cached_property
     def slices(self) -> dict[str, slice]:
         """Indices of each function's coefficients in a."""
-        found, start = {}, 0
+        slices, start = {}, 0
         for function in self.functions:
-            found[function.name] = slice(start, start + function.basis.size)
+            slices[function.name] = slice(start, start + function.basis.size)
             start += function.basis.size
-        return found
+        return slices
 
     def scaled(self, x: Array) -> Array:
-        """Positions x (m, 3) scaled to [0, 1] over the volume."""
+        """Return positions x (m, 3) scaled to [0, 1] over the volume."""
         lower = np.asarray(self.lower)
         return (x - lower) / (np.asarray(self.upper) - lower)
 
@@ -146,16 +135,16 @@ class KinematicModel:
     def _motions(
         self, bases: dict[tuple[int, Basis], Array], a: Array, m: int
     ) -> tuple[Array, Array]:
-        """Displacement and rotation of every axis, each (m, 3 axes, 3 components)."""
+        """Return displacement and rotation of every axis, each (m, 3 axes, 3 components)."""
         translation, rotation = np.zeros((m, 3, 3), a.dtype), np.zeros((m, 3, 3), a.dtype)
         for f in self.functions:
             target = rotation if f.rotation else translation
-            # A straightness error and a squareness error displace alike.
+            # A straightness and a squareness error share a component.
             target[:, f.axis, f.component] += bases[f.axis, f.basis] @ a[self.slices[f.name]]
         return translation, rotation
 
     def motions(self, x: Array, a: Array) -> tuple[Array, Array]:
-        """Displacement and rotation of every axis at positions x (m, 3), each (m, 3 axes, 3
+        """Return displacement and rotation of every axis at x (m, 3), each (m, 3 axes, 3
         components).
         """
         return self._motions(self._bases(x), a, len(x))
@@ -193,15 +182,15 @@ class KinematicModel:
             elif f.rotation:
                 # The unit vector of the component times the carried one, crosswise.
                 sign, vector = carried[f.axis]
-                one, other = (f.component + 1) % 3, (f.component + 2) % 3
-                result[:, one, columns] = values * (-sign * vector[:, other, None])
-                result[:, other, columns] = values * (sign * vector[:, one, None])
+                first, second = (f.component + 1) % 3, (f.component + 2) % 3
+                result[:, first, columns] = values * (-sign * vector[:, second, None])
+                result[:, second, columns] = values * (sign * vector[:, first, None])
             else:
                 result[:, f.component, columns] = values
         return result
 
     def lines(self, function: str, t: Array) -> tuple[Line, ...]:
-        """The function along its axis; a squareness error is the same everywhere."""
+        """Return the function along its axis; a squareness error is constant."""
         return tuple(
             Line("", np.ones((len(t), 1)))
             if isinstance(f.error, SquarenessError)
@@ -211,8 +200,8 @@ class KinematicModel:
         )
 
     def reported(self) -> Reported:
-        """Monomial coefficients on [0, 1], the form in which NPL section 6 quotes U3, or
-        coefficients of B-splines.
+        """Return monomial coefficients on [0, 1], as NPL section 6 quotes U3, or those of
+        B-splines.
         """
         return self._reported
 
@@ -230,10 +219,10 @@ class KinematicModel:
 
 
 def error_function(name: str, basis: Basis) -> ErrorFunction:
-    """One of the 18 functions by its ISO 230-1 name.
+    """Return one of the 18 functions by its ISO 230-1 name.
 
-    >>> found = error_function("ECX", Polynomial(3))
-    >>> found.axis, found.component, found.rotation
+    >>> yaw = error_function("ECX", Polynomial(3))
+    >>> yaw.axis, yaw.component, yaw.rotation
     (0, 2, True)
     """
     return ErrorFunction(AXIS_ERRORS[name], basis)
@@ -247,7 +236,7 @@ def kinematic_model(
     upper: tuple[float, ...],
     full_rotations: bool = False,
 ) -> KinematicModel:
-    """The model with polynomials of the stated numbers of coefficients, constants included.
+    """Return the model with polynomials of the stated numbers of coefficients, constants included.
 
     These are NDEL and NEPS of NPL Report CISE 15/98.
 
@@ -267,18 +256,17 @@ def kinematic_model_of(
     lower: tuple[float, ...],
     upper: tuple[float, ...],
     full_rotations: bool = False,
-    own: tuple[tuple[str, Basis | None], ...] = (),
+    single_families: tuple[tuple[str, Basis | None], ...] = (),
     squareness: bool = False,
 ) -> KinematicModel:
-    """The model with functions of the two families for its positional and its rotational errors.
+    """Return the model with functions of two families, for positional and rotational errors.
 
-    `own` has families of single functions by ISO 230-1 name, None for one that there is not. All
-    18 functions vanish at the lower corner, and the three straightness functions EYX, EZX and EZY
-    at the far end too. With `squareness` all six straightness functions do, and the three
-    squareness errors are parameters besides: the 21-parameter form, which can do the same where
-    the families contain t.
+    `single_families` has families of single functions by ISO 230-1 name, ``None`` to omit one. All
+    18 functions vanish at the lower corner; EYX, EZX and EZY (straightness) at the far end also.
+    With `squareness` all six straightness functions do, and three squareness errors are
+    parameters: the 21-parameter form, equivalent if the families contain t.
     """
-    families = dict(own)
+    families = dict(single_families)
     functions = []
     for is_rotation, family in ((False, position), (True, rotation)):
         for error in AXIS_ERRORS.values():
@@ -296,29 +284,30 @@ def kinematic_model_of(
 
 
 def in_plane(model: KinematicModel) -> KinematicModel:
-    """The model with those errors only that move points of the plane of x and y within it."""
+    """Return the model with only the errors that move points of the xy plane within it."""
     return replace(model, functions=tuple(f for f in model.functions if f.error.in_plane))
 
 
 def carried_vectors(arrangement: Arrangement, x: Array, p: Array) -> list[tuple[float, Array]]:
-    """For each axis the sign of its rotation's effect and the vector (m, 3) it carries.
+    """Return per axis the sign of its rotation's effect and the vector (m, 3) that it turns.
 
-    On the probe's side: what follows in the chain, and the probe offset. On the workpiece's side:
-    the whole of x + p less the displacements of the axes between this one and the workpiece.
+    On the probe's side: the chain beyond the axis, and the probe offset. On the workpiece's side:
+    x + p less the displacements of the axes between this axis and the workpiece.
     """
-    found: dict[str, tuple[float, Array]] = {}
+    by_axis: dict[str, tuple[float, Array]] = {}
     for side, sign in ((arrangement.probe_side, 1.0), (arrangement.workpiece_side, -1.0)):
-        for place, axis in enumerate(side):
-            beyond = np.array([name in side[place + 1 :] for name in AXES])
+        for index, axis in enumerate(side):
+            beyond = np.array([name in side[index + 1 :] for name in AXES])
             vector = x * beyond + p if sign > 0 else x * ~beyond + p
-            found[axis] = (sign, vector)
-    return [found[axis] for axis in AXES]
+            by_axis[axis] = (sign, vector)
+    return [by_axis[axis] for axis in AXES]
 
 
 def _crossed(v: Array, w: Array) -> Array:
-    """v x w, both (m, 3): as np.cross has it, without its general ways, which take far longer."""
-    found = np.empty(v.shape, np.result_type(v, w))
+    """Return v x w, both (m, 3)."""
+    # The generality of np.cross costs most of its time.
+    product = np.empty(v.shape, np.result_type(v, w))
     for i in range(3):
         j, k = (i + 1) % 3, (i + 2) % 3
-        found[:, i] = v[:, j] * w[:, k] - v[:, k] * w[:, j]
-    return found
+        product[:, i] = v[:, j] * w[:, k] - v[:, k] * w[:, j]
+    return product

@@ -1,4 +1,4 @@
-"""The keys of the kinematic error model."""
+"""Keys of the kinematic error model."""
 
 from __future__ import annotations
 
@@ -66,7 +66,7 @@ class KinematicSettings(Settings):
     functions: FunctionsSettings | None = Field(  # type: ignore[valid-type]
         default=None,
         description=(
-            "Single functions by their ISO 230-1 names, as the others are where left out: numbers"
+            "Single functions by their ISO 230-1 names, by default as all others: numbers"
             " of coefficients, the constant included, or B-splines as {order: 4, knots: [0.5]}."
             " With 1 coefficient there is no such error."
         ),
@@ -74,7 +74,7 @@ class KinematicSettings(Settings):
     squareness: Literal["straightness", "parameters"] = Field(
         default="straightness",
         description=(
-            "Where squareness is: in the straightness errors EXY, EXZ and EYZ, which then do not"
+            "Form of squareness: in the straightness errors EXY, EXZ and EYZ, which then do not"
             " vanish at the upper end of their axis, or in parameters EC0Y, EB0Z and EA0Z of its"
             " own (the 21-parameter form)."
         ),
@@ -91,17 +91,16 @@ class KinematicSettings(Settings):
         return self
 
 
-def _own(settings: KinematicSettings) -> tuple[tuple[str, Basis], ...]:
-    """The functions that have families of their own."""
-    stated: dict[str, Any] = {} if settings.functions is None else settings.functions.stated
+def _single_functions(settings: KinematicSettings) -> tuple[tuple[str, Basis], ...]:
+    """Return the functions with families of their own."""
+    forms: dict[str, Any] = {} if settings.functions is None else settings.functions.stated
     polynomials = "monomial" if settings.basis == "monomial" else "chebyshev"
     return tuple(
         (
-            (name, one.spline())
-            if isinstance(one, SplineSettings)
-            else (name, basis_of(polynomials, one))
+            name,
+            form.spline() if isinstance(form, SplineSettings) else basis_of(polynomials, form),
         )
-        for name, one in stated.items()
+        for name, form in forms.items()
     )
 
 
@@ -112,20 +111,25 @@ def _kinematic(settings: KinematicSettings, lower: Corner, upper: Corner) -> Err
         basis_of(settings.basis, settings.rotation_coefficients),
         *in_space(lower, upper),
         settings.rotations == "full",
-        _own(settings),
+        _single_functions(settings),
         settings.squareness == "parameters",
     )
     return model if len(lower) == 3 else PlaneModel(in_plane(model), 0.0)
 
 
 def _wrong(settings: KinematicSettings, dimension: int) -> list[tuple[Steps, str]]:
-    names = [name for name, _ in _own(settings)]
+    names = [name for name, _ in _single_functions(settings)]
     absent = [name for name in names if dimension == 2 and not AXIS_ERRORS[name].in_plane]
     if absent:
         text = "moves no point within the plane of x and y; remove it"
         return [(("functions", name), text) for name in absent]
     if not _kinematic(settings, (0.0,) * dimension, (1.0,) * dimension).parameters:
-        return [(("functions",), "leaves no error to be estimated; give one of them more than 1")]
+        return [
+            (
+                ("functions",),
+                "leaves no error to be estimated; give one function more than 1 coefficient",
+            )
+        ]
     return []
 
 

@@ -15,7 +15,7 @@ from .protocol import Array, Parameter, Reported
 
 Scale = Literal["none", "x", "y", "split"]
 
-# How much of gamma each scale takes: equations (3), (4) and (5).
+# Share of gamma in each scale: equations (3), (4) and (5).
 _SHARES: dict[Scale, tuple[float, float]] = {
     "none": (0.0, 0.0),
     "x": (1.0, 0.0),

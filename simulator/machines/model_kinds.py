@@ -1,4 +1,4 @@
-"""What a kind of error model consists of: its keys in a file, and the model made of them."""
+"""A type of error model: its keys in a file, and its model."""
 
 from __future__ import annotations
 
@@ -13,22 +13,18 @@ from .protocol import ErrorModel
 Corner = tuple[float, ...]
 
 
-def _nothing(settings: Any, dimension: int) -> tuple[tuple[Steps, str], ...]:
-    return ()
-
-
 @dataclass(frozen=True)
 class ErrorModelKind:
-    """A kind of error model.
+    """A type of error model.
 
-    `build` makes the model of the `settings` for a volume from a lower to an upper corner in
-    metres, with as many co-ordinates as one of `dimensions`. `wrong` tells what is wrong with
-    settings for so many dimensions, as (path in the settings, text) pairs; `with_defaults` states
-    defaults that depend on their number.
+    `build` makes the model from `settings` for a volume between two corners in metres;
+    `dimensions` lists the possible numbers of co-ordinates. `wrong` returns faults of the settings
+    for a number of dimensions as (path in the settings, text) pairs; `with_defaults` states
+    defaults that depend on this number.
     """
 
     settings: type[Settings]
     build: Callable[[Any, Corner, Corner], ErrorModel]
     dimensions: tuple[int, ...] = (2, 3)
-    wrong: Callable[[Any, int], Iterable[tuple[Steps, str]]] = _nothing
+    wrong: Callable[[Any, int], Iterable[tuple[Steps, str]]] = lambda settings, dimension: ()
     with_defaults: Callable[[Any, int], Settings] = lambda settings, dimension: settings

@@ -31,11 +31,11 @@ class PlaneModel:
         return self.spatial.error(_with_z(x, self.z), a, _with_z(p, 0.0))[:, :2]
 
     def jacobian(self, x: Array, a: Array, p: Array) -> Array:
-        found = self.spatial.jacobian(_with_z(x, self.z), a, _with_z(p, 0.0))
-        return np.ascontiguousarray(found[:, :2])
+        spatial = self.spatial.jacobian(_with_z(x, self.z), a, _with_z(p, 0.0))
+        return np.ascontiguousarray(spatial[:, :2])
 
     def lines(self, function: str, t: Array) -> tuple[Line, ...]:
-        """The function as the three-dimensional model shows it."""
+        """Return the function as the three-dimensional model shows it."""
         assert isinstance(self.spatial, HasLines)
         return self.spatial.lines(function, t)
 
@@ -46,7 +46,7 @@ class PlaneModel:
 def in_space(
     lower: tuple[float, ...], upper: tuple[float, ...]
 ) -> tuple[tuple[float, ...], tuple[float, ...]]:
-    """Corners of a volume; above a plane it is as high as it is wide, from z = 0.
+    """Return the corners of a volume; a plane volume becomes equally high and wide, from z = 0.
 
     >>> in_space((0.0, 0.5), (1.0, 2.5))
     ((0.0, 0.5, 0.0), (1.0, 2.5, 2.0))

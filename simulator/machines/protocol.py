@@ -1,4 +1,4 @@
-"""Protocol of all error models, whatever their parametrisation."""
+"""Protocol of all error models."""
 
 from __future__ import annotations
 
@@ -17,11 +17,10 @@ Unit = Literal["m", "rad", "1", "K", "1/K", "m/h", "1/h"]
 class Parameter:
     """A named parameter of an error model.
 
-    `unit` is the unit of its value: metres, radians, 1 for a ratio, or those of influence
-    quantities. `function` is the error it
-    belongs to, by its ISO 230-1 name where it has one, and `meaning` says in words what that error
-    is. `effect` is the displacement of a corrected point, in metres per `unit`, that the parameter
-    causes where in the volume it causes most: it makes parameters of different kinds comparable.
+    `unit` is that of its value: metres, radians, 1 for a ratio, or units of influence quantities.
+    `function` is its error, by ISO 230-1 name if it has one, and `meaning` describes it. `effect`
+    is the largest displacement of a corrected point in the volume, in metres per `unit`: it makes
+    different parameters comparable.
     """
 
     name: str
@@ -33,7 +32,7 @@ class Parameter:
 
 @dataclass(frozen=True)
 class Reported:
-    """The same model in another basis: `values = matrix @ a`, with `names` and `units` per row."""
+    """The model in another basis: `values = matrix @ a`, with `names` and `units` per row."""
 
     names: tuple[str, ...]
     units: tuple[Unit, ...]
@@ -41,36 +40,31 @@ class Reported:
 
     @classmethod
     def as_is(cls, parameters: tuple[Parameter, ...]) -> Reported:
-        """The parameters themselves."""
-        names, units = (
-            tuple(one.name for one in parameters),
-            tuple(one.unit for one in parameters),
-        )
+        """Return the parameters unchanged."""
+        names, units = tuple(p.name for p in parameters), tuple(p.unit for p in parameters)
         return cls(names, units, np.eye(len(parameters)))
 
-    def beside(self, other: Reported) -> Reported:
-        """What is reported of two models, the parameters of one after those of the other."""
-        (rows, columns), size = self.matrix.shape, np.add(self.matrix.shape, other.matrix.shape)
+    def beside(self, second: Reported) -> Reported:
+        """Return the joint report of two models, the parameters of `second` after these."""
+        (rows, columns), size = self.matrix.shape, np.add(self.matrix.shape, second.matrix.shape)
         matrix = np.zeros(size)
-        matrix[:rows, :columns], matrix[rows:, columns:] = self.matrix, other.matrix
-        return Reported(self.names + other.names, self.units + other.units, matrix)
+        matrix[:rows, :columns], matrix[rows:, columns:] = self.matrix, second.matrix
+        return Reported(self.names + second.names, self.units + second.units, matrix)
 
     def known_names(self) -> dict[str, int]:
-        """Rows by all names under which they may be stated: `EXX t` is the coefficient `EXX t^1`,
-        too.
-        """
-        found = {name: row for row, name in enumerate(self.names)}
+        """Return rows by all accepted names: `EXX t` is a synonym of the coefficient `EXX t^1`."""
+        rows = {name: row for row, name in enumerate(self.names)}
         for row, name in enumerate(self.names):
-            found.setdefault(name.removesuffix("^1"), row)
-        return found
+            rows.setdefault(name.removesuffix("^1"), row)
+        return rows
 
 
 @runtime_checkable
 class ErrorModel(Protocol):
     """An error correction e(x, a, p) with e(x, 0, p) = p.
 
-    A corrected point is x + e(x, a, p) for scale readings x, parameters a and probe offset p; the
-    model holds no state, so that one instance serves any number of estimates at once.
+    A corrected point is x + e(x, a, p) for scale readings x, parameters a and probe offset p. The
+    model holds no state: one instance serves concurrent estimates.
     """
 
     @property
@@ -80,19 +74,21 @@ class ErrorModel(Protocol):
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:
-        """The free parameters in the order of a, frame constraints already taken out."""
+        """The free parameters in the order of a, without those fixed by frame constraints."""
         ...
 
     def error(self, x: Array, a: Array, p: Array) -> Array:
-        """Correction in metres, (m, d), at scale readings x (m, d) with offsets p (m, d)."""
+        """Return the correction in metres, (m, d), at scale readings x (m, d) with offsets p (m,
+        d).
+        """
         ...
 
     def jacobian(self, x: Array, a: Array, p: Array) -> Array:
-        """Derivative of the correction by a, (m, d, n)."""
+        """Return the derivative of the correction by a, (m, d, n)."""
         ...
 
     def reported(self) -> Reported:
-        """The parameters as the field quotes them: monomial coefficients, angles, ratios."""
+        """Return the parameters in their usual form: monomial coefficients, angles, ratios."""
         ...
 
 
@@ -106,11 +102,10 @@ class TrueMachine:
 
 @dataclass(frozen=True)
 class Line:
-    """Values of an error function along a line: `basis` (points, parameters of the function) times
-    its parameters.
+    """Values of an error function along a line: `basis` (points, parameters) times its parameters.
 
-    `words` names the line where a function has more than one, such as "along X", and `axis` is the
-    one (0 to 2) that it runs along; None where it runs along none.
+    `words` names the line if a function has several, such as "along X"; `axis` (0 to 2) is its
+    direction, ``None`` if it is oblique.
     """
 
     words: str
@@ -120,14 +115,11 @@ class Line:
 
 @runtime_checkable
 class HasLines(Protocol):
-    """What an error model may offer besides: its error functions as curves, to describe and to draw
-    them.
+    """An error model whose error functions can be shown as curves.
 
     A function has the parameters whose `function` is its name, in their order.
     """
 
     def lines(self, function: str, t: Array) -> tuple[Line, ...]:
-        """The function at fractions t (m,) of lines through the volume; along its axis if it
-        depends on one only.
-        """
+        """Return the function at fractions t (m,) of lines through the volume, or of its axis."""
         ...

@@ -23,7 +23,7 @@ def _plane_rotation(angle: Array, about: int, derivative: bool = False) -> Array
 
 
 def rotation_and_derivatives(angles: Array) -> tuple[Array, list[Array]]:
-    """Rz Ry Rx for angles (m, 3), and its three derivatives, each (m, 3, 3)."""
+    """Return Rz Ry Rx for angles (m, 3), and its three derivatives, each (m, 3, 3)."""
     plain = [_plane_rotation(angles[:, k], k) for k in range(3)]
     derivatives = []
     for k in range(3):
@@ -35,7 +35,7 @@ def rotation_and_derivatives(angles: Array) -> tuple[Array, list[Array]]:
 
 @dataclass(frozen=True)
 class RigidChain:
-    """Rigid-body product of all axes: where the probe's tip lies in the frame of the workpiece
+    """Rigid-body product of all axes: the position of the probe's tip in the frame of the
     table.
     """
 
@@ -95,7 +95,7 @@ class RigidChain:
         return self._walk()[0] - self.x
 
     def sensitivities(self) -> tuple[list[Array], list[Array]]:
-        """Derivatives of the tip by each axis's translation and rotation, lists by axis of (m, 3,
+        """Return derivatives of the tip by each axis's translation and rotation, by axis (m, 3,
         3).
         """
         _, by_translation, by_rotation = self._walk()

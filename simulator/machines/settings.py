@@ -1,7 +1,7 @@
-"""The keys of error models in a file, and their conversion into error models.
+"""Keys of error models in a file, and their models.
 
-A kind of error model of the kernel is one file with its settings and an `ErrorModelKind`, and one
-entry of `ERROR_MODELS`; extensions have their own.
+A new error model of the kernel is one file with its keys and an `ErrorModelKind`, and one entry of
+`ERROR_MODELS`; extensions provide their own.
 """
 
 from __future__ import annotations
@@ -36,28 +36,28 @@ class MetricSettings(Settings):
     scale: Literal["none", "x", "y", "split", "each"] | None = Field(
         default=None,
         description=(
-            "In two dimensions which axis takes the scale difference gamma: x, y, split between"
-            " both, or none (default). In three dimensions each (default), for a scale error of"
-            " every axis, or none."
+            "In two dimensions the axis with the scale difference gamma: x, y, split (both), or"
+            " none (default). In three dimensions each (default), for a scale error of every"
+            " axis, or none."
         ),
     )
 
     @property
     def plane_scale(self) -> Scale:
-        """Which axis takes the scale difference in two dimensions."""
+        """The axis with the scale difference in two dimensions."""
         return "none" if self.scale is None or self.scale == "each" else self.scale
 
 
 class PythonSettings(Settings):
-    """A user's own error model, made by a Python function that is called with the volume's corners
-    and the options.
+    """A user's own error model, made by a Python function from the volume's corners and the
+    options.
     """
 
     kind: Literal["python"] = Field(description="a model of the user's own")
     object: Annotated[str, StringConstraints(min_length=1)] = Field(
         description=(
-            "module:function, the module installed or beside this file, or the name of an installed"
-            " entry point of the group ballplate.error_models."
+            "module:function, the module installed or in this file's folder, or the name of an"
+            " installed entry point of the group ballplate.error_models."
         )
     )
     options: dict[str, Any] = Field(
@@ -66,27 +66,23 @@ class PythonSettings(Settings):
 
     folder: str | None = Field(
         default=None,
-        description=(
-            "Folder of the module, as it is found from this file; default: that of this file."
-        ),
+        description=("Folder of the module, relative to this file; default: that of this file."),
     )
 
-    # Where modules are looked for besides where Python finds them.
+    # An additional folder of modules.
     _folder: Path | None = PrivateAttr(default=None)
     _trust: Trust = PrivateAttr(default=UNKNOWN)
 
     def beside(self, folder: Path, trust: Trust) -> None:
-        """Look for modules in the folder of the experiment file too, or in that named from
-        there.
+        """Search modules also in the experiment file's folder, or the stated one relative to
+        it.
         """
         self._folder = folder if self.folder is None else folder / self.folder
         self._trust = trust
 
 
 class MachineFileSettings(OfMachineFile):
-    """What a machine file states, as an error model to be estimated: its arrangement and errors,
-    not their values.
-    """
+    """The errors in a machine file, without their values, as an error model to be estimated."""
 
     kind: Literal["machine"] = Field(description="the errors that a machine file states")
     file: str = Field(description="Machine file (YAML), as for ballplate map.")
@@ -139,9 +135,10 @@ def _machine_file(settings: MachineFileSettings, lower: Corner, upper: Corner) -
 def _wrong_machine_file(settings: MachineFileSettings, dimension: int) -> list[tuple[Steps, str]]:
     if _machine_file(settings, (0.0,) * dimension, (1.0,) * dimension).parameters:
         return []
-    seen = " in the plane of x and y" if dimension == 2 else ""
+    plane_note = " in the plane of x and y" if dimension == 2 else ""
     text = (
-        f"{settings.file} states no error that could be estimated{seen}; give polynomials or tables"
+        f"{settings.file} states no error that could be estimated{plane_note}; give polynomials or"
+        " tables"
     )
     return [(("file",), text)]
 
@@ -155,11 +152,11 @@ ERROR_MODELS: tuple[ErrorModelKind, ...] = (
     ErrorModelKind(PythonSettings, _python),
     ErrorModelKind(MachineFileSettings, _machine_file, wrong=_wrong_machine_file),
 )
-"""The kinds of error models."""
+"""The kernel's types of error model."""
 
 _KINDS = {kind.settings: kind for kind in ERROR_MODELS}
 
-KINDS = tuple(kind for one in _KINDS for kind in get_args(one.model_fields["kind"].annotation))
+KINDS = tuple(kind for keys in _KINDS for kind in get_args(keys.model_fields["kind"].annotation))
 
 ErrorModelSettings = Annotated[  # type: ignore[valid-type]
     Union[tuple(_KINDS)],  # noqa: UP007
@@ -168,7 +165,7 @@ ErrorModelSettings = Annotated[  # type: ignore[valid-type]
 
 
 def kind_of(settings: Settings) -> ErrorModelKind:
-    """The kind of error model that the settings describe."""
+    """Return the type of a described error model."""
     if type(settings) in _KINDS:
         return _KINDS[type(settings)]
     kind: Any = provided("error_models", vars(settings)["kind"], "ERROR_MODEL")
@@ -177,26 +174,26 @@ def kind_of(settings: Settings) -> ErrorModelKind:
 
 
 def with_defaults(settings: Settings, dimension: int) -> Settings:
-    """Settings of an error model or a true machine, with defaults stated that depend on the number
-    of dimensions.
+    """Return settings of an error model or true machine with defaults for the number of
+    dimensions.
 
     >>> with_defaults(MetricSettings(kind="metric"), 3).scale
     'each'
     """
     if type(settings) in _KINDS or owner(type(settings)) is not None:
         return kind_of(settings).with_defaults(settings, dimension)
-    own = getattr(settings, "error_model", None)
+    model_settings = getattr(settings, "error_model", None)
     return (
         settings
-        if own is None
-        else settings.model_copy(update={"error_model": with_defaults(own, dimension)})
+        if model_settings is None
+        else settings.model_copy(update={"error_model": with_defaults(model_settings, dimension)})
     )
 
 
 def build_error_model(settings: Settings, lower: Corner, upper: Corner) -> ErrorModel:
-    """The error model that settings describe, for a volume from `lower` to `upper` in metres.
+    """Return the described error model, for a volume from `lower` to `upper` in metres.
 
-    :raises CustomModelError: a user's own model that cannot be used.
+    :raises CustomModelError: a user's own model is unusable.
 
     >>> build_error_model(MetricSettings(kind="metric"), (0.0, 0.0), (1.0, 1.0)).dimension
     2

@@ -1,11 +1,11 @@
-"""The three-dimensional metric: three straight axes, each with a scale error, not quite square to
-one another.
+"""The three-dimensional metric: three straight axes with scale errors, not quite square to one
+another.
 
-Source: US 4,437,151 (Hurt and Foss), equations (100) to (107). A difference D of readings is a true
-length d with d^2 = D' G D. Here G = M'M, where the columns of M are the directions of the axes
-times what their scales leave out; M is upper triangular because X gives the frame its x and X and Y
-its xy plane. G and M tell the same, exactly: sqrt(G_ii) - 1 is the scale error of axis i, and
-arccos(G_ij / sqrt(G_ii G_jj)) the angle between axes i and j.
+Source: US 4,437,151 (Hurt and Foss), equations (100) to (107). A difference D of readings has the
+true length d with d^2 = D' G D. Here G = M'M, and the columns of M are the directions of the axes
+times their scale factors; M is upper triangular because X defines the frame's x axis, X and Y its
+xy plane. G and M are equivalent: sqrt(G_ii) - 1 is the scale error of axis i, arccos(G_ij /
+sqrt(G_ii G_jj)) the angle between axes i and j.
 """
 
 from __future__ import annotations
@@ -22,14 +22,12 @@ SQUARENESS = ("C0Y", "B0Z", "A0Z")
 
 @dataclass(frozen=True)
 class SpatialMetricModel:
-    """Scale errors of X, Y and Z and squareness errors C0Y, B0Z and A0Z, in this order; or the
-    latter alone.
+    """Scale errors of X, Y and Z (optional) and squareness errors C0Y, B0Z and A0Z, in this order.
 
-    A reading x is corrected to `lower` + M (x - `lower`) + p with the columns (1 + s_i) u_i of M. A
-    scale error s is positive where readings are too short. Squareness errors are turns about the
-    positive axis C, B or A (ISO 230-1) that the guideway has suffered: the angle between X and Y is
-    90 degrees + C0Y, that between X and Z 90 degrees less B0Z, that between Y and Z 90 degrees +
-    A0Z, exactly.
+    A reading x is corrected to `lower` + M (x - `lower`) + p with the columns (1 + s_i) u_i of M.
+    A scale error s is positive if readings are too short. Squareness errors are turns of the
+    guideway about the positive axis C, B or A (ISO 230-1): the angle between X and Y is 90 degrees
+    + C0Y, between X and Z 90 degrees - B0Z, between Y and Z 90 degrees + A0Z, exactly.
     """
 
     with_scales: bool
@@ -51,18 +49,22 @@ class SpatialMetricModel:
         )
         squareness = tuple(
             Parameter(
-                name, "rad", name, f"squareness of {name[2]} to {other}", span["XYZ".index(name[2])]
+                name,
+                "rad",
+                name,
+                f"squareness of {name[2]} to {reference}",
+                span["XYZ".index(name[2])],
             )
-            for name, other in zip(SQUARENESS, "XXY", strict=True)
+            for name, reference in zip(SQUARENESS, "XXY", strict=True)
         )
         return scales + squareness if self.with_scales else squareness
 
     def axes(self, a: Array) -> Array:
-        """M (3, 3) at parameters `a`, which takes differences of readings to true ones."""
+        """Return M (3, 3) at parameters `a`, from differences of readings to true differences."""
         return self._derivatives(a)[0]
 
     def _derivatives(self, a: Array) -> tuple[Array, Array]:
-        """M (3, 3) and its derivatives (parameters, 3, 3)."""
+        """Return M (3, 3) and its derivatives (parameters, 3, 3)."""
         scale = 1.0 + a[:3] if self.with_scales else np.ones(3)
         c, b, a_ = a[-3:]
         sin_c, cos_c, sin_b, sin_a = np.sin(c), np.cos(c), np.sin(b), np.sin(a_)
@@ -98,11 +100,10 @@ class SpatialMetricModel:
 
 
 def parameters_of_metric(metric: Array) -> Array:
-    """Scale errors and squareness errors (6,) of a metric tensor G (3, 3): equations (102) to
+    """Return scale and squareness errors (6,) of a metric tensor G (3, 3): equations (102) to
     (107).
 
-    :raises ValueError: a tensor that is not positive definite, so that some difference of readings
-        has no length.
+    :raises ValueError: G is not positive definite: a difference of readings has no length.
 
     >>> model = SpatialMetricModel(True, (0.0, 0.0, 0.0), (1.0, 1.0, 1.0))
     >>> a = np.array([1e-5, -2e-5, 3e-5, 4e-5, -5e-5, 6e-5])

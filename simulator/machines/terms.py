@@ -1,8 +1,8 @@
-"""Functions of three variables on [0, 1]^3, from which the empirical error model is built.
+"""Functions of three variables on [0, 1]^3, the terms of the empirical error model.
 
-Products of one univariate function along each axis: redundancy-free sums, plain sums of univariate
-functions, quadratics and full tensor products; and radial basis functions. They are those of NPL
-Report CISE 15/98, sections 2.1.1, 2.1.2 and 5.3, where the radial function is left open.
+Products of one univariate function along each axis (redundancy-free sums, plain sums, quadratics,
+full tensor products) and radial basis functions: NPL Report CISE 15/98, sections 2.1.1, 2.1.2 and
+5.3, which does not prescribe the radial function.
 """
 
 from __future__ import annotations
@@ -23,24 +23,24 @@ VARIABLES = ("x", "y", "z")
 
 
 class Terms(Protocol):
-    """Linearly independent functions of a place."""
+    """Linearly independent functions of a position."""
 
     @property
     def names(self) -> tuple[str, ...]: ...
 
     def values(self, t: Array) -> Array:
-        """Functions at places t (m, 3), as (m, number of functions)."""
+        """Return the functions at scaled positions t (m, 3), as (m, number of functions)."""
         ...
 
     def quoted(self) -> Quoted:
-        """The functions in the form the field quotes."""
+        """Return the functions in the form usual in the field."""
         ...
 
 
 @dataclass(frozen=True)
 class Products:
     """Products of univariate functions: `factors` (terms, 3) index 1, t and the interior functions
-    of each axis.
+    of an axis.
 
     >>> sums(Spline(3)).names[:8]
     ('1', 'x', 'y', 'z', 'x*y', 'x*z', 'y*z', 's1(x)')
@@ -75,20 +75,20 @@ class Products:
         return result
 
     def quoted(self) -> Quoted:
-        """Coefficients of monomials; splines are quoted as they are, with t and 1 among them."""
+        """Return coefficients of monomials; splines remain unchanged, with t and 1 among them."""
         if any(isinstance(axis, Spline) for axis in self.axes):
             return Quoted(self.names, np.eye(len(self.names)))
         by_axis = [
             axis.quoted_whole(variable) for axis, variable in zip(self.axes, VARIABLES, strict=True)
         ]
         rows: dict[str, Array] = {}
-        for powers in product(*(range(len(one.names)) for one in by_axis)):
+        for powers in product(*(range(len(quoted.names)) for quoted in by_axis)):
             row = np.array(
                 [
                     np.prod(
                         [
-                            one.matrix[power, index]
-                            for one, power, index in zip(by_axis, powers, term, strict=True)
+                            quoted.matrix[power, index]
+                            for quoted, power, index in zip(by_axis, powers, term, strict=True)
                         ]
                     )
                     for term in self.factors
@@ -96,8 +96,8 @@ class Products:
             )
             if row.any():
                 names = [
-                    one.names[power].removesuffix("^1")
-                    for one, power in zip(by_axis, powers, strict=True)
+                    quoted.names[power].removesuffix("^1")
+                    for quoted, power in zip(by_axis, powers, strict=True)
                 ]
                 rows["*".join(filter(None, names)) or "1"] = row
         matrix = np.array(list(rows.values())).reshape(len(rows), len(self.factors))
@@ -105,15 +105,15 @@ class Products:
 
 
 def sums(basis: Basis) -> Products:
-    """Sums of tensor products without redundancy: 1, x, y, z, xy, xz, yz and, for each interior
-    function s, s(x), s(x) y, s(x) z, and so for y and z.
+    """Return sums of tensor products without redundancy: 1, x, y, z, xy, xz, yz and, for each
+    interior function s and variable such as x, s(x), s(x) y, s(x) z.
     """
     inner = range(2, 2 + basis.interior().size)
     factors = [(0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1), (1, 1, 0), (1, 0, 1), (0, 1, 1)]
     for axis in range(3):
-        others = [k for k in range(3) if k != axis]
+        across = [k for k in range(3) if k != axis]
         for index in inner:
-            for linear in (None, *others):
+            for linear in (None, *across):
                 term = [0, 0, 0]
                 term[axis] = index
                 if linear is not None:
@@ -123,8 +123,7 @@ def sums(basis: Basis) -> Products:
 
 
 def univariate(basis: Basis) -> Products:
-    """Plain sums of univariate functions without redundancy: 1, x, y, z and the interior functions
-    of each.
+    """Return plain sums of univariate functions: 1, x, y, z and the interior functions of each.
 
     >>> univariate(Spline(3)).names
     ('1', 'x', 'y', 'z', 's1(x)', 's1(y)', 's1(z)')
@@ -136,13 +135,15 @@ def univariate(basis: Basis) -> Products:
 
 
 def no_terms() -> Products:
-    """No functions at all."""
+    """Return no functions."""
     basis = Monomial(2)
     return Products((basis, basis, basis), ())
 
 
 def quadratic() -> Products:
-    """All polynomials of degree 2: 1, x, y, z, xy, xz, yz and s(x) = x - x^2, s(y), s(z)."""
+    """Return all polynomials of degree 2: 1, x, y, z, xy, xz, yz and s(x) = x - x^2, s(y),
+    s(z).
+    """
     basis = Monomial(3)
     factors = [term for term in _triples(3) if sum(term) <= 2]
     return Products(
@@ -151,7 +152,7 @@ def quadratic() -> Products:
 
 
 def tensor(basis: Basis) -> Products:
-    """All products of a function of x, one of y and one of z."""
+    """Return all products of a function of x, one of y and one of z."""
     return Products((basis, basis, basis), tuple(_triples(2 + basis.interior().size)))
 
 
@@ -165,7 +166,7 @@ RadialName = Literal[
 
 
 def _thin_plate(squared: Array, constant: float) -> Array:
-    """r^2 log r, of r^2; zero where r is."""
+    """Return r^2 log r of r^2; zero at r = 0."""
     return 0.5 * squared * np.log(np.where(squared == 0.0, 1.0, squared))
 
 
@@ -179,8 +180,8 @@ RADIAL: dict[str, Callable[[Array, float], Array]] = {
 }
 """Radial functions of r^2 and a constant.
 
-Each is, up to sign, definite on coefficients that are orthogonal to linear polynomials, so that
-interpolation at any centres that do not all lie in a plane has one solution.
+Up to sign, each is definite on coefficients orthogonal to linear polynomials: interpolation at
+centres that are not coplanar has one solution.
 """
 WITH_CONSTANT = ("multiquadric", "inverse multiquadric", "gaussian")
 
@@ -190,9 +191,9 @@ class Radial:
     """Interpolants of radial functions and a linear polynomial, by their values at centres.
 
     The centres are a regular grid over the volume, corners included. A function's coefficients are
-    its values at the centres; the radial functions' own coefficients are orthogonal to linear
-    polynomials, in the null space of those conditions, so that linear functions come out exactly.
-    Distances and `constant` are in fractions of the volume.
+    its values at the centres; the radial functions' coefficients are orthogonal to linear
+    polynomials, so that linear functions are reproduced exactly. Distances and `constant` are in
+    fractions of the volume.
 
     >>> Radial((2, 2, 2), 0.5).names[:2]
     ('at (0, 0, 0)', 'at (0, 0, 1)')
@@ -222,7 +223,7 @@ class Radial:
 
     @cached_property
     def _weights(self) -> tuple[Array, Array]:
-        """Coefficients of the radial functions (n, n) and of 1, x, y, z (4, n) for each value at a
+        """Coefficients of the radial functions (n, n) and of 1, x, y, z (4, n) per value at a
         centre.
         """
         kernel, linear = self._functions(self.centres)
@@ -237,5 +238,5 @@ class Radial:
         return kernel @ radial + linear @ polynomial
 
     def quoted(self) -> Quoted:
-        """The values at the centres, as they are."""
+        """Return the values at the centres."""
         return Quoted(self.names, np.eye(len(self.names)))

@@ -1,4 +1,4 @@
-"""The keys of the true machine, from which simulated readings come."""
+"""Keys of the true machine, the source of simulated readings."""
 
 from __future__ import annotations
 
@@ -77,22 +77,22 @@ class CurvesSettings(Settings):
     )
     interpolation: Interpolation = Field(
         default="linear",
-        description="Between the points: linear, cubic splines, or monotone cubics.",
+        description="Interpolation between points: linear, cubic splines, or monotone cubics.",
     )
     arrangement: ArrangementName | ArrangementSettings = Field(
         default="MB2", description=ARRANGEMENT
     )
     rotations: Literal["linearised", "full"] = Field(default="linearised", description=ROTATIONS)
 
-    # What the files hold, by ISO 230-1 name; filled in when the experiment is loaded.
+    # Curves by ISO 230-1 name; set when the experiment is loaded.
     _curves: dict[str, Points] = PrivateAttr(default_factory=dict)
 
-    def of(self, curves: dict[str, Points]) -> None:
-        """Take the curves that the files hold."""
+    def set_curves(self, curves: dict[str, Points]) -> None:
+        """Set the curves of the files."""
         self._curves = curves
 
     def model(self, lower: Corner, upper: Corner) -> ErrorModel:
-        """The curves as an error model, all of whose parameters are one."""
+        """Return the curves as an error model whose parameters are all one."""
         return curves_model(
             self._curves,
             self.interpolation,
@@ -104,7 +104,7 @@ class CurvesSettings(Settings):
 
 
 class TrueMachineFileSettings(OfMachineFile):
-    """The machine that a machine file describes."""
+    """The machine in a machine file."""
 
     kind: Literal["machine"] = Field(description="the machine that a file describes")
     file: str = Field(description="Machine file (YAML), as for ballplate map.")
@@ -117,25 +117,25 @@ class TrueMachineFileSettings(OfMachineFile):
     random_part: Literal["omitted"] | None = Field(
         default=None,
         description=(
-            '"omitted": simulated readings are to be without the random part of the file, which '
-            "machine.repeatability covers. A file that has one is refused otherwise."
+            '"omitted": simulate without the random part of the file, which machine.repeatability '
+            "covers. Without this key, a file with a random part is refused."
         ),
     )
 
     def machine(self, dimension: int = 3) -> TrueMachine:
-        """The systematic errors of the machine, of two dimensions those at the level."""
+        """Return the systematic errors of the machine, in two dimensions those at the level."""
         # Loaded where a machine file is named: few experiments name any.
         from .description import true_volumetric
 
-        found = true_volumetric(self.described)
+        machine = true_volumetric(self.described)
         if dimension == 3:
-            return found
+            return machine
         level = self.described.reference[2] if self.level is None else self.level
-        return TrueMachine(PlaneModel(found.model, level), found.a)
+        return TrueMachine(PlaneModel(machine.model, level), machine.a)
 
 
 class TrueMapSettings(Settings):
-    """The machine that a map of a fit describes."""
+    """The machine of a map file."""
 
     kind: Literal["map"] = Field(description="the machine that a fit has found")
     file: str = Field(description="Map file, as ballplate fit -o writes it.")
@@ -147,18 +147,18 @@ class TrueMapSettings(Settings):
         ),
     )
 
-    # What the file says; filled in when the experiment is loaded.
-    _found: TrueMachine | None = PrivateAttr(default=None)
+    # Content of the file; set when the experiment is loaded.
+    _machine: TrueMachine | None = PrivateAttr(default=None)
     _content: str = PrivateAttr(default="")
 
-    def of(self, machine: TrueMachine, content: str) -> None:
-        """Take the machine of a file, and the SHA-256 of what is in that."""
-        self._found, self._content = machine, content
+    def set_machine(self, machine: TrueMachine, content: str) -> None:
+        """Set the machine of a map file, and the SHA-256 of its content."""
+        self._machine, self._content = machine, content
 
     def machine(self) -> TrueMachine:
-        """The errors that were found, or drawn."""
-        assert self._found is not None
-        return self._found
+        """Return the estimated or drawn errors."""
+        assert self._machine is not None
+        return self._machine
 
 
 TrueMachineSettings = Annotated[

@@ -1,5 +1,5 @@
-"""The machine from which synthetic readings come: an error model, which may differ from the
-estimated one, and its parameters.
+"""The machine behind synthetic readings: an error model, which may differ from the estimated one,
+and its parameters.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ _PARSERS = {"m": parse_length, "rad": parse_angle, "1": parse_ratio}
 
 
 class TruthError(ValueError):
-    """A stated true machine is not one of the error model; `problems` are (parameter name, text)
+    """A stated true machine contradicts its error model; `problems` are (parameter name, text)
     pairs.
     """
 
@@ -40,10 +40,10 @@ class TruthError(ValueError):
 def true_machine(
     settings: Settings, fitted: ErrorModel, lower: Corner, upper: Corner
 ) -> TrueMachine:
-    """The true machine in a volume from `lower` to `upper` in metres.
+    """Return the true machine in a volume from `lower` to `upper` in metres.
 
-    Its error model is `fitted`, the one that is estimated, unless the settings name another. A
-    machine that a file describes is brought into the frame of `fitted`.
+    Its error model is its own, if stated, otherwise the estimated one, `fitted`. A machine from a
+    file is transformed into the frame of `fitted`.
 
     :raises TruthError: see `true_parameters`.
 
@@ -62,27 +62,28 @@ def true_machine(
     if isinstance(settings, TrueMapSettings):
         machine = settings.machine()
         return machine if machine.model == fitted else in_frame_of(fitted, machine, lower, upper)
-    other = getattr(settings, "error_model", None)
-    model = fitted if other is None else build_error_model(other, lower, upper)
+    own_model = getattr(settings, "error_model", None)
+    model = fitted if own_model is None else build_error_model(own_model, lower, upper)
     return TrueMachine(model, true_parameters(settings, model))
 
 
 def true_parameters(settings: Settings, model: ErrorModel) -> Array:
-    """Parameters a (n,) of the true machine.
+    """Return parameters a (n,) of the true machine.
 
-    :raises TruthError: an unknown parameter, a wrong unit, or values that break a frame constraint.
+    :raises TruthError: an unknown parameter, an unsuitable unit, or values that break a frame
+        constraint.
     """
     if isinstance(settings, ZeroSettings):
         return np.zeros(len(model.parameters))
     if isinstance(settings, CoefficientSettings):
-        return _stated(settings.values, model)
+        return _parameters_of_values(settings.values, model)
     if isinstance(settings, RandomSettings):
         return _random(settings, model)
     raise TypeError(f"no true machine is made from {type(settings).__name__}")
 
 
-def _stated(values: dict[str, str], model: ErrorModel) -> Array:
-    own = {
+def _parameters_of_values(values: dict[str, str], model: ErrorModel) -> Array:
+    rows_of_a = {
         p.name: (p.unit, np.eye(len(model.parameters))[i]) for i, p in enumerate(model.parameters)
     }
     reported = model.reported()
@@ -91,10 +92,14 @@ def _stated(values: dict[str, str], model: ErrorModel) -> Array:
     problems: list[tuple[str, str]] = []
     targets: dict[str, float] = {}
     for name, text in values.items():
-        entry = own.get(name) or quoted.get(name)
+        entry = rows_of_a.get(name) or quoted.get(name)
         if entry is None:
             problems.append(
-                (name, f'the error model has no parameter "{name}"; {hint(name, [*own, *quoted])}')
+                (
+                    name,
+                    f'the error model has no parameter "{name}";'
+                    f" {hint(name, [*rows_of_a, *quoted])}",
+                )
             )
             continue
         try:
@@ -103,10 +108,10 @@ def _stated(values: dict[str, str], model: ErrorModel) -> Array:
             problems.append((name, str(error)))
     if problems:
         raise TruthError(problems)
-    given_own = {name: value for name, value in targets.items() if name in own}
+    given_own = {name: value for name, value in targets.items() if name in rows_of_a}
     given_quoted: dict[int, tuple[str, float]] = {}
     for name, value in targets.items():
-        if name in own:
+        if name in rows_of_a:
             continue
         if rows[name] in given_quoted:
             text = (
@@ -117,35 +122,34 @@ def _stated(values: dict[str, str], model: ErrorModel) -> Array:
         given_quoted[rows[name]] = name, value
     a = np.zeros(len(model.parameters))
     for name, value in given_own.items():
-        a += value * own[name][1]
+        a += value * rows_of_a[name][1]
     if given_quoted:
-        wanted = np.zeros(len(reported.names))
-        wanted[list(given_quoted)] = [value for _, value in given_quoted.values()]
-        solution = np.linalg.lstsq(reported.matrix, wanted, rcond=None)[0]
-        left = reported.matrix @ solution - wanted
+        targets_quoted = np.zeros(len(reported.names))
+        targets_quoted[list(given_quoted)] = [value for _, value in given_quoted.values()]
+        solution = np.linalg.lstsq(reported.matrix, targets_quoted, rcond=None)[0]
+        residual = reported.matrix @ solution - targets_quoted
         for row, (name, value) in given_quoted.items():
-            if abs(left[row]) > 1e-9 * max(abs(value), np.abs(wanted).max()):
-                problems.append((name, _held(name.split()[0], own)))
+            if abs(residual[row]) > 1e-9 * max(abs(value), np.abs(targets_quoted).max()):
+                problems.append((name, _constraint_text(name.split()[0], rows_of_a)))
         if problems:
             raise TruthError(problems)
         a += solution
     return a
 
 
-def _held(function: str, parameters: Collection[str]) -> str:
-    """Why the coefficients of a function have to add up to zero, and what to do."""
+def _constraint_text(function: str, parameters: Collection[str]) -> str:
+    """Return the reason and the remedy if coefficients of a function must add up to zero."""
     text, error = f"{function} must be zero at both ends of its axis", AXIS_ERRORS.get(function)
     for name, square in SQUARENESS_ERRORS.items():
         if name in parameters and error == AxisError(square.axis, square.to, False):
             return f"{text}; let its coefficients add up to zero, and state its slope as {name}"
-    return f"{text}, where it fixes the machine's frame; let its coefficients add up to zero"
+    return f"{text} to fix the machine's frame; let its coefficients add up to zero"
 
 
 def _random(settings: RandomSettings, model: ErrorModel) -> Array:
-    """Each error function gets a random shape, scaled to the stated root mean square.
+    """Return random parameters: each error function is scaled to the stated root mean square.
 
-    It is taken over the function's axis or, where it has several, over the lines on which the model
-    shows it.
+    The mean is over the function's axis or, if it has several variables, its lines.
     """
     sizes = {
         "m": settings.position or 0.0,

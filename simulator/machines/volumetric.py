@@ -1,8 +1,8 @@
 """Volumetric errors: the chain of axes with squareness, thermal expansion and the droop of an arm.
 
 Source: Park, Burdekin and Peggs, section 5.1 and Appendix A.1, which prints the sum for ten
-arrangements. The errors are those of the kinematic model; what comes in addition is linear in a few
-numbers, each times a polynomial of the position from the reference point.
+arrangements. To the errors of the kinematic model it adds fields, each a coefficient times a
+polynomial of the position relative to the reference point.
 """
 
 from __future__ import annotations
@@ -24,7 +24,9 @@ Term = tuple[int, float, tuple[int, int, int]]
 
 @dataclass(frozen=True)
 class Field:
-    """An error that is one number times a polynomial of the position from the reference point."""
+    """An error that is a coefficient times a polynomial of the position relative to the reference
+    point.
+    """
 
     name: str
     unit: Unit
@@ -32,13 +34,13 @@ class Field:
     terms: tuple[Term, ...]
 
     def values(self, x: Array) -> Array:
-        """Displacement (m, 3) for each unit of the number, at positions x (m, 3) from the reference
-        point.
+        """Return the displacement (m, 3) per unit of the coefficient, at x (m, 3) from the
+        reference point.
         """
-        found = np.zeros(x.shape, x.dtype)
+        displacement = np.zeros(x.shape, x.dtype)
         for component, factor, exponents in self.terms:
-            found[:, component] += factor * np.prod(x ** np.array(exponents), axis=1)
-        return found
+            displacement[:, component] += factor * np.prod(x ** np.array(exponents), axis=1)
+        return displacement
 
 
 SQUARENESS: dict[str, tuple[Term, ...]] = {
@@ -62,30 +64,30 @@ DROOP: dict[str, tuple[int, tuple[int, float], tuple[int, float]]] = {
 
 
 def squareness_field(name: str) -> Field:
-    """A squareness error by its ISO 230-1 name, in radians."""
+    """Return a squareness error by its ISO 230-1 name, in radians."""
     return Field(name, "rad", SQUARENESS_ERRORS[name].meaning, SQUARENESS[name])
 
 
 def thermal_field(axis: int) -> Field:
-    """Expansion of an axis; its number is the coefficient times the deviation of the
-    temperature.
+    """Return the expansion of an axis; its coefficient is expansion times temperature
+    deviation.
     """
     exponents = int(axis == 0), int(axis == 1), int(axis == 2)
     meaning = f"thermal expansion along {AXES[axis]}"
     return Field(f"thermal {AXES[axis]}", "1", meaning, ((axis, 1.0, exponents),))
 
 
-def droop_field(arrangement: str, which: str, length: float) -> Field:
-    """Droop of an arm; its number is phi1 or phi2 times `length`, the angle when the arm has moved
-    so far.
+def droop_field(arrangement: str, name: str, length: float) -> Field:
+    """Return the droop of an arm; its coefficient is the angle phi1 or phi2 at the extension
+    `length`.
 
     As printed: MH1 has phi1 x z in X and -phi2 x^2 / 2 in Z, MH2 has phi1 y z in Y and +phi2 y^2 /
-    2 in Z. An arm that sinks as it is driven out has phi1 > 0 in both, phi2 > 0 in MH1, but phi2 <
-    0 in MH2: the printed phi2 y is a right-handed rotation about X, which lifts what is at +y.
+    2 in Z. An arm that sinks on extension has phi1 > 0 in both, phi2 > 0 in MH1, but phi2 < 0 in
+    MH2: the printed phi2 y is a right-handed rotation about X, which lifts points at +y.
     """
     axis, tilt, bend = DROOP[arrangement]
     along = [int(k == axis) for k in range(3)]
-    if which == "phi1":
+    if name == "phi1":
         exponents = (along[0], along[1], 1)
         return Field(
             "phi1",
@@ -99,8 +101,8 @@ def droop_field(arrangement: str, which: str, length: float) -> Field:
 
 @dataclass(frozen=True)
 class VolumetricModel:
-    """e(x, a, p) of a chain of axes and of fields besides; a has the chain's parameters, then one
-    for each field.
+    """e(x, a, p) of a chain of axes plus fields; a has the chain's parameters, then one per
+    field.
     """
 
     chain: KinematicModel
@@ -113,21 +115,21 @@ class VolumetricModel:
     @cached_property
     def parameters(self) -> tuple[Parameter, ...]:
         corners = np.array(list(product(*zip(self.chain.lower, self.chain.upper, strict=True))))
-        found = []
+        of_fields = []
         for field in self.fields:
             effect = float(np.abs(field.values(self._from_origin(corners))).max())
-            found.append(Parameter(field.name, field.unit, field.name, field.meaning, effect))
-        return (*self.chain.parameters, *found)
+            of_fields.append(Parameter(field.name, field.unit, field.name, field.meaning, effect))
+        return (*self.chain.parameters, *of_fields)
 
     def _from_origin(self, x: Array) -> Array:
         return x - np.asarray(self.chain.lower if self.chain.origin is None else self.chain.origin)
 
     def error(self, x: Array, a: Array, p: Array) -> Array:
         n = len(self.chain.parameters)
-        found = self.chain.error(x, a[:n], p)
+        total = self.chain.error(x, a[:n], p)
         for field, value in zip(self.fields, a[n:], strict=True):
-            found = found + value * field.values(self._from_origin(x))
-        return found
+            total = total + value * field.values(self._from_origin(x))
+        return total
 
     def jacobian(self, x: Array, a: Array, p: Array) -> Array:
         n = len(self.chain.parameters)
@@ -136,19 +138,21 @@ class VolumetricModel:
         return np.concatenate([by_chain, *by_fields], axis=2)
 
     def lines(self, function: str, t: Array) -> tuple[Line, ...]:
-        """An axis's function along it; a field's number, which is the same everywhere."""
+        """Return an axis's function along it; a field's coefficient is constant."""
         if any(field.name == function for field in self.fields):
             return (Line("", np.ones((len(t), 1))),)
         return self.chain.lines(function, t)
 
     def reported(self) -> Reported:
-        """Functions as the kinematic model reports them, and the fields' numbers as they are."""
+        """Return functions as the kinematic model reports them, and the coefficients of the
+        fields.
+        """
         of_fields = self.parameters[len(self.chain.parameters) :]
         return self.chain.reported().beside(Reported.as_is(of_fields))
 
 
 def symbol(name: str) -> str:
-    """How Park, Burdekin and Peggs write an error that ISO 230-1 names.
+    """Return the symbol of Park, Burdekin and Peggs for an ISO 230-1 name.
 
     >>> symbol("EXX"), symbol("EZY"), symbol("EBX"), symbol("EB0Z")
     ('δx(x)', 'δz(y)', 'Ey(x)', '-β1')
@@ -156,12 +160,12 @@ def symbol(name: str) -> str:
     error = ERRORS[name]
     if not isinstance(error, AxisError):
         return {"EC0Y": "α", "EB0Z": "-β1", "EA0Z": "β2"}[name]
-    axis, other = AXES[error.axis], AXES[error.component]
-    return f"E{other}({axis})" if error.is_rotation else f"δ{other}({axis})"
+    axis, component = AXES[error.axis], AXES[error.component]
+    return f"E{component}({axis})" if error.is_rotation else f"δ{component}({axis})"
 
 
 def meaning(name: str) -> str:
-    """Words for an error of an axis or a squareness error.
+    """Return the description of an axis or squareness error.
 
     >>> meaning("EC0Y"), meaning("EXX")
     ('squareness of Y to X', 'positioning error of X')

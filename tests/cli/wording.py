@@ -10,7 +10,7 @@ ARGUMENT_FORMAT_INVALID_CHOICE = (
     "argument --format: invalid choice: 'juint'; did you mean \"junit\"?"
 )
 A_BRYAN_GAUGE_ONLY_CARRIES = (
-    "7:9: artefacts.role: a Bryan gauge only carries its radius and is no plate; remove its role"
+    "7:9: artefacts.role: a Bryan gauge is a length standard, not a plate; remove its role"
 )
 A_PLATE_IN_TWO = "design: a plate in two positions"
 A_TURN_OF_DEGREES_LIES_BETWEEN = (

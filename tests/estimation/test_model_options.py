@@ -430,7 +430,7 @@ def test_a_level_is_for_planes(tmp_path: Path) -> None:
     ("function", "advice"),
     [
         ("EXY", "let its coefficients add up to zero, and state its slope as EC0Y"),
-        ("EYX", "where it fixes the machine's frame; let its coefficients add up to zero"),
+        ("EYX", "to fix the machine's frame; let its coefficients add up to zero"),
     ],
 )
 def test_a_slope_is_stated_as_squareness(function: str, advice: str) -> None:

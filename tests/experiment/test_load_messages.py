@@ -92,7 +92,7 @@ SECTIONS = [
     ("error_model: {kind: kinematic}", "error_model: {kind: kinematic, basis: {periodic: true, slopes: {end: 0}}}", [
         "5:39: error_model.basis: periodic ends have slopes of their own; remove slopes or periodic"]),
     ("error_model: {kind: kinematic}", "error_model: {kind: kinematic, basis: {slopes: {}}}", [
-        "5:48: error_model.basis.slopes: neither start nor end is given; give 0 for one of them or both, or remove the "
+        "5:48: error_model.basis.slopes: neither start nor end is given; give 0 for one or both, or remove the "
         "key"]),
     ("error_model: {kind: kinematic}", "error_model: {kind: empirical, terms: tensor, basis: {slopes: {end: 0}}}", [
         "5:14: error_model: full tensor products have the factors x, y and z, whose slope is not 0; remove slopes"]),
@@ -121,7 +121,7 @@ SECTIONS = [
     ("error_model: {kind: kinematic}",
      "error_model: {kind: kinematic}\ntrue_machine: {kind: coefficients, values: {EY x^2: 1 um}, "
      "error_model: {kind: empirical, terms: quadratic}}", [
-         "6:53: true_machine.values[EY x^2]: EY must be zero at both ends of its axis, where it fixes the machine's "
+         "6:53: true_machine.values[EY x^2]: EY must be zero at both ends of its axis to fix the machine's "
          "frame; let its coefficients add up to zero"]),
     ("error_model: {kind: kinematic}", "error_model: {kind: kinematic}\ntrue_machine: zero", [
         "6:15: true_machine: expected a mapping, key: value, found the text \"zero\" "
@@ -190,7 +190,7 @@ ARTEFACTS = [
         '9:50: artefacts.bar.role: unknown value "standard"; did you mean "length_standard"? '
         "allowed: plate, length_standard"]),
     ("kind: grid, balls: [3, 3], size: [500 mm, 500 mm]", "kind: balls", [
-        '8:10: artefacts.plate: needs either "coordinates" or "file"; give exactly one of them']),
+        '8:10: artefacts.plate: neither or both of "coordinates" and "file" are given; give exactly one']),
     ("kind: grid, balls: [3, 3], size: [500 mm, 500 mm]", "kind: balls, coordinates: [[1 mm], 5]", [
         "8:38: artefacts.plate.coordinates[0]: has 1 entry; 2 or 3 are needed",
         "8:46: artefacts.plate.coordinates[1]: expected a list in brackets, found the number 5",
@@ -341,11 +341,11 @@ PLANE_CASES = [
         '4:74: artefacts.plate.axes.origin: unknown ball "r1c9"; did you mean "r1c3"?',
         '4:83: artefacts.plate.axes.x: unknown ball "r1c7"; did you mean "r1c3"?']),
     ("size: 500 mm", "size: 500 mm, axes: {origin: r1c1}", [
-        '4:65: artefacts.plate.axes: needs either "x" or "y", the ball that lies on that axis; '
-        "give exactly one of them"]),
+        '4:65: artefacts.plate.axes: neither or both of "x" and "y" are given; '
+        "name one ball, on one axis"]),
     ("size: 500 mm", "size: 500 mm, axes: {origin: r1c1, x: r1c2, y: r2c1}", [
-        '4:65: artefacts.plate.axes: needs either "x" or "y", the ball that lies on that axis; '
-        "give exactly one of them"]),
+        '4:65: artefacts.plate.axes: neither or both of "x" and "y" are given; '
+        "name one ball, on one axis"]),
     ("size: 500 mm", "size: 500 mm, axes: {origin: r1c1, y: r1c1}", [
         '4:65: artefacts.plate.axes: ball "r1c1" cannot be the origin and fix an axis too; name another one']),
 ]  # fmt: skip

@@ -144,7 +144,7 @@ def test_an_installed_entry_point(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
         ("a) + p", "a)", "error(x, 0, p) is not p"),
         ("a) + p", "a) + p * np.nan", "not finite numbers"),
         ("return result", "return result[:, :2]", "operands could not be broadcast"),
-        ("a) + p", "a)[:3] + p[:3]", "the shape (3, 3); (7, 3) is needed"),
+        ("a) + p", "a)[:3] + p[:3]", "the shape (3, 3); return (7, 3)"),
         ("a) + p", "a * (1 + 100 * a)) + p", "jacobian is not the derivative of error by"),
         ("return result", "return result.astype(np.float32)", "no new array of floats"),
         ("np.eye(len(names)))", "np.eye(2))", "one row for each name"),

@@ -140,7 +140,7 @@ def test_radial_functions_interpolate_as_scipy_does(function: RadialName) -> Non
 def test_an_empirical_model_contains_the_twenty_one_parameter_form(arrangement: str) -> None:
     model = kinematic_model_of(
         ARRANGEMENTS[arrangement], Polynomial(4), Polynomial(3), LOWER, UPPER, squareness=True,
-        own=(("EXX", Spline(4, (0.3,))),),
+        single_families=(("EXX", Spline(4, (0.3,))),),
     )  # fmt: skip
     outer = empirical_model(sums(Spline(4, (0.3,))), LOWER, UPPER, frame=())
     matrix = linear_map(model, outer)
@@ -259,7 +259,7 @@ def test_other_options_are_other_experiments(tmp_path: Path) -> None:
         (
             "{kind: kinematic, position_coefficients: 2, rotation_coefficients: 1, functions:"
             " {EXX: 1, EYX: 1, EZX: 1, EXY: 1, EYY: 1, EZY: 1, EXZ: 1, EYZ: 1, EZZ: 1}}",
-            "functions: leaves no error to be estimated; give one of them more than 1",
+            "functions: leaves no error to be estimated; give one function more than 1 coefficient",
         ),
         (
             "{kind: empirical, rotation_functions: {terms: quadratic, coefficients: 2}}",

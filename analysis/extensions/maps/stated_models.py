@@ -86,7 +86,7 @@ def _built(settings: Any, volume: Volume, folder: Path, problems: Problems) -> E
         return None
     try:
         if isinstance(settings, MachineFileSettings):
-            settings.of(load_machine(folder / settings.file))
+            settings.set_machine(load_machine(folder / settings.file))
         elif isinstance(settings, PythonSettings):
             settings.beside(folder, OPENED)
         for steps, text in kind.wrong(settings, d):
