@@ -339,7 +339,7 @@ def _refuse_unknown_places(experiment: Experiment, design: Design) -> None:
         text = "estimators of distances alone cannot follow where a star points; use the full one"
         raise refused(experiment.source, text, "stars")
     if design.positions.across is not None:
-        text = "estimators of distances alone cannot follow what is read in plane; use the full one"
+        text = "estimators of distances alone cannot use readings in plane; use the full one"
         raise refused(experiment.source, text, "artefacts")
     for k, item in enumerate(experiment.calibration):
         if item.root is not None:
@@ -373,8 +373,8 @@ def _refuse_other_lengths(experiment: Experiment, design: Design) -> None:
         )
     elif as_drawn(design).deficiency:
         text = (
-            "the design leaves errors undetermined, so that estimates differ by what they hold"
-            " fixed; see ballplate check"
+            "the design leaves errors undetermined, so that estimates hold different errors fixed;"
+            " see ballplate check"
         )
     if text:
         raise refused(experiment.source, text, key)

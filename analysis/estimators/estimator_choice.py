@@ -58,10 +58,10 @@ def misused(components: str | None, reweight: bool, sigma: str | None) -> str:
     """Return the fault of a combination of options, or an empty text.
 
     >>> misused(None, True, None)
-    'reweight needs components, the groups of observations to be weighted anew'
+    'reweight needs components, the groups of observations to be reweighted'
     """
     if reweight and components is None:
-        return "reweight needs components, the groups of observations to be weighted anew"
+        return "reweight needs components, the groups of observations to be reweighted"
     if reweight and sigma == "estimated":
         return "reweight takes variances as estimated by group; leave sigma out"
     return ""

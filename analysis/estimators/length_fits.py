@@ -69,7 +69,7 @@ class LengthFit(FitResult):
         deficiency = self.solution.deficiency
         if not self.converged:
             return (
-                "the estimate has not converged; look for wrong units, balls or positions among the"
+                "the estimate has not converged; check the units, balls and positions of the"
                 " readings"
             )
         if has_all_errors(self.observed.design) and deficiency != (self.expected or 0):
@@ -163,14 +163,14 @@ def fit_lengths(
         solution = length_estimate(design, observed.x, estimator)
     except NotAMetricError as error:
         text = (
-            f"{error}; look for wrong units, balls or positions among the readings, or read more"
+            f"{error}; check the units, balls and positions of the readings, or read more"
             " directions"
         )
         raise refused(experiment.source, text) from None
     remarks = _remarks(design, estimator, solution)
     if sigma is not None:
         remarks.append(
-            "--sigma has no effect: uncertainties come from the scatter about the equations"
+            "--sigma has no effect: uncertainties come from the residuals of the equations"
         )
     factors = np.where(solution.open_factors, np.nan, solution.factors)
     centres = np.where(solution.open_centres, np.nan, solution.centres)
@@ -230,8 +230,8 @@ def _remarks(design: Design, estimator: LengthEstimator, solution: LengthSolutio
         )
     if not has_all_errors(design):
         remarks.append(
-            f"{estimator} has three scale errors and three squareness errors, whatever the file's"
-            " error model"
+            f"{estimator} has three scale errors and three squareness errors, regardless of the"
+            " file's error model"
         )
     if not design.of(Lengths).is_known.any():
         remarks.append(

@@ -152,7 +152,7 @@ def _refuse_others(experiment: Experiment, observed: ObservedReadings, scale: Sc
         text = 'the reversal needs a machine of kind "metric" in two dimensions'
         solid = experiment.dimension == 3
         remedy = "write metric" + (
-            " and leave z out of the volume and of all places" if solid else ""
+            " and leave z out of the volume and of all points" if solid else ""
         )
         add(
             ("error_model", "kind"), f'{text}, not "{kind}"{" in three" if solid else ""}; {remedy}'

@@ -145,7 +145,7 @@ class ReversalFit(FitResult):
                 f" {number(1e6 * reversal.single)} µm"
             ),
             (
-                "what the first-order equations neglect changes no result by more than"
+                "terms that the first-order equations neglect change no result by more than"
                 f" {number(reversal.bias, 2)} standard uncertainties"
             ),
             (
@@ -211,7 +211,7 @@ class ReversalFit(FitResult):
         shift = f" and offsets by up to {_length(offset)}" if self.offsets else ""
         return (
             f"the turn is {difference} from 90 degrees, too far for equations of the first order:"
-            " what they neglect changes co-ordinates of balls by up to"
+            " neglected terms change co-ordinates of balls by up to"
             f" {_length(self.distortion)}{shift}, and results by up to {number(self.found.bias, 2)}"
             " of their standard uncertainties; turn the plate closer to 90 degrees, or take the"
             " results of multiple redundancy"
@@ -223,7 +223,7 @@ class ReversalFit(FitResult):
         omitted = [name for name in self.names if name not in self.names_of_both]
         if omitted:
             warnings.append(
-                f"the reversal leaves out what is not read in both positions: {listing(omitted)}"
+                f"the reversal omits balls that are not read in both positions: {listing(omitted)}"
             )
         if NOTICEABLE < self.found.bias <= USELESS:
             warnings.append(self._neglected())

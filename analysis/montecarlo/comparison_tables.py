@@ -97,7 +97,7 @@ def trials_lines(result: Trials) -> list[str]:
 def _failed_lines(outcome: MonteCarloOutcome) -> list[str]:
     if not outcome.failed:
         return []
-    omission = " and are left out of all figures" if outcome.comparisons else ""
+    omission = " and are left out" if outcome.comparisons else ""
     numbers = listing([str(k) for k in outcome.failed])
     return [f"{len(outcome.failed)} data sets did not converge{omission}: {numbers}"]
 
@@ -129,18 +129,22 @@ def _misfit_lines(result: Trials, outcome: MonteCarloOutcome) -> list[str]:
         ("Too optimistic? " if too_optimistic else "")
         + "The fitted model cannot follow the true machine exactly.",
         f"ratios of actual to predicted errors, as root mean squares: {', '.join(ratios)}"
-        + ("" if too_optimistic else f"; none is above 1 by more than {BEYOND:g} standard errors"),
+        + (
+            ""
+            if too_optimistic
+            else f"; no ratio is above 1 by more than {BEYOND:g} standard errors"
+        ),
         (
             f"readings without noise leave S^2 = {misfit.noise_free:.4g}; with sigma known, S^2"
-            f" alone shows the misfit in {100 * result.optimism.power:.3g} % of experiments"
+            f" alone shows the lack of fit in {100 * result.optimism.power:.3g} % of experiments"
         ),
     ]
     own_model = result.optimism.own_model
     if own_model is not None:
         lines.append(
             f"a second fit with the true machine's own functions added, {own_model.more} parameters"
-            f" more that this design determines, brings S^2 down by {own_model.gain:.4g} beyond"
-            f" chance; comparing the two shows it in {100 * own_model.power:.3g} %"
+            f" more that this design determines, lowers S^2 by {own_model.gain:.4g} more than"
+            f" noise does; comparing the two shows it in {100 * own_model.power:.3g} %"
         )
     return lines
 

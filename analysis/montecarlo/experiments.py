@@ -128,7 +128,7 @@ def _shared(experiment: Experiment) -> Reference | str:
     except (NoReadingError, DivergedError) as error:
         text = f"{error}; state smaller errors"
         raise experiment.refused(("true_machine",), text) from None
-    return shared if targets(shared) else "the design determines nothing that could be compared"
+    return shared if targets(shared) else "the design determines no quantity that can be compared"
 
 
 def _optimism(experiment: Experiment, shared: Reference) -> Optimism:

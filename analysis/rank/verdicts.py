@@ -519,7 +519,7 @@ def in_words(direction: Direction) -> str:
         end = (
             f"known only to {length(direction.standard_deviation)} in corrected points, relative to"
             f" one another (root mean square over {direction.points} points; more than"
-            f" {length(direction.limit)} at {direction.beyond} of them)"
+            f" {length(direction.limit)} at {direction.beyond} points)"
         )
     return "; ".join(parts) + f": {end}"
 

@@ -99,7 +99,7 @@ class EstimatedFunctions:
         chosen: dict[int, None] = {}
         names = self.labels
         for k, name in enumerate(wanted):
-            ensure_type(str, "the name of an estimate, or a kind of them", **{f"chosen[{k}]": name})
+            ensure_type(str, "the name or the kind of an estimate", **{f"chosen[{k}]": name})
             kinds = KINDS.get(name)
             matches = [
                 i

@@ -78,7 +78,7 @@ if TYPE_CHECKING:
 
 
 REWEIGHTED = (
-    "(everything below is as if these estimates had been stated, but for those of fewer than 10"
+    "(everything below is as if these estimates had been stated, except those of fewer than 10"
     " degrees of freedom that are not larger than stated)"
 )
 
@@ -511,11 +511,11 @@ class Fit(FitResult):
             )
         if self.too_large:
             advice = (
-                "no single gross error explains that: try a richer error model or larger"
+                "no single gross error explains that: try a larger error model or larger"
                 " uncertainties, and consider drifts"
             )
             if has_exact_values(self.design):
-                advice += "; several values that are stated as exact may be wrong, too"
+                advice += "; several values stated as exact may be in error, too"
             if self.diagnosis and self.diagnosis.names_causes:
                 advice = "see what is suspected"
             times = self.lack_of_fit.times
@@ -524,9 +524,9 @@ class Fit(FitResult):
             )
         if self.without_scatter:
             warnings.append(
-                "sigma is zero but for rounding, since the readings agree exactly with the model,"
-                " as computed ones do, or a few rounded ones by chance: the uncertainties here are"
-                " zero, too, and neither they nor what is within a target can be relied on; --sigma"
+                "sigma is zero within rounding, since the readings agree exactly with the model,"
+                " as computed ones do, or a few rounded ones may: the uncertainties are zero, too,"
+                " and unreliable, as are shares within a target; --sigma"
                 " given takes the uncertainties as stated"
             )
         if self.sigma_is_estimated:
@@ -555,10 +555,10 @@ class Fit(FitResult):
                 # The deficiency comes of missing readings: the plan need not expect it.
                 rank = f"{rank_words(self.verdict)}; {not_read(self.unread)}"
             return "; ".join(filter(None, [rank, self.lack_of_fit.complaint]))
-        exact = ", and for wrong values among those that are stated as exact"
+        exact = ", and values stated as exact"
         return (
             f"the estimate has {self.solution.status}; no results are reported: see the record of"
-            " iterations, and look for wrong units, balls or probes among the readings"
+            " iterations, and check the units, balls and probes of the readings"
             f"{exact if has_exact_values(self.design) else ''}"
         )
 

@@ -229,5 +229,5 @@ def _of_campaign(estimated: Sequence[str]) -> str:
     return (
         f"{number_of(count, 'parameter')} of influence quantities that the fit estimated"
         f" {'are' if count > 1 else 'is'} not applied, as they belong to the campaign: {names};"
-        " correct for these beforehand where they matter"
+        " correct for these beforehand if needed"
     )

@@ -206,7 +206,7 @@ def compared(campaign: EarlierCampaign, own_sigma: float, own_freedom: int) -> S
     if not campaign.degrees_of_freedom or not own_freedom:
         return ScaledMap(campaign, math.nan, True, "no test for want of degrees of freedom")
     if own_sigma < LEAST_SIGMA:
-        return ScaledMap(campaign, math.nan, True, "no test, as the readings have no scatter")
+        return ScaledMap(campaign, math.nan, True, "no test, as the readings have no noise")
     freedoms, ratio = (
         (campaign.degrees_of_freedom, own_freedom),
         (campaign.estimate / own_sigma) ** 2,

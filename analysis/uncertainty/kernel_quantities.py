@@ -54,7 +54,7 @@ class QuantityKind:
     def __post_init__(self) -> None:
         if not self.are_lengths and (self.about_balls or self.has_target):
             raise ValueError(
-                f'"{self.description}" has about_balls or has_target, which go with are_lengths;'
+                f'"{self.description}" has about_balls or has_target, which need are_lengths;'
                 " add that, or remove them"
             )
 

@@ -51,14 +51,14 @@ def _fault_of(kind: QuantityKind, groups: object) -> str:
         return f"give a tuple of Parameters, Coordinates or Distances, not {shorten(repr(groups))}"
     types = {type(group) for group in groups}
     if kind.are_lengths and types - {Distances}:
-        return "are_lengths goes with Distances only; remove it"
+        return "are_lengths applies to Distances only; remove it"
     if kind.effect and Parameters in types:
-        return "effect goes with Distances and Coordinates only; remove it"
+        return "effect applies to Distances and Coordinates only; remove it"
     # Only one group of names is shown.
     if len(groups) > 1 and not all(
         isinstance(group, Distances) and not group.names for group in groups
     ):
-        return "only Distances without names can be in several groups; put all into one"
+        return "only Distances without names can be in several groups; combine all in one"
     return ""
 
 

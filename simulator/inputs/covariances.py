@@ -154,7 +154,7 @@ def matrix_problems(matrix: NamedMatrix) -> list[Message]:
     for k, j in np.argwhere(np.triu(is_asymmetric)).tolist():
         text = (
             f'not symmetric: "{matrix.names[k]}" with "{matrix.names[j]}" is'
-            f" {matrix.shown(values[k, j])}, the other way round {matrix.shown(values[j, k])};"
+            f" {matrix.shown(values[k, j])}, vice versa {matrix.shown(values[j, k])};"
             " correct one of the two"
         )
         messages.append(matrix.marks[k].message("", text))

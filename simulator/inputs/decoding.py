@@ -95,7 +95,7 @@ def refuse_controls(text: str, file: object) -> None:
     control = CONTROL.search(text)
     if control is not None:
         line = len(LINE_END.findall(text, 0, control.start())) + 1
-        fact = f"the control character U+{ord(control[0]):04X} is no part of a text"
+        fact = f"the control character U+{ord(control[0]):04X} is not allowed in a text"
         raise refused(file, f"{fact}; take a whole copy of the file", line=line)
 
 

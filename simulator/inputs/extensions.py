@@ -122,7 +122,7 @@ def missing(error: BaseException) -> MissingExtensionError | None:
         return None
     for extension in shipped():
         if f"{error.name}.".startswith(f"{extension.package}."):
-            text = f"the extension {extension.name} is not installed; install ballplate anew"
+            text = f"the extension {extension.name} is not installed; install ballplate again"
             return MissingExtensionError(f"{text}, with it")
     return None
 

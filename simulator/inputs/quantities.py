@@ -570,7 +570,7 @@ def _growing(value: str, constant: str, slope: Fraction, in_metres: bool = False
         )
     if slope and slope < SMALLEST:
         raise QuantityError(
-            f'"{text}" grows too slowly; leave out what it grows by, or give 1e-18 m/m or more'
+            f'"{text}" grows too slowly; leave out the growth, or give 1e-18 m/m or more'
         )
     if at_zero == 0 and slope == 0:
         _positive(value, at_zero)

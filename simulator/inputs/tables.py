@@ -153,7 +153,7 @@ def _refuse_unfilled(
         )
     ):
         text = f"nothing is filled in: {listing(lengths)} are empty in all {len(lines) - 1} rows"
-        text += "; write in what was read, and remove the lines of what was not"
+        text += "; enter values, and remove rows without any"
         raise refused(file, text, line=lines[1][0])
 
 

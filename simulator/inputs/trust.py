@@ -27,7 +27,7 @@ class Trust:
         """
         path = folder / str(name)
         if self.within is not None and not path.resolve().is_relative_to(self.within.resolve()):
-            text = "is outside the folder that files are read from here; put a copy of it there"
+            text = "is outside the folder that files are read from here; copy it there"
             raise refused(path, text)
         return path
 

@@ -171,7 +171,7 @@ def _explain(error: ErrorDetails, location: _Location, root: Node, schema: Schem
         return Explanation(steps, _wrong_literal(value, _allowed(schema, root, steps)))
     if kind in EXPECTED:
         note = _description(schema, root, steps) if not steps or isinstance(steps[-1], str) else ""
-        quotes = "; put it in quotes" if kind == "string_type" and isinstance(node, Scalar) else ""
+        quotes = "; quote it" if kind == "string_type" and isinstance(node, Scalar) else ""
         return Explanation(
             steps, f"expected {EXPECTED[kind]}, found {describe(value)}{quotes}{note}"
         )

@@ -35,13 +35,10 @@ LOADER: Any = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
 REMEDIES = (
     (
         "mapping values are not allowed",
-        (
-            "a second “: ” in one line; put a text that contains it in quotes, and check the"
-            " indentation"
-        ),
+        ("a second “: ” in one line; quote a text that contains it, and check the indentation"),
     ),
     ("unexpected end of stream", "a quotation mark is never closed; close it"),
-    ("cannot start any token", "a text cannot begin with this character; put it in quotes"),
+    ("cannot start any token", "a text cannot begin with this character; quote it"),
     ("',' or ']'", "a list in brackets is never closed or lacks a comma; write [a, b]"),
     (
         "',' or '}'",
@@ -456,8 +453,7 @@ class _Builder:
         anchors = listing(f"&{name}" for name in self.anchors)
         self.refuse(
             mark,
-            f"nothing is anchored as &{anchor}; "
-            + (f"known: {anchors}" if anchors else "write the value out"),
+            f"no anchor &{anchor}; " + (f"known: {anchors}" if anchors else "write the value out"),
         )
         self._add(Scalar(mark, "?"), None)
 
@@ -475,8 +471,8 @@ class _Builder:
         if parent.size > MOST_NODES:
             self.stop(
                 node.mark,
-                f"more than {MOST_NODES} values, aliases counted in full; put long lists in a CSV"
-                " file",
+                f"more than {MOST_NODES} values, aliases counted in full; move long lists into a"
+                " CSV file",
             )
         if parent.entries is None:
             parent.items.append(node)

@@ -248,8 +248,8 @@ def test_a_weak_direction_tells_at_how_many_points_and_what_all_do(tmp_path: Pat
     lines = found.lines()
     direction = next(line for line in lines if line.startswith("weakly determined 1"))
     assert (
-        f"root mean square over 30 points; more than 0.02 µm at {found.verdict.weak[0].beyond} of"
-        " them" in direction
+        f"root mean square over 30 points; more than 0.02 µm at {found.verdict.weak[0].beyond}"
+        " points" in direction
     )
     assert f"all directions together: U6 {1e6 * found.lengths.average:.4f}"[:38] in "\n".join(lines)
 

@@ -62,10 +62,10 @@ WRONG = [
     (no_tuple, {}, "give a tuple"),
     (no_name, {}, "1 pairs, 0 names and 0 targets"),
     (no_point, {}, "not (m, 2) of places 0 to 199"),
-    (coordinates, {"are_lengths": True}, "are_lengths goes with Distances only"),
-    (two, {}, "put all into one"),
+    (coordinates, {"are_lengths": True}, "are_lengths applies to Distances only"),
+    (two, {}, "combine all in one"),
     (parameters, {}, "1 names and 1 units"),
-    (one_parameter, {"effect": "something"}, "effect goes with"),
+    (one_parameter, {"effect": "something"}, "effect applies to"),
 ]
 
 
@@ -81,7 +81,7 @@ def test_a_wrong_entry_is_refused_by_its_symbol(
 
 @pytest.mark.parametrize("field", ["about_balls", "has_target"])
 def test_targets_and_balls_are_of_lengths(field: str) -> None:
-    with pytest.raises(ValueError, match="go with are_lengths"):
+    with pytest.raises(ValueError, match="need are_lengths"):
         QuantityKind("something", coordinates, **{field: True})  # type: ignore[arg-type]
 
 

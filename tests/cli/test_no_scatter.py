@@ -64,7 +64,7 @@ def test_a_fit_without_scatter_says_so(
     picture = tmp_path / "residuals.svg"
     assert main(["fit", str(path), str(readings), "--plot", str(picture)]) == 0
     said = capsys.readouterr()
-    told = "sigma is zero but for rounding, since the readings agree exactly with the model"
+    told = "sigma is zero within rounding, since the readings agree exactly with the model"
     assert told in said.err and "--sigma given" in said.err and picture.exists()
     start = said.out.index("largest residuals")
     assert [line.split()[-1] for line in said.out[start:].splitlines()[1:4]] == ["-"] * 3

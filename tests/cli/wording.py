@@ -88,7 +88,7 @@ IS_A_PLATE_BUT_LENGTH_EQUATIONS = (
 IS_MM_FROM_WHERE_IT_SHOULD = "is 10 mm from where it should be"
 IS_NOT_DEFINED_FOR_THIS_ARTEFACT = '"braced" is not defined for this artefact'
 IS_TURNED_BY_DEGREES = '"turned" is turned by 89.992480 degrees, clockwise, from "first"'
-LEAVES_OUT_WHAT_IS_NOT_READ = "leaves out what is not read in both positions: r2c2, r3c1"
+LEAVES_OUT_WHAT_IS_NOT_READ = "omits balls that are not read in both positions: r2c2, r3c1"
 MM_IS_FAR_FROM_THE_MM = (
     "23:71: calibration[2].value: 600 mm is far from the 500 mm of the artefact's "
     "drawing; correct one of the two"
@@ -174,4 +174,4 @@ UNKNOWN_PARAMETER_DID_YOU_MEAN = (
 )
 UNKNOWN_POSITION_DID_YOU_MEAN = 'unknown position "z lo"; did you mean "z low"?'
 UNKNOWN_PROBE_DID_YOU_MEAN = 'unknown probe "downn"; did you mean "down"?'
-WHATEVER_THE_FILES_ERROR_MODEL = "whatever the file's error model"
+WHATEVER_THE_FILES_ERROR_MODEL = "regardless of the file's error model"

@@ -205,7 +205,7 @@ def test_what_cannot_be_read_in_its_plane_is_refused(
 @pytest.mark.parametrize(
     ("changes", "expected"),
     [
-        ({}, "cannot follow what is read in plane"),
+        ({}, "cannot use readings in plane"),
         (
             {"artefacts": {"plate": PLATE}, "stars": [{"standard_uncertainty": "0.2 um"}]},
             "cannot follow where a star points",

@@ -45,7 +45,7 @@ SECTIONS = [
         '1:1: titel: unknown key; did you mean "title"?',
     ]),
     ("title: good", "title: 2024", [
-        "1:8: title: expected a text, found the number 2024; put it in quotes (one-line"
+        "1:8: title: expected a text, found the number 2024; quote it (one-line"
         " description of the experiment)"]),
     ("title: good", "title:", ["1:7: title: empty; give a value, or leave it out"]),
     ("title: good", 'title: ""', ["1:8: title: empty; give a text"]),

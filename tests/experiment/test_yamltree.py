@@ -112,8 +112,8 @@ def test_aliases_stand_where_they_are_used() -> None:
                 "f:2:4: the tag !x has no meaning here; remove it",
             ],
         ),
-        ("a: *b\n", ["f:1:4: nothing is anchored as &b; write the value out"]),
-        ("a: &b 1\nc: *d\n", ["f:2:4: nothing is anchored as &d; known: &b"]),
+        ("a: *b\n", ["f:1:4: no anchor &b; write the value out"]),
+        ("a: &b 1\nc: *d\n", ["f:2:4: no anchor &d; known: &b"]),
         (
             "a: &b [*b]\n",
             ["f:1:8: the alias *b is inside the value that it refers to; write the value out"],
@@ -144,13 +144,13 @@ def test_aliases_stand_where_they_are_used() -> None:
         (
             "a: b: c\n",
             [
-                "f:1:5: not valid YAML: a second “: ” in one line; put a text that contains it in"
-                " quotes, and check the indentation"
+                "f:1:5: not valid YAML: a second “: ” in one line; quote a text that contains"
+                " it, and check the indentation"
             ],
         ),
         (
             "a: @b\n",
-            ["f:1:4: not valid YAML: a text cannot begin with this character; put it in quotes"],
+            ["f:1:4: not valid YAML: a text cannot begin with this character; quote it"],
         ),
         ("a: µ\x07\n", ["f:1:5: the control character U+0007 is not allowed; remove it"]),
         (

@@ -24,7 +24,7 @@ EXPECTED_A_MAPPING_NAME = (
 )
 EXPECTED_A_MAPPING_THAT_BEGINS = "e.yaml:1:1: expected a mapping that begins with title: …, found "
 EXPECTED_A_TEXT_FOUND_THE_NUMBER = (
-    "e.yaml:1:8: title: expected a text, found the number 1; put it in quotes (one-line "
+    "e.yaml:1:8: title: expected a text, found the number 1; quote it (one-line "
     "description of the experiment)"
 )
 EXPECTED_A_WHOLE = (
@@ -32,7 +32,7 @@ EXPECTED_A_WHOLE = (
     "readings; default 1) (in variant B)"
 )
 GROWS_BY_PER_METRE_OF_LENGTH = '"0.2 um + L/1e-3" grows by 1000 m per metre of length'
-GROWS_TOO_SLOWLY = "grows too slowly; leave out what it grows by, or give 1e-18 m/m or more"
+GROWS_TOO_SLOWLY = "grows too slowly; leave out the growth, or give 1e-18 m/m or more"
 HAS_NO_UNIT = (
     'e.yaml:12:27: positions[0].level: "5" has no unit; write for example "5 mm" or "5 '
     'um" (in variant B)'
@@ -63,7 +63,9 @@ MM_IS_MM_BELOW_THE_MEASURING = (
 )
 MORE_THAN_ERRORS = "balls.csv:502:1: more than 1000 errors; mend these first"
 MORE_THAN_ERRORS_MEND = ": more than 1000 errors; mend these first"
-MORE_THAN_VALUES = "more than 500000 values, aliases counted in full; put long lists in a CSV file"
+MORE_THAN_VALUES = (
+    "more than 500000 values, aliases counted in full; move long lists into a CSV file"
+)
 MOST_OF_ALL = 'most of all "down";'
 NESTED_MORE_THAN_DEEP = "f:3:49: nested more than 50 deep by this alias; write less of it"
 NO_CANDIDATE_IS_LEFT = (

@@ -273,7 +273,7 @@ WRONG_CERTIFICATES = {
     ),
     "an asymmetric covariance": (
         SPELLINGS["a list with a covariance"].replace("0.0100", "0.0300", 1),
-        'not symmetric: "value 1" with "value 2" is 0.01 µm², the other way round 0.03 µm²',
+        'not symmetric: "value 1" with "value 2" is 0.01 µm², vice versa 0.03 µm²',
     ),
     "a covariance of expanded uncertainties": (
         of_list(
@@ -420,16 +420,16 @@ MATRIX_FILE = table(
 WRONG_MATRICES = {
     "asymmetric": (
         MATRIX_FILE.replace("0.0100", "0.0300", 1),
-        'm.csv:2:1: .*not symmetric: "r1c1 r1c3" with "r3c1 r3c3" is 0.03 µm², the other way round'
+        'm.csv:2:1: .*not symmetric: "r1c1 r1c3" with "r3c1 r3c3" is 0.03 µm², vice versa'
         " 0.01 µm²;",
     ),
     "asymmetric in other units": (
         MATRIX_FILE.replace("0.0100", "0.0300", 1).replace("um2", "nm2"),
-        "is 0.03 nm², the other way round 0.01 nm²;",
+        "is 0.03 nm², vice versa 0.01 nm²;",
     ),
     "asymmetric correlations": (
         MATRIX_FILE.replace("0.0100", "0.0300", 1).replace("covariance_um2", "correlation"),
-        "is 0.03, the other way round 0.01;",
+        "is 0.03, vice versa 0.01;",
     ),
     "indefinite": (
         MATRIX_FILE.replace("0.0050", "0.0299"),

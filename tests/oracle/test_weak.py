@@ -80,7 +80,7 @@ def test_weak_directions(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> 
         beyond = int((of_points > TARGET).sum())
         end = re.search(
             rf": known only to ({NUMBER}) (µm) in corrected points, relative to one another \(root"
-            rf" mean square over (\d+) points; more than ({NUMBER}) (µm) at (\d+) of them\)$",
+            rf" mean square over (\d+) points; more than ({NUMBER}) (µm) at (\d+) points\)$",
             line,
         )
         assert end is not None, line

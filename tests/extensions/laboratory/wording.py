@@ -91,7 +91,9 @@ SWAP_THE_NAMES_OF_THE_BALLS = "swap the names of the balls in lines 54 and 55"
 TABLE_OF_THE_NOMINAL_CENTRES = "table of the nominal centres of balls"
 THERE_IS_NO_COLUMN = 'there is no column "F"'
 THE_COLUMN_HAS_NAMES_OF_POSITIONS = 'the column "Ort" has names of positions'
-THE_CONTROL_CHARACTER_IS_NO_PART = "report:2:1: the control character U+0007 is no part of a text"
+THE_CONTROL_CHARACTER_IS_NO_PART = (
+    "report:2:1: the control character U+0007 is not allowed in a text"
+)
 THE_DEVIATION_IS_NOT_MEASURED_MINUS = (
     "report:14:1: X: the deviation is not measured minus nominal; is the line damaged?"
 )
