@@ -140,7 +140,9 @@ def test_too_far_from_a_quarter_turn(
     assert found["neglected_coordinates"] == pytest.approx(np.abs(off).max(), rel=0.01)
     size = 1e6 * found["neglected_coordinates"]
     unit = f"{size / 1e3:.2g} mm" if size > 1e3 else f"{size:.2g} µm"
-    assert f"changes co-ordinates of balls by up to {unit}" in err.replace("0.020 µm", "0.02 µm")
+    assert f"neglected terms change co-ordinates of balls by up to {unit}" in err.replace(
+        "0.020 µm", "0.02 µm"
+    )
     shift = max(
         abs(found["estimates"][name]["value"] - full["relation"][name]["value"])
         for name in ("offset x", "offset y")
