@@ -129,7 +129,10 @@ class AlternativeFit(FitResult):
             **picked(self, "pairs", "lengths"),
             **picked(self.solution, "estimator", "observations", "status"),
             "rank_deficiency": self.solution.deficiency,
-            "iterations": [picked(it, "step", "sum_of_squares") for it in self.solution.iterations],
+            "iterations": [
+                picked(iteration, "step", "sum_of_squares")
+                for iteration in self.solution.iterations
+            ],
             "estimates": by_name(self.estimates, "value", "unit"),
             **self.notes_data(),
         }

@@ -23,8 +23,8 @@ def complete_fit(
     undetermined are held, as in all replicates.
     """
     design, x = replicate_data(shared, moved, errors, ends)
-    held = None if shared.drawn is None else shared.drawn.spectrum
-    return gauss_newton(design, x, initial_state(design, x), held=held)
+    held_spectrum = None if shared.drawn is None else shared.drawn.spectrum
+    return gauss_newton(design, x, initial_state(design, x), held=held_spectrum)
 
 
 def replicate_data(

@@ -167,7 +167,7 @@ def _comparison(aim: MonteCarloQuantity, sums: QuantityAccumulator, n: int) -> M
         return MonteCarloEstimate(value, errors[index] / (2.0 * value) if value else 0.0)
 
     spread, actual = root(SPREAD), root(ACTUAL)
-    known, estimated = (
+    coverage_known, coverage_estimated = (
         MonteCarloEstimate(float(means[KNOWN]), errors[KNOWN]),
         MonteCarloEstimate(float(means[ESTIMATED]), errors[ESTIMATED]),
     )
@@ -181,9 +181,9 @@ def _comparison(aim: MonteCarloQuantity, sums: QuantityAccumulator, n: int) -> M
         flags.append("spread")
     if bias.differs_from(0.0):
         flags.append("bias")
-    if known.differs_from(COVERAGE):
+    if coverage_known.differs_from(COVERAGE):
         flags.append("coverage")
-    if not np.isnan(estimated.value) and estimated.differs_from(COVERAGE):
+    if not np.isnan(coverage_estimated.value) and coverage_estimated.differs_from(COVERAGE):
         flags.append("coverage with sigma estimated")
     rms = np.sqrt(sums.squares / count)
     present = [unit for unit in ("m", "rad", "1") if unit in aim.units]
@@ -200,8 +200,8 @@ def _comparison(aim: MonteCarloQuantity, sums: QuantityAccumulator, n: int) -> M
         actual,
         bias,
         float(np.abs(mean_error).max()),
-        known,
-        estimated,
+        coverage_known,
+        coverage_estimated,
         tuple(flags) if n >= REPLICATES_LIMIT else (),
     )
 

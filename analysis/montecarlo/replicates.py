@@ -101,7 +101,7 @@ class Draw:
     errors: tuple[Array, ...]
     ends: tuple[Array, Array]
 
-    def of(self, k: int) -> tuple[Array, tuple[Array, ...], tuple[Array, Array]]:
+    def replicate(self, k: int) -> tuple[Array, tuple[Array, ...], tuple[Array, Array]]:
         """Noise of readings (d, m), of values and of both ends of one replicate."""
         return (
             self.moved[k],
@@ -148,7 +148,7 @@ def estimate_batch(shared: Reference, seed: int, batch: int, count: int = BATCH)
         drawn = drawn.select(np.arange(count))
     estimates = _refined(shared, drawn, batch * BATCH + np.arange(count))
     for k in np.flatnonzero(~estimates.converged).tolist():
-        estimates = _with_estimate(estimates, k, shared, complete_fit(shared, *drawn.of(k)))
+        estimates = _with_estimate(estimates, k, shared, complete_fit(shared, *drawn.replicate(k)))
     return estimates
 
 

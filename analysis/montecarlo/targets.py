@@ -107,7 +107,7 @@ def _displaced(shared: Reference, at: Linearisation) -> Callable[[Places], Displ
         if isinstance(places, BallPlaces):
             truly = places.at(at.design, shared.truth.state)
             return Displaced(
-                displacements(at, places), truly, lambda found: found.balls[:, :, places.index]
+                displacements(at, places), truly, lambda change: change.balls[:, :, places.index]
             )
         key = places.points.tobytes() + places.probes.tobytes()
         if key not in cache:

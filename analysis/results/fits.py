@@ -544,8 +544,10 @@ class Fit(FitResult):
     @property
     def unread(self) -> tuple[str, ...]:
         """Names of positions without readings."""
-        read = set(self.design.readings.position.tolist())
-        return tuple(name for k, name in enumerate(self.design.positions.names) if k not in read)
+        read_positions = set(self.design.readings.position.tolist())
+        return tuple(
+            name for k, name in enumerate(self.design.positions.names) if k not in read_positions
+        )
 
     @property
     def complaint(self) -> str:

@@ -67,12 +67,12 @@ def uncertainty_table(quantities: dict[str, Quantity], caveat: str = "") -> list
     lines += [f"({', '.join(locations)})"] if locations else []
     for quantity in quantities.values():
         if quantity.parameters:
-            each = (
+            values = (
                 f"{name} {'undetermined' if math.isnan(u) else number(1e6 * u)}"
                 for name, u in quantity.parameters
             )
             unit = shown_unit(quantity.unit)
-            lines.append(f"({quantity.description}, {unit}: {', '.join(each)})")
+            lines.append(f"({quantity.description}, {unit}: {', '.join(values)})")
         if quantity.within_target is not None:
             uncertainty = uncertainty_words(quantity.coverage_factor)
             share = percent(quantity.within_target)

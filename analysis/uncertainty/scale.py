@@ -91,7 +91,8 @@ def scale_of(experiment: Experiment, at: Linearisation) -> Scale | None:
         # Readings alone do not determine scale, so that this is the only source.
         carriers = [Carrier(groups[0][0], np.inf)]
     else:
-        sources = sorted(((scale_uncertainty(rest), words) for words, rest in groups), reverse=True)
+        uncertainties = ((scale_uncertainty(without), words) for words, without in groups)
+        sources = sorted(uncertainties, reverse=True)
         significant = [source for source in sources if source[0] > CARRIES * uncertainty]
         chosen = significant or (sources if stretches else [])
         carriers = [Carrier(words, without) for without, words in chosen]

@@ -23,7 +23,7 @@ class Problems:
     messages: list[Message] = field(default_factory=list)
     doubts: list[Message] = field(default_factory=list)
     notes: list[Message] = field(default_factory=list)
-    _known: set[Message] = field(default_factory=set)
+    _reported: set[Message] = field(default_factory=set)
 
     def add(self, steps: Steps, text: str, of_key: bool = False) -> None:
         """Add a message about a path; ``of_key`` locates it at the key instead of the value."""
@@ -40,11 +40,11 @@ class Problems:
     def add_at(self, mark: Mark, steps: Steps, text: str) -> None:
         """Add a message about a path at another location, such as in a table."""
         message = mark.message(format_path(steps), text)
-        if message in self._known:
+        if message in self._reported:
             return
         if len(self.messages) >= MOST_MESSAGES:
             raise ExperimentError([*self.messages, mark.message("", MORE_ERRORS)])
-        self._known.add(message)
+        self._reported.add(message)
         self.messages.append(message)
 
     def take(self, error: ExperimentError, steps: Steps) -> None:

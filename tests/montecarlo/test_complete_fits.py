@@ -43,7 +43,7 @@ def test_no_data_set_of_a_weak_design_is_left_out() -> None:
     assert found.converged.all()
     drawn = draw(shared, 1, 0)
     for k in (0, 7):
-        solution = estimate(*replicate_data(shared, *drawn.of(k)))
+        solution = estimate(*replicate_data(shared, *drawn.replicate(k)))
         state, own = solution.state, found.found
         spread = own.balls.std(axis=0).max()
         assert np.abs(shared.start.balls + own.balls[k].T - state.balls).max() < 1e-3 * spread

@@ -206,7 +206,10 @@ def followed(shared: Reference, monkeypatch: pytest.MonkeyPatch) -> MonteCarloQu
 
 def own_changes(shared: Reference, k: int, seed: int) -> Real:
     """What the shared parameters of a replicate's own estimate differ by from the reference."""
-    solution, layout = complete_fit(shared, *draw(shared, seed, 0).of(k)), shared.factor.layout
+    solution, layout = (
+        complete_fit(shared, *draw(shared, seed, 0).replicate(k)),
+        shared.factor.layout,
+    )
     state, start = solution.state, shared.start
     turns = vector_from_rotation(state.rotations @ start.rotations.transpose(0, 2, 1))
     found = np.full(len(layout), np.nan)
