@@ -20,8 +20,8 @@ from ..machines.protocol import Array
 
 
 def resolve_calibration(settings: Any, steps: Steps, references: References) -> Calibration | None:
-    """Return a calibration of an artefact, or of the machine, with its indices and values, or None
-    after saying what is wrong.
+    """Return a calibration of an artefact or the machine, or ``None`` after reporting its
+    faults.
     """
     if "artefact" not in type(settings).model_fields:
         of_machine = read_calibration(settings, "", steps, references)
@@ -48,33 +48,35 @@ def resolve_calibration(settings: Any, steps: Steps, references: References) -> 
         return None
     # What a kind makes of balls that do not suit it is told below.
     with np.errstate(all="ignore"):
-        found = read_calibration(settings, artefact, steps, references)
-        text = "" if found is None or is_gauge else _unsuitable(found, references.layouts[artefact])
-    return found if references.require(not text, steps, text) else None
+        calibration = read_calibration(settings, artefact, steps, references)
+        text = (
+            ""
+            if calibration is None or is_gauge
+            else _unsuitable(calibration, references.layouts[artefact])
+        )
+    return calibration if references.require(not text, steps, text) else None
 
 
 def _unnamed(pairs: list[tuple[str, str]]) -> str:
-    """What is wrong with the names of an item's values; empty if nothing is."""
+    """Return the fault in the names of an item's values, or an empty text."""
     names = [", ".join(pair) for pair in pairs]
     if not names:
         return "states no value; name at least one ball, or remove the item"
-    twice = [name for name, times in Counter(names).items() if times > 1]
-    return f"states {listing(twice)} more than once; remove all but one" if twice else ""
+    repeated = [name for name, times in Counter(names).items() if times > 1]
+    return f"states {listing(repeated)} more than once; remove all but one" if repeated else ""
 
 
 def _unsuitable(item: Calibration, layout: BallLayout) -> str:
-    """What is wrong with values that cannot be observed where balls are as drawn; empty if nothing
-    is.
-    """
+    """Return the fault of values that nominal ball positions do not define, or an empty text."""
     if text := _unnamed(item.names(layout)):
         return text
     names = [", ".join(one) for one in item.names(layout)]
     given, extent = item.observed(0), float(np.ptp(layout.coordinates, axis=0).max())
     assert isinstance(given, BallObservations)
-    values, slopes = _at(given, layout.coordinates)
+    values, slopes = _values_at(given, layout.coordinates)
     # Each ball is moved otherwise, by what rounding may do.
     way = np.sin(np.arange(1.0, layout.coordinates.size + 1.0)).reshape(layout.coordinates.shape)
-    beside = _at(given, layout.coordinates + 1e-12 * extent * way)[1]
+    beside = _values_at(given, layout.coordinates + 1e-12 * extent * way)[1]
     size, change = (np.abs(one).max(axis=(1, 2)) for one in (slopes, beside - slopes))
     # A change that is no number is no small one.
     is_smooth = np.isfinite(values) & (change <= 0.5 * size)
@@ -94,10 +96,10 @@ def _unsuitable(item: Calibration, layout: BallLayout) -> str:
     return ""
 
 
-def _at(given: BallObservations, balls: Array) -> tuple[Array, Array]:
-    """Values (m,) and slopes (m, k, d) there, NaN where the computation fails."""
+def _values_at(observations: BallObservations, balls: Array) -> tuple[Array, Array]:
+    """Return values (m,) and slopes (m, k, d) at `balls`, NaN if the computation fails."""
     try:
-        return given.values(balls)
+        return observations.values(balls)
     except np.linalg.LinAlgError:
-        shape = (*given.balls.shape, balls.shape[1])
-        return np.full(len(given), np.nan), np.full(shape, np.nan)
+        shape = (*observations.balls.shape, balls.shape[1])
+        return np.full(len(observations), np.nan), np.full(shape, np.nan)

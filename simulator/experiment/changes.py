@@ -1,4 +1,4 @@
-"""Experiments that are written or changed in Python instead of in a file."""
+"""Experiments that are written or changed in Python."""
 
 from __future__ import annotations
 
@@ -15,18 +15,18 @@ from .variants import override, removed, steps_of
 
 
 def changed_tree(tree: Node, file: str, changes: AnyMapping[str, Any]) -> Node:
-    """What was written in a file, with new values at some paths; None removes what stands there.
+    """Return the tree of a file with new values at some paths; ``None`` removes an entry.
 
-    :raises ExperimentError: a path that does not exist, or a value that no file could hold.
+    :raises ExperimentError: a path that does not exist, or a value that no file can hold.
     """
     mark = Mark(f"{file} as changed", 0, 0)
     messages = []
     written: dict[tuple[str, ...], str] = {}
     for path, value in changes.items():
         try:
-            other = written.setdefault(tuple(steps_of(path)), path)
-            if other != path:
-                raise ValueError(f'is the same place as "{other}"; replace it once')
+            earlier = written.setdefault(tuple(steps_of(path)), path)
+            if earlier != path:
+                raise ValueError(f'is the same place as "{earlier}"; replace it once')
             tree = (
                 removed(tree, path)
                 if value is None
@@ -40,7 +40,7 @@ def changed_tree(tree: Node, file: str, changes: AnyMapping[str, Any]) -> Node:
 
 
 def node_of(value: object, mark: Mark) -> Node:
-    """What a file would hold: text, numbers, lists and mappings, arrays and paths among them.
+    """Return the node of a text, number, list, mapping, array or path.
 
     :raises ValueError: a value of another type.
     """

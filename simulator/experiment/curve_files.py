@@ -98,13 +98,13 @@ def _columns(mark: Mark, header: str, errors: tuple[str, ...]) -> tuple[list[str
     factors: list[Fraction] = []
     for place, cell, name, unit in header_cells(mark, header, EXAMPLE):
         if name != POSITION and name not in errors:
-            known = cell in (POSITION, *errors)
+            is_known = cell in (POSITION, *errors)
             remedy = (
                 f"write it with its unit, as in {EXAMPLE}"
-                if known
+                if is_known
                 else hint(name or cell, [POSITION, *errors])
             )
-            problem = "has no unit" if known else "is not an error of an axis"
+            problem = "has no unit" if is_known else "is not an error of an axis"
             messages.append(place.message("", f'the column "{shorten(cell)}" {problem}; {remedy}'))
             continue
         error = AXIS_ERRORS.get(name.removesuffix(BANDWIDTH))

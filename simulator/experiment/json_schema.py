@@ -24,27 +24,27 @@ def schema() -> dict[str, Any]:
     if keys:
         about = ExperimentSettings.__doc__
         settings = create_model("Experiment", __base__=ExperimentSettings, __doc__=about, **keys)
-    found: dict[str, Any] = tidied(settings.model_json_schema())
+    document: dict[str, Any] = tidied(settings.model_json_schema())
     # Variants may supply what the file itself leaves out, which no schema can tell.
-    required = found.pop("required")
+    required = document.pop("required")
     # Positions may be chosen from a pool.
     pooled = [key if key != "positions" else "pool" for key in required]
-    found["anyOf"] = [{"required": ["variants"]}, {"required": required}, {"required": pooled}]
-    return {"$schema": DRAFT, **found, "title": "ballplate experiment"}
+    document["anyOf"] = [{"required": ["variants"]}, {"required": required}, {"required": pooled}]
+    return {"$schema": DRAFT, **document, "title": "ballplate experiment"}
 
 
 def tidied(part: Any) -> Any:
-    """Leave out what serves programs only: titles, OpenAPI's discriminators, null for an omitted
-    key.
+    """Return a schema without entries for programs: titles, discriminators, null for omitted
+    keys.
     """
     if isinstance(part, list):
         return [tidied(item) for item in part]
     if not isinstance(part, dict):
         return part
-    found: dict[str, Any] = {}
+    tidy: dict[str, Any] = {}
     for key, value in part.items():
         if key in ("properties", "$defs"):
-            found[key] = {name: tidied(below) for name, below in value.items()}
+            tidy[key] = {name: tidied(below) for name, below in value.items()}
         elif (
             key == "title"
             or key == "discriminator"
@@ -53,23 +53,23 @@ def tidied(part: Any) -> Any:
             continue
         elif key == "description" and isinstance(value, str):
             # Docstrings have line ends.
-            found[key] = " ".join(value.split())
+            tidy[key] = " ".join(value.split())
         else:
-            found[key] = tidied(value)
-    choices: list[Any] = found.get("anyOf", [])
+            tidy[key] = tidied(value)
+    choices: list[Any] = tidy.get("anyOf", [])
     if {"type": "null"} in choices:
         choices = [choice for choice in choices if choice != {"type": "null"}]
-        found["anyOf"] = choices
+        tidy["anyOf"] = choices
     if len(choices) == 1:
-        del found["anyOf"]
-        found = {**choices[0], **found}
+        del tidy["anyOf"]
+        tidy = {**choices[0], **tidy}
     # Whole numbers serve as names too.
-    if isinstance(found.get("items"), dict) and found["items"] == {
+    if isinstance(tidy.get("items"), dict) and tidy["items"] == {
         "minLength": 1,
         "type": "string",
     }:
-        found["items"] = {"minLength": 1, "type": ["string", "integer"]}
-    return found
+        tidy["items"] = {"minLength": 1, "type": ["string", "integer"]}
+    return tidy
 
 
 def _is_writable(default: Any, part: dict[str, Any]) -> bool:

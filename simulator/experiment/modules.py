@@ -12,7 +12,7 @@ from ..inputs.yamltree import Mapping, Node, Scalar, walk
 
 
 def python_models(root: Node) -> Iterator[tuple[Steps, Mapping]]:
-    """Settings of error models and calibrations in Python in a tree, each with its path."""
+    """Return error models and calibrations in Python in a tree, each with its path."""
     for steps, node in walk(root):
         if isinstance(node, Mapping):
             kind = node.items.get("kind")
@@ -21,8 +21,9 @@ def python_models(root: Node) -> Iterator[tuple[Steps, Mapping]]:
 
 
 def runs_code(root: Node, folder: Path) -> bool:
-    """Whether anything in a tree is code in Python, also in a map; names of maps begin in
-    `folder`.
+    """Return True if a tree, or a map that it names, contains code in Python.
+
+    Names of maps are relative to `folder`.
     """
     return any(python_models(root)) or any(
         _has_model_in_python(folder / str(file.value)) for file in _named_maps(root)
