@@ -161,10 +161,10 @@ def run(
         return predicted
     from .montecarlo import experiments as replicates
 
-    found = replicates.trials(
+    trials_result = replicates.trials(
         chosen, MOST_TRIALS if trials is None else trials, seed, until, workers, report
     )
-    return replace(predicted, monte_carlo=found)
+    return replace(predicted, monte_carlo=trials_result)
 
 
 def simulate(
@@ -182,8 +182,8 @@ def simulate(
 
     ensure_whole(0, seed=seed)
     ensure_type(bool, "True or False", exact=exact)
-    found = simulated_readings(experiment_of(experiment), seed, exact)
-    return pandas.DataFrame(reading_columns(found.design, found.readings, found.x))
+    simulated = simulated_readings(experiment_of(experiment), seed, exact)
+    return pandas.DataFrame(reading_columns(simulated.design, simulated.readings, simulated.x))
 
 
 @overload
@@ -311,11 +311,15 @@ def fit(
     reason = misused(components, reweight, sigma)
     if reason:
         raise ValueError(reason)
-    said: dict[str, object] = {"columns": columns, "unit": unit, "coordinates": coordinates}
-    said |= {"names": names, "swap_names": swap_names}
-    given = experiment_of(experiment).with_readings(said)
-    chosen, observed = observed_of(given, readings, certificate)
-    found = fit_readings(
+    column_settings: dict[str, object] = {
+        "columns": columns,
+        "unit": unit,
+        "coordinates": coordinates,
+    }
+    column_settings |= {"names": names, "swap_names": swap_names}
+    chosen_experiment = experiment_of(experiment).with_readings(column_settings)
+    chosen, observed = observed_of(chosen_experiment, readings, certificate)
+    fit_result = fit_readings(
         chosen,
         observed,
         estimator,
@@ -328,9 +332,9 @@ def fit(
         components,
         reweight,
     )
-    if trials is None or not isinstance(found, Fit) or not found.converged:
-        return found
-    return found.with_trials(trials, chosen.seed if seed is None else seed, workers, report)
+    if trials is None or not isinstance(fit_result, Fit) or not fit_result.converged:
+        return fit_result
+    return fit_result.with_trials(trials, chosen.seed if seed is None else seed, workers, report)
 
 
 def compare(
@@ -436,13 +440,13 @@ def plan(
     if order is not None:
         ensure_one_of(tuple(ORDERS), order=order)
     request = Request(criterion, budget, curve, seed, order, tuple(drift))
-    found = load_file(experiment, True) if isinstance(experiment, str | os.PathLike) else ()
-    chosen = found[0] if len(found) == 1 else with_pool(experiment_of(experiment))
-    taken = None if done is None else table_of("done", done)
+    loaded = load_file(experiment, True) if isinstance(experiment, str | os.PathLike) else ()
+    chosen = loaded[0] if len(loaded) == 1 else with_pool(experiment_of(experiment))
+    done_table = None if done is None else table_of("done", done)
     before = None if earlier is None else Path(earlier)
     offered, choice = None, None
-    if taken is not None or before is not None:
-        offered, choice = service("begun")(chosen, taken, moved, before)
+    if done_table is not None or before is not None:
+        offered, choice = service("begun")(chosen, done_table, moved, before)
     return campaign(chosen, request, offered, choice, workers, report)
 
 

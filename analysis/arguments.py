@@ -41,20 +41,22 @@ def load(path: PathLike, variant: str | None = None) -> Experiment:
     '6.1.1[B]'
     """
     ensure_type(str, "the name of a variant", variant=variant)
-    found = load_all(path)
-    names = [str(one.name) for one in found]
+    experiments = load_all(path)
+    names = [str(loaded.name) for loaded in experiments]
     if variant is not None:
         if variant in names:
-            return found[names.index(variant)]
-        told = hint(variant, names) if found[0].name is not None else "the file has no variants"
-        raise refused(path, f'no variant "{variant}"; {told}', "variants")
-    if len(found) > 1:
+            return experiments[names.index(variant)]
+        advice = (
+            hint(variant, names) if experiments[0].name is not None else "the file has no variants"
+        )
+        raise refused(path, f'no variant "{variant}"; {advice}', "variants")
+    if len(experiments) > 1:
         text = (
             "the file has several variants; choose one with variant=, or load_all:"
             f" {', '.join(names)}"
         )
         raise refused(path, text, "variants")
-    return found[0]
+    return experiments[0]
 
 
 def load_all(path: PathLike) -> tuple[Experiment, ...]:
@@ -72,33 +74,33 @@ def experiment_of(given: Any) -> Experiment:
         return given
     if isinstance(given, str | os.PathLike):
         return load(given)
-    what = "convert it with experiment()" if isinstance(given, Mapping) else "give either"
+    advice = "convert it with experiment()" if isinstance(given, Mapping) else "give either"
     kind = type(given).__name__
-    raise TypeError(f"experiment: {kind} is neither an experiment nor the path of a file; {what}")
+    raise TypeError(f"experiment: {kind} is neither an experiment nor the path of a file; {advice}")
 
 
-def table_of(name: str, given: PathLike | pandas.DataFrame) -> Path | GivenText:
-    if isinstance(given, str | os.PathLike):
-        return Path(given)
+def table_of(name: str, table: PathLike | pandas.DataFrame) -> Path | GivenText:
+    if isinstance(table, str | os.PathLike):
+        return Path(table)
     import pandas
 
-    if not isinstance(given, pandas.DataFrame):
-        raise TypeError(f"{name}={given!r}; give the path of a CSV file, or a data frame")
-    return GivenText(name, given.to_csv(index=False))
+    if not isinstance(table, pandas.DataFrame):
+        raise TypeError(f"{name}={table!r}; give the path of a CSV file, or a data frame")
+    return GivenText(name, table.to_csv(index=False))
 
 
-def tables_of(given: Tables, experiment: Experiment) -> list[Path | GivenText]:
+def tables_of(tables: Tables, experiment: Experiment) -> list[Path | GivenText]:
     """Tables of readings, or those that the experiment names."""
-    if given is None:
+    if tables is None:
         named = experiment.readings.named_files
         if not named:
             raise ValueError("readings: the experiment names no files; give a table")
         return [experiment.source.parent / name for name in named]
-    if not isinstance(given, list | tuple):
-        return [table_of("readings", given)]
-    if not given:
+    if not isinstance(tables, list | tuple):
+        return [table_of("readings", tables)]
+    if not tables:
         raise ValueError("readings: no table; give one at least")
-    return [table_of(f"readings[{k}]", one) for k, one in enumerate(given)]
+    return [table_of(f"readings[{k}]", table) for k, table in enumerate(tables)]
 
 
 def observed_of(
@@ -112,37 +114,37 @@ def observed_of(
     from ballplate.simulator.readings.reading_files import read_readings
 
     chosen = experiment_of(experiment)
-    tables, stated = tables_of(readings, chosen), len(chosen.doubts)
+    tables, count_of_doubts = tables_of(readings, chosen), len(chosen.doubts)
     if certificate is not None:
         read = service("CertificateFiles").read
         chosen = read(table_of("certificate", certificate), chosen)
     observed = read_readings(tables, lay_out(chosen), settings=chosen.readings)
-    return chosen, replace(observed, certificate_doubts=chosen.doubts[stated:])
+    return chosen, replace(observed, certificate_doubts=chosen.doubts[count_of_doubts:])
 
 
-def fit_map_or_path(name: str, given: Fit | FittedMap | PathLike) -> Fit | FittedMap | Path:
+def fit_map_or_path(name: str, fitted: Fit | FittedMap | PathLike) -> Fit | FittedMap | Path:
     """A map to be compared: the path of a file as such."""
     from .results.fits import Fit
     from .simulator.maps.fitted_map import FittedMap
 
-    if isinstance(given, str | os.PathLike):
-        return Path(given)
-    if not isinstance(given, Fit | FittedMap):
-        raise TypeError(f"{name}={given!r}; give a fit, what its to_map() gives, or a path")
-    return given
+    if isinstance(fitted, str | os.PathLike):
+        return Path(fitted)
+    if not isinstance(fitted, Fit | FittedMap):
+        raise TypeError(f"{name}={fitted!r}; give a fit, what its to_map() gives, or a path")
+    return fitted
 
 
-def map_or_path(name: str, given: Fit | FittedMap | PathLike) -> FittedMap | Path:
+def map_or_path(name: str, fitted: Fit | FittedMap | PathLike) -> FittedMap | Path:
     """The map of a fit, or of what its to_map() gives; the path of a file as such."""
     from .results.fits import Fit
 
-    side = fit_map_or_path(name, given)
+    side = fit_map_or_path(name, fitted)
     return side.to_map() if isinstance(side, Fit) else side
 
 
-def fitted_map_of(name: str, given: Fit | FittedMap | PathLike) -> FittedMap:
+def fitted_map_of(name: str, fitted: Fit | FittedMap | PathLike) -> FittedMap:
     """The map of a fit, of what its to_map() gives, or of a file."""
-    found = map_or_path(name, given)
+    loaded_map = map_or_path(name, fitted)
     from ballplate.simulator.experiment.map_files import read_map
 
-    return read_map(found) if isinstance(found, Path) else found
+    return read_map(loaded_map) if isinstance(loaded_map, Path) else loaded_map

@@ -101,15 +101,15 @@ def _command(name: str) -> Command | None:
 
 def _with_command(words: Sequence[str]) -> list[str]:
     """A command line whose first word is the command, with the option that makes it another one."""
-    command, *others = words
+    command, *arguments = words
     if command.startswith("-"):
         return list(words)
-    until = others.index("--") if "--" in others else len(others)
+    until = arguments.index("--") if "--" in arguments else len(arguments)
     for name in names("commands"):
         first, _, option = name.partition(" ")
-        if first == command and option and option in others[:until]:
-            others.remove(option)
-            return [name, *others]
+        if first == command and option and option in arguments[:until]:
+            arguments.remove(option)
+            return [name, *arguments]
     return list(words)
 
 
@@ -173,12 +173,17 @@ def _plain(text: str) -> str:
 
 def _add_other_commands(command: _Parser, name: str) -> None:
     """List the options that make another command of one."""
-    others = [other for other in names("commands") if other.startswith(f"{name} ")]
+    other_commands = [
+        other_command for other_command in names("commands") if other_command.startswith(f"{name} ")
+    ]
     group = command.add_argument_group("another command, with options of its own")
-    for other in others:
-        if listed := _command(other):
+    for other_command in other_commands:
+        if listed := _command(other_command):
             group.add_argument(
-                other.removeprefix(f"{name} "), action=_InFull, nargs=0, help=_plain(listed.help)
+                other_command.removeprefix(f"{name} "),
+                action=_InFull,
+                nargs=0,
+                help=_plain(listed.help),
             )
 
 
@@ -216,15 +221,15 @@ def _main(arguments: Sequence[str] | None, interruption: Interruption) -> int:
         write_readably(sys.stdout, sys.stderr)
         try:
             try:
-                given = sys.argv[1:] if arguments is None else arguments
+                words = sys.argv[1:] if arguments is None else arguments
                 # The grammar of all commands is needed only where none is named.
-                if not given:
+                if not words:
                     parser(with_options=False).print_help(sys.stderr)
                     return USAGE
-                given = _with_command(given)
-                options = _grammar(given[0]).parse_args(given)
+                words = _with_command(words)
+                options = _grammar(words[0]).parse_args(words)
             except UnusableError as error:
-                print(f"ballplate {given[0]}: {error}", file=sys.stderr)
+                print(f"ballplate {words[0]}: {error}", file=sys.stderr)
                 return USAGE
             except SystemExit:
                 # Help is data, too.
@@ -299,8 +304,8 @@ def _run(options: argparse.Namespace) -> int:
 
 def internal_error(error: object) -> int:
     """Say that the program is wrong, not what it was given; the exit status."""
-    told = f"internal error: {error}. Please report it with the file and the command."
-    print(told, file=sys.stderr)
+    text = f"internal error: {error}. Please report it with the file and the command."
+    print(text, file=sys.stderr)
     return INTERNAL
 
 
@@ -332,9 +337,9 @@ class _Parser(argparse.ArgumentParser):
         options, unknown = self.parse_known_args(args, namespace)
         for word in unknown:
             # Of an extension that is not shipped.
-            if provider("commands", other := f"{options.command} {word}"):
-                others = [one for one in args[1:] if one != word]
-                return parser([other]).parse_args([other, *others], namespace)
+            if provider("commands", command := f"{options.command} {word}"):
+                remaining_words = [remaining for remaining in args[1:] if remaining != word]
+                return parser([command]).parse_args([command, *remaining_words], namespace)
         if unknown:
             chosen = self.commands[options.command]
             chosen.error(f"unrecognized arguments: {' '.join(unknown)}{chosen.meant_by(unknown)}")
@@ -344,8 +349,10 @@ class _Parser(argparse.ArgumentParser):
     def commands(self) -> dict[str, _Parser]:
         """The parsers of the commands, by name."""
         # Not by `next`, which a command of this package hides.
-        (found,) = (one for one in self._actions if isinstance(one, argparse._SubParsersAction))
-        choices: dict[str, _Parser] = found.choices
+        (subparsers,) = (
+            action for action in self._actions if isinstance(action, argparse._SubParsersAction)
+        )
+        choices: dict[str, _Parser] = subparsers.choices
         return choices
 
     def meant_by(self, unknown: Sequence[str]) -> str:
@@ -353,7 +360,7 @@ class _Parser(argparse.ArgumentParser):
         from ballplate.simulator.inputs.moved import MOVED
         from ballplate.simulator.inputs.settings import nearest
 
-        known = [
+        option_strings = [
             option
             for action in self._actions
             for option in action.option_strings
@@ -362,9 +369,15 @@ class _Parser(argparse.ArgumentParser):
         for word in unknown:
             if successor := MOVED.get(f"{self.prog} {word.partition('=')[0]}"):
                 return f"; it is now {successor}"
-        meant = [nearest(one.partition("=")[0], known) for one in unknown if one.startswith("--")]
-        told = ", ".join(f'"{one}"' for one in dict.fromkeys(meant) if one is not None)
-        return f"; did you mean {told}?" if told else ""
+        meant = [
+            nearest(option.partition("=")[0], option_strings)
+            for option in unknown
+            if option.startswith("--")
+        ]
+        suggestions = ", ".join(
+            f'"{option}"' for option in dict.fromkeys(meant) if option is not None
+        )
+        return f"; did you mean {suggestions}?" if suggestions else ""
 
     def _check_value(self, action: argparse.Action, value: Any) -> None:
         if action.choices is not None and value not in action.choices:
@@ -373,7 +386,7 @@ class _Parser(argparse.ArgumentParser):
 
             if successor := MOVED.get(f"{self.prog} {value}"):
                 self.error(f"{self.prog} {value} is now {successor}")
-            meant = nearest(str(value), [str(one) for one in action.choices])
+            meant = nearest(str(value), [str(choice) for choice in action.choices])
             if meant is not None:
                 raise argparse.ArgumentError(
                     action, f'invalid choice: {value!r}; did you mean "{meant}"?'
@@ -396,7 +409,11 @@ class _Formatter(argparse.HelpFormatter):
             return super()._format_action(action)
         parts = []
         for group, title in GROUPS.items():
-            rows = [one for one in action._choices_actions if vars(one).get("group") == group]
+            rows = [
+                choice_action
+                for choice_action in action._choices_actions
+                if vars(choice_action).get("group") == group
+            ]
             if rows:
                 parts += [f"\n {title}\n", *map(self._format_action, rows)]
         return "".join(parts).removeprefix("\n")

@@ -20,11 +20,11 @@ class Bar(tqdm):
     monitor_interval = 0
     _lock = RLock()
 
-    def __init__(self, what: str, total: int, before: int) -> None:
+    def __init__(self, purpose: str, total: int, before: int) -> None:
         form = "|{bar}| " + FORM
         # Sizes are given, as tqdm draws nothing on a terminal that does not know its own.
         super().__init__(
-            desc=what,
+            desc=purpose,
             total=total,
             initial=before,
             miniters=1,

@@ -134,7 +134,7 @@ def run(options: Namespace) -> int:
         print(service("junit_report")(files), end="")
     designs = [design for checked in files for design in checked.designs]
     if options.format == "json" and designs:
-        print_json([one.prediction.to_dict() for one in designs])
+        print_json([checked_design.prediction.to_dict() for checked_design in designs])
     if any(checked.messages for checked in files):
         return BAD_FILE
     if not all(checked.as_expected for checked in files):
@@ -145,7 +145,7 @@ def run(options: Namespace) -> int:
 def _name_suggestions(checked: CheckedFile, options: Namespace) -> None:
     """Name the command that suggests repairs of a design that determines less than it should."""
     verdicts = [design.prediction.verdict for design in checked.designs]
-    if any(one.deficiency and not one.as_expected for one in verdicts):
+    if any(verdict.deficiency and not verdict.as_expected for verdict in verdicts):
         variants = [word for name in options.variant or () for word in ("--variant", name)]
         words = ["ballplate", "check", str(checked.file), *variants, "--suggest"]
         note(options, f"next: {shlex.join(words)}")

@@ -103,10 +103,10 @@ def count(text: str) -> int:
     return whole(text, 1)
 
 
-def at_most(number: int, most: int, things: str) -> int:
+def at_most(number: int, most: int, noun: str) -> int:
     """Refuse more things than are possible."""
     if number > most:
-        raise ArgumentTypeError(f"{number} {things} are too many; at most {most} are possible")
+        raise ArgumentTypeError(f"{number} {noun} are too many; at most {most} are possible")
     return number
 
 
@@ -242,25 +242,29 @@ def experiments(options: Namespace, planning: bool = False) -> list[Experiment]:
     from ballplate.simulator.experiment.variants import unknown_variants
     from ballplate.simulator.inputs.messages import ExperimentError, Message
 
-    found: list[Experiment] = []
+    chosen_experiments: list[Experiment] = []
     messages: list[Message] = []
     for path in options.files:
         try:
-            found += load(path, planning=planning)
+            chosen_experiments += load(path, planning=planning)
         except ExperimentError as error:
             messages += error.messages
     if messages:
         raise ExperimentError(messages)
     if options.variant:
         unknown = unknown_variants(
-            options.files, options.variant, {experiment.name for experiment in found}
+            options.files, options.variant, {experiment.name for experiment in chosen_experiments}
         )
         if unknown:
             raise ExperimentError(unknown)
-        found = [experiment for experiment in found if experiment.name in options.variant]
-    tell_notes(dict.fromkeys(note for experiment in found for note in experiment.notes))
-    warn(dict.fromkeys(doubt for experiment in found for doubt in experiment.doubts))
-    return found
+        chosen_experiments = [
+            experiment for experiment in chosen_experiments if experiment.name in options.variant
+        ]
+    tell_notes(
+        dict.fromkeys(note for experiment in chosen_experiments for note in experiment.notes)
+    )
+    warn(dict.fromkeys(doubt for experiment in chosen_experiments for doubt in experiment.doubts))
+    return chosen_experiments
 
 
 def single(options: Namespace, planning: bool = False) -> Experiment:
@@ -270,12 +274,12 @@ def single(options: Namespace, planning: bool = False) -> Experiment:
     """
     from ballplate.simulator.inputs.messages import refused
 
-    found = experiments(options, planning)
-    if len(found) > 1:
-        names = [str(experiment.name) for experiment in found]
+    loaded = experiments(options, planning)
+    if len(loaded) > 1:
+        names = [str(experiment.name) for experiment in loaded]
         text = f"the file has several variants; choose one with --variant: {', '.join(names)}"
         raise refused(options.files[0], text)
-    return found[0]
+    return loaded[0]
 
 
 def print_lines(lines: Sequence[str]) -> None:

@@ -88,7 +88,7 @@ def run(options: Namespace) -> int:
     from .progress_bars import progress
 
     published = {"rms": options.published_rms, "maximum": options.published_maximum}
-    found = []
+    results = []
     for experiment in experiments(options):
         with progress(options) as shown:
             comparison = compare_estimators(
@@ -102,9 +102,9 @@ def run(options: Namespace) -> int:
                 published,
                 shown.show,
             )
-        found.append(comparison)
+        results.append(comparison)
         if not options.json:
-            print_lines([*([""] if len(found) > 1 else []), *comparison.lines()])
+            print_lines([*([""] if len(results) > 1 else []), *comparison.lines()])
     if options.json:
-        print_json([comparison.to_dict() for comparison in found])
-    return 0 if not any(comparison.failed for comparison in found) else 1
+        print_json([comparison.to_dict() for comparison in results])
+    return 0 if not any(comparison.failed for comparison in results) else 1

@@ -51,10 +51,10 @@ def readable(error: UnicodeError) -> tuple[str, int]:
     """
     if not isinstance(error, UnicodeEncodeError):
         raise error
-    found = ""
-    for one in error.object[error.start : error.end]:
-        found += SUBSTITUTES.get(one) or one.encode("ascii", "backslashreplace").decode("ascii")
-    return found, error.end
+    text = ""
+    for byte in error.object[error.start : error.end]:
+        text += SUBSTITUTES.get(byte) or byte.encode("ascii", "backslashreplace").decode("ascii")
+    return text, error.end
 
 
 codecs.register_error(HANDLER, readable)

@@ -81,25 +81,31 @@ def excerpt(line: str, column: int, width: int) -> tuple[str, str]:
     from ballplate.simulator.inputs.messages import in_one_line
 
     room = max(width - INDENT - 1, 10)
-    at = min(max(column - 1, 0), len(line))
-    far = max(at - room, 0)
+    column_index = min(max(column - 1, 0), len(line))
+    far = max(column_index - room, 0)
     # Each character as it is shown, so that the mark stands below the right one.
-    shown = [" " if one == "\t" else in_one_line(one) for one in f"{line} "[far : at + room]]
-    at -= far
+    shown = [
+        " " if character == "\t" else in_one_line(character)
+        for character in f"{line} "[far : column_index + room]
+    ]
+    column_index -= far
     start = 0
-    while sum(map(_columns, shown[start : at + 1])) > max(
-        room // 2, room - sum(map(_columns, shown[at + 1 :]))
+    while sum(map(_columns, shown[start : column_index + 1])) > max(
+        room // 2, room - sum(map(_columns, shown[column_index + 1 :]))
     ):
         start += 1
     end = len(shown)
-    while end > at + 1 and sum(map(_columns, shown[start:end])) > room:
+    while end > column_index + 1 and sum(map(_columns, shown[start:end])) > room:
         end -= 1
     indent = " " * INDENT
     return (indent + "".join(shown[start:end])).rstrip(), indent + " " * sum(
-        map(_columns, shown[start:at])
+        map(_columns, shown[start:column_index])
     ) + "^"
 
 
 def _columns(text: str) -> int:
     """How many columns of a terminal a text takes."""
-    return sum(0 if combining(one) else 2 if east_asian_width(one) in "FW" else 1 for one in text)
+    return sum(
+        0 if combining(character) else 2 if east_asian_width(character) in "FW" else 1
+        for character in text
+    )

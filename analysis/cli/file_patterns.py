@@ -11,14 +11,14 @@ from pathlib import Path
 OTHERS = ("sweeps", "machines")
 
 
-def matching_files(given: Sequence[Path]) -> list[Path]:
+def matching_files(patterns: Sequence[Path]) -> list[Path]:
     """Files and patterns as files, each once; those in folders of sweeps and machines are left out
     of patterns.
 
     A pattern that matches nothing stays as it is, and is told as a file that is not there.
     """
-    found: dict[Path, None] = {}
-    for path in given:
+    paths: dict[Path, None] = {}
+    for path in patterns:
         matches = (
             [Path(name) for name in sorted(glob.glob(str(path), recursive=True))]
             if is_pattern(path)
@@ -27,10 +27,12 @@ def matching_files(given: Sequence[Path]) -> list[Path]:
         # Folders that the pattern names itself are meant.
         named = sum(1 for _ in takewhile(lambda part: not glob.has_magic(part), path.parts))
         chosen = [
-            one for one in matches if one.is_file() and not set(one.parts[named:-1]) & set(OTHERS)
+            match
+            for match in matches
+            if match.is_file() and not set(match.parts[named:-1]) & set(OTHERS)
         ]
-        found |= dict.fromkeys(chosen or [path])
-    return list(found)
+        paths |= dict.fromkeys(chosen or [path])
+    return list(paths)
 
 
 def is_pattern(path: Path) -> bool:

@@ -203,9 +203,9 @@ def _refuse_misused(options: Namespace) -> None:
 
     :raises UsageError: there are such.
     """
-    given = [name for name in TAKE if getattr(options, name, False)]
-    given += ["offsets"] if options.no_offsets else []
-    wrong = takers(options.estimator, given)
+    names_misused = [name for name in TAKE if getattr(options, name, False)]
+    names_misused += ["offsets"] if options.no_offsets else []
+    wrong = takers(options.estimator, names_misused)
     if wrong is not None:
         name, estimators = wrong
         option = {"offsets": "no-offsets"}.get(name, name).replace("_", "-")

@@ -47,9 +47,9 @@ def named_paths(options: Namespace) -> Iterator[tuple[str, Path]]:
     from pathlib import Path
 
     for name, value in vars(options).items():
-        for one in value if isinstance(value, list) else [value]:
-            if isinstance(one, Path):
-                yield name, one
+        for item in value if isinstance(value, list) else [value]:
+            if isinstance(item, Path):
+                yield name, item
 
 
 def signatures(paths: Iterable[Path]) -> dict[Path, Signature | None]:
@@ -59,10 +59,10 @@ def signatures(paths: Iterable[Path]) -> dict[Path, Signature | None]:
 
 def _signature(path: Path) -> Signature | None:
     try:
-        found = os.stat(path)
+        status = os.stat(path)
     except (OSError, ValueError):
         return None
-    return (found.st_mtime_ns, found.st_size, found.st_ino)
+    return (status.st_mtime_ns, status.st_size, status.st_ino)
 
 
 def written(before: Mapping[Path, Signature | None]) -> str:
@@ -194,8 +194,8 @@ def _watch(interruption: Interruption, numbers: frozenset[int]) -> None:
         try:
             number = _wait(reader, numbers)
             first = time.monotonic()
-            while (left := first + ORDERLY_LIMIT - time.monotonic()) > 0.0:
-                reader.settimeout(left)
+            while (seconds_left := first + ORDERLY_LIMIT - time.monotonic()) > 0.0:
+                reader.settimeout(seconds_left)
                 with suppress(TimeoutError):
                     _wait(reader, numbers)
                     if time.monotonic() - first > SAME_SIGNAL_LIMIT:

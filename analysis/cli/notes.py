@@ -64,7 +64,7 @@ def told(options: Namespace) -> Iterator[None]:
 
     for name, version in versions():
         note(options, f"{name} {version}")
-    outputs = {one.dest for one in getattr(options, "outputs", ())}
+    outputs = {output.dest for output in getattr(options, "outputs", ())}
     for path in dict.fromkeys(inputs(options, outputs)):
         if path.is_file():
             note(options, f"reads {path}")

@@ -66,10 +66,10 @@ class Needed:
     @property
     def told(self) -> str:
         """What is missing, and how to get it."""
-        them = "it" if len(self.modules) == 1 else "them"
+        pronoun = "it" if len(self.modules) == 1 else "them"
         names = " and ".join(self.modules)
         return (
-            f"{self.what} {names}; install {them} with: python -m pip install"
+            f"{self.what} {names}; install {pronoun} with: python -m pip install"
             f" 'ballplate[{self.extra}]'"
         )
 
@@ -114,9 +114,9 @@ class OutputAction(Action):
         *arguments: Any,
         needed: Callable[[Path], Needed | None] = lambda path: None,
         takes_screen: bool = False,
-        **others: Any,
+        **settings: Any,
     ) -> None:
-        super().__init__(*arguments, **others)
+        super().__init__(*arguments, **settings)
         self.needed, self.takes_screen = needed, takes_screen
 
     def __call__(
@@ -130,8 +130,10 @@ class OutputAction(Action):
             self.needed(values),
             self.takes_screen,
         )
-        others = [one for one in getattr(namespace, "outputs", ()) if one.dest != self.dest]
-        namespace.outputs = (*others, output)
+        other_outputs = [
+            output for output in getattr(namespace, "outputs", ()) if output.dest != self.dest
+        ]
+        namespace.outputs = (*other_outputs, output)
 
 
 def add_output(parser: Any, *names: str, metavar: str, help: str, **settings: Any) -> None:
@@ -163,19 +165,19 @@ def check_outputs(options: Namespace) -> None:
     """
     from ballplate.simulator.inputs.messages import ExperimentError
 
-    given = getattr(options, "outputs", ())
-    screens = [one.option for one in given if one.is_screen]
+    chosen_outputs = getattr(options, "outputs", ())
+    screens = [output.option for output in chosen_outputs if output.is_screen]
     if len(screens) > 1:
         raise UsageError(f"{' and '.join(screens)} both go to the screen; name a file for one")
-    outputs = [one for one in given if not one.is_screen]
+    outputs = [output for output in chosen_outputs if not output.is_screen]
     _refuse_screen(outputs)
     _refuse_same(outputs)
     _refuse_inputs(outputs, options)
     messages = []
-    for one in outputs:
+    for output in outputs:
         # What is tried is taken away.
         with options.interruption.held():
-            messages += _reasons_against(one, options.force)
+            messages += _reasons_against(output, options.force)
     if messages:
         raise ExperimentError(messages)
 
@@ -193,42 +195,44 @@ def check_overwritten(path: Path) -> None:
 
 
 def _refuse_screen(outputs: list[Output]) -> None:
-    for one in outputs:
-        if str(one.path) == "-":
+    for output in outputs:
+        if str(output.path) == "-":
             raise UsageError(
-                f"{one.option} - would be standard output, which has the rest; name a file"
+                f"{output.option} - would be standard output, which has the rest; name a file"
             )
-        status = status_of(one.path)
-        if status is not None and not is_device(one.path) and _is_standard_output(status):
+        status = status_of(output.path)
+        if status is not None and not is_device(output.path) and _is_standard_output(status):
             raise UsageError(
-                f"{one.option} {one.path} is where standard output goes; name another file"
+                f"{output.option} {output.path} is where standard output goes; name another file"
             )
 
 
 def _refuse_same(outputs: list[Output]) -> None:
-    for one, other in combinations(outputs, 2):
+    for first, second in combinations(outputs, 2):
         # There are disks on which capitals make no other file.
-        if str(real(one.path)).casefold() == str(real(other.path)).casefold():
+        if str(real(first.path)).casefold() == str(real(second.path)).casefold():
             raise UsageError(
-                f"{one.option} {one.path} and {other.option} {other.path} are the same file; name"
+                f"{first.option} {first.path} and {second.option} {second.path} are the same file;"
+                " name"
                 " another"
             )
 
 
 def _refuse_inputs(outputs: list[Output], options: Namespace) -> None:
     there = [
-        (one, found)
-        for one in outputs
-        if (found := status_of(one.path)) and stat.S_ISREG(found.st_mode)
+        (output, status_there)
+        for output in outputs
+        if (status_there := status_of(output.path)) and stat.S_ISREG(status_there.st_mode)
     ]
     if not there:
         return
-    for path in inputs(options, {one.dest for one in outputs}):
+    for path in inputs(options, {output.dest for output in outputs}):
         status = status_of(path)
-        for one, found in there:
-            if status is not None and os.path.samestat(status, found):
+        for output, status_there in there:
+            if status is not None and os.path.samestat(status, status_there):
                 raise UsageError(
-                    f"{one.option} {one.path} would overwrite {path}, which is read; name another"
+                    f"{output.option} {output.path} would overwrite {path}, which is read; name"
+                    " another"
                     " file"
                 )
 
@@ -275,7 +279,7 @@ def _reasons_against(output: Output, force: bool) -> list[Message]:
 def write_outputs(
     writers: Mapping[Path, Writer],
     force: bool,
-    held: Callable[[], AbstractContextManager[None]] = nullcontext,
+    within: Callable[[], AbstractContextManager[None]] = nullcontext,
 ) -> bool:
     """Write files as `write_files` does; False after saying why not."""
     from ballplate.simulator.inputs.messages import Message
@@ -284,11 +288,13 @@ def write_outputs(
         if any(map(is_device, writers)):
             # What was printed before stands before it, where it is standard output.
             sys.stdout.flush()
-        write_files(writers, force, held)
+        write_files(writers, force, within)
     except UnwrittenError as error:
         path = Path(error.filename)
-        kept = "" if status_of(path) is None or is_device(path) else "; the file there is as it was"
-        print(Message(str(path), 0, 0, "", _cannot(error.__cause__) + kept), file=sys.stderr)
+        unchanged = (
+            "" if status_of(path) is None or is_device(path) else "; the file there is as it was"
+        )
+        print(Message(str(path), 0, 0, "", _cannot(error.__cause__) + unchanged), file=sys.stderr)
         return False
     return True
 

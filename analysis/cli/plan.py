@@ -206,17 +206,17 @@ def run(options: Namespace) -> int:
         tuple(options.drift or ()),
     )
     with progress(options) as shown:
-        found = campaign(
+        planned = campaign(
             experiment, request, offered, earlier, options.workers or processors(), shown.show
         )
     try:
-        _write(found, options)
+        _write(planned, options)
     except ExperimentError as error:
         # What took so long to find is told nevertheless.
         print_errors(error.messages, options)
         options.is_written = False
-    show(options, found)
-    return 0 if found.is_determined and found.prediction.verdict.as_expected else 1
+    show(options, planned)
+    return 0 if planned.is_determined and planned.prediction.verdict.as_expected else 1
 
 
 def _write(campaign: Campaign, options: Namespace) -> None:

@@ -97,11 +97,11 @@ def observed_readings(options: Namespace) -> tuple[Experiment, ObservedReadings]
 
     refuse_wrong_order(options)
     experiment = with_options(options, single(options))
-    stated = len(experiment.doubts)
+    count_of_doubts = len(experiment.doubts)
     if options.certificate:
         experiment = service("CertificateFiles").read(options.certificate, experiment)
     sources = options.readings or named_sources(experiment)
-    return experiment, tables(options, experiment, sources, experiment.doubts[stated:])
+    return experiment, tables(options, experiment, sources, experiment.doubts[count_of_doubts:])
 
 
 def warn_of(result: FitResult) -> int:

@@ -46,10 +46,10 @@ def add_options(parser: ArgumentParser) -> None:
 
 
 def _trial_count(text: str) -> int:
-    found = trial_count(text)
-    if found < 2:
+    count = trial_count(text)
+    if count < 2:
         raise ArgumentTypeError(f'one data set has no scatter; give at least 2, not "{text}"')
-    return found
+    return count
 
 
 def run(options: Namespace) -> int:
@@ -57,14 +57,14 @@ def run(options: Namespace) -> int:
     from ..results.checked_designs import predict
     from .common import experiments, print_json, print_lines
 
-    plans, found, interrupted = [], [], False
+    plans, results, interrupted = [], [], False
     with_trials = options.trials is not None or options.until is not None
     if not with_trials and (options.seed is not None or options.workers is not None):
         raise UsageError("--seed and --workers go with --trials or --until only; leave them out")
-    kept = options.interruption.kept
+    written_before = options.interruption.kept
     chosen = experiments(options)
     if options.report and len(chosen) > 1:
-        names = ", ".join(str(one.name or one.label) for one in chosen)
+        names = ", ".join(str(experiment.name or experiment.label) for experiment in chosen)
         raise UsageError(f"--report is the page of one design; choose one with --variant: {names}")
     for experiment in chosen:
         plans.append(predict(experiment, with_scale=True))
@@ -76,20 +76,20 @@ def run(options: Namespace) -> int:
         if with_trials:
             from ..montecarlo.comparison_tables import trials_data, trials_lines
 
-            done = _trials(experiment, options)
-            data["monte_carlo"] = trials_data(done)
+            trials_done = _trials(experiment, options)
+            data["monte_carlo"] = trials_data(trials_done)
             if not options.json:
-                print_lines(["", *trials_lines(done)])
-                options.interruption.kept = kept
-            interrupted = done.outcome is not None and done.outcome.interrupted
-        found.append(data)
+                print_lines(["", *trials_lines(trials_done)])
+                options.interruption.kept = written_before
+            interrupted = trials_done.outcome is not None and trials_done.outcome.interrupted
+        results.append(data)
         if interrupted:
             complain(
                 f"{options.interruption.word}: the figures are those of the data sets done so far"
             )
             break
     if options.json:
-        print_json(found)
+        print_json(results)
     if interrupted:
         return int(options.interruption.status)
     return 0 if all(p.verdict.as_expected for p in plans) else 1

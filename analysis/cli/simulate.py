@@ -62,21 +62,23 @@ def run(options: Namespace) -> int:
     certificates = service("CertificateFiles") if options.certificate else None
     if certificates is not None:
         certificates.ensure_certified(experiment)
-    found = simulated_readings(experiment, options.seed, options.exact)
+    simulated = simulated_readings(experiment, options.seed, options.exact)
     texts: dict[Path, Callable[[TextIO], None]] = {
-        options.output: lambda stream: write_readings(stream, found.design, found.readings, found.x)
+        options.output: lambda stream: write_readings(
+            stream, simulated.design, simulated.readings, simulated.x
+        )
     }
-    told = [f"{len(found.readings)} readings written to {options.output}"]
+    lines = [f"{len(simulated.readings)} readings written to {options.output}"]
     if certificates is not None:
-        drawn = certificates.with_drawn_values(experiment, found)
-        how = "exact" if options.exact else f"drawn with seed {found.seed}"
+        drawn = certificates.with_drawn_values(experiment, simulated)
+        how = "exact" if options.exact else f"drawn with seed {simulated.seed}"
         comment = f"certificate values of {experiment.label}, {how}, for fit --certificate"
         texts[options.certificate] = lambda stream: certificates.write(stream, drawn, comment)
         count = len(certificates.certified_values(drawn))
-        told.append(f"{count} certificate values written to {options.certificate}")
+        lines.append(f"{count} certificate values written to {options.certificate}")
     writers = {path: text_writer(print_to) for path, print_to in texts.items() if str(path) != "-"}
     is_written = write(options, writers)
-    for line, path in zip(told, texts, strict=True) if is_written else ():
+    for line, path in zip(lines, texts, strict=True) if is_written else ():
         if path in writers:
             note(options, line)
         else:

@@ -70,16 +70,16 @@ def rule(text: str) -> str:
 
 def columns(text: str) -> dict[str, str]:
     """Read columns from the command line."""
-    found: dict[str, str] = {}
+    assignments: dict[str, str] = {}
     for part in text.split(","):
-        name, sign, column = (one.strip() for one in part.partition("="))
-        if not sign or not column or name in found:
+        name, sign, column = (piece.strip() for piece in part.partition("="))
+        if not sign or not column or name in assignments:
             raise ArgumentTypeError(
                 f'expected columns such as position=Lage,ball=Nr, not "{text}"; names with commas'
                 " stand in the experiment file"
             )
-        found[name] = column
-    return found
+        assignments[name] = column
+    return assignments
 
 
 def with_options(options: Namespace, experiment: Experiment) -> Experiment:

@@ -24,7 +24,7 @@ def complete_fit(
     """
     design, x = replicate_data(shared, moved, errors, ends)
     held_spectrum = None if shared.drawn is None else shared.drawn.spectrum
-    return gauss_newton(design, x, initial_state(design, x), held=held_spectrum)
+    return gauss_newton(design, x, initial_state(design, x), held_spectrum=held_spectrum)
 
 
 def replicate_data(

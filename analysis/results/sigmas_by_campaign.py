@@ -190,7 +190,7 @@ def _without_maps(
     is_chosen[: len(experiment.priors)] = [prior.share is None for prior in experiment.priors]
     without = design.observed(priors.select(is_chosen))
     drawn = as_drawn(without)
-    fit = gauss_newton(without, x, solution.state, held=drawn)
+    fit = gauss_newton(without, x, solution.state, held_spectrum=drawn)
     freedom = without.observation_count - without.parameter_count + drawn.deficiency
     if fit.status != "converged" or freedom <= 0:
         return math.nan, 0

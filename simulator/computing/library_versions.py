@@ -18,9 +18,9 @@ def versions() -> tuple[tuple[str, str], ...]:
 
     blas = sorted(
         {
-            f"{one['internal_api']} {one.get('version')} {one.get('architecture', '')}".strip()
-            for one in threadpool_info()
-            if one["user_api"] == "blas"
+            f"{lib['internal_api']} {lib.get('version')} {lib.get('architecture', '')}".strip()
+            for lib in threadpool_info()
+            if lib["user_api"] == "blas"
         }
     )
     return (

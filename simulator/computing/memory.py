@@ -12,6 +12,6 @@ def want_of_memory(error: BaseException) -> str | None:
     """What stands after the name of what has failed for want of memory; None of any other error."""
     if not isinstance(error, MemoryError) and getattr(error, "errno", None) != errno.ENOMEM:
         return None
-    found = WITH_SIZE.search(str(error))
-    size = f": there is no room for another {found[1]}" if found else ""
+    match = WITH_SIZE.search(str(error))
+    size = f": there is no room for another {match[1]}" if match else ""
     return f"needs more memory than is available{size}"

@@ -39,8 +39,8 @@ def in_processes(
     [8, 16]
     """
     if workers == 1:
-        for own in arguments:
-            yield function(*own)
+        for argument in arguments:
+            yield function(*argument)
         return
     from joblib import Parallel, delayed
 
@@ -57,7 +57,7 @@ def in_processes(
     finished = False
     try:
         with _signals_held():
-            results = parallel(delayed(function)(*own) for own in arguments)
+            results = parallel(delayed(function)(*argument) for argument in arguments)
         # Not `yield from`, which would end the workers before the warning below is silenced.
         for result in results:  # noqa: UP028
             yield result
@@ -129,13 +129,13 @@ def _signals_held() -> Iterator[None]:
     if threading.current_thread() is not threading.main_thread():
         yield
         return
-    held: list[tuple[int, FrameType | None]] = []
+    pending: list[tuple[int, FrameType | None]] = []
     before = {}
     for number in (signal.SIGINT, signal.SIGTERM):
         handler = signal.getsignal(number)
         if callable(handler):
             before[number] = handler
-            signal.signal(number, lambda *arrived: held.append(arrived))
+            signal.signal(number, lambda *arrived: pending.append(arrived))
     try:
         _start_trackers()
         with interruptions_blocked():
@@ -143,8 +143,8 @@ def _signals_held() -> Iterator[None]:
     finally:
         for number, handler in before.items():
             signal.signal(number, handler)
-        if held:
-            first, frame = held[0]
+        if pending:
+            first, frame = pending[0]
             before[signal.Signals(first)](first, frame)
 
 

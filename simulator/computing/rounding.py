@@ -36,12 +36,12 @@ def comparable(values: ArrayLike, digits: int = DIGITS, axis: int | None = None)
     [1.0, 0.0, nan, inf]
     """
     values = np.asarray(values, float)
-    known = np.isfinite(values)
-    size = np.abs(values, where=known, out=np.zeros(values.shape))
+    is_finite = np.isfinite(values)
+    size = np.abs(values, where=is_finite, out=np.zeros(values.shape))
     is_something = size > NOTHING * size.max(axis=axis, initial=0.0, keepdims=True)
-    mantissa, exponent = np.frexp(np.where(known & is_something, values, 0.0))
-    found = np.ldexp(np.round(np.ldexp(mantissa, digits)), exponent - digits) + 0.0
-    return np.asarray(np.where(known, found, values))
+    mantissa, exponent = np.frexp(np.where(is_finite & is_something, values, 0.0))
+    rounded = np.ldexp(np.round(np.ldexp(mantissa, digits)), exponent - digits) + 0.0
+    return np.asarray(np.where(is_finite, rounded, values))
 
 
 def first_largest(values: Array) -> int:

@@ -38,7 +38,7 @@ def unreported(step: ProgressStep) -> None:
     """Show nothing."""
 
 
-def counted(items: Iterable[Item], what: str, wanted: int, report: Report) -> Iterator[Item]:
+def counted(items: Iterable[Item], unit_name: str, wanted: int, report: Report) -> Iterator[Item]:
     """The items as they come, each reported as done when the next is asked for.
 
     >>> list(counted("ab", "letters", 2, print))
@@ -47,7 +47,7 @@ def counted(items: Iterable[Item], what: str, wanted: int, report: Report) -> It
     2 of 2 letters
     ['a', 'b']
     """
-    report(ProgressStep(what, 0, wanted))
-    for done, item in enumerate(items, start=1):
+    report(ProgressStep(unit_name, 0, wanted))
+    for count_done, item in enumerate(items, start=1):
         yield item
-        report(ProgressStep(what, done, wanted))
+        report(ProgressStep(unit_name, count_done, wanted))

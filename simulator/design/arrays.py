@@ -101,19 +101,28 @@ class Design:
 
     def of(self, kind: type[Kind]) -> Kind:
         """The observations of a kind."""
-        return next(one for one in self.observations if isinstance(one, kind))
+        return next(
+            observation for observation in self.observations if isinstance(observation, kind)
+        )
 
     def observed(self, *changed: Observations) -> Design:
         """The design with other observations of some kinds."""
-        by_kind = {type(one): one for one in changed}
+        by_kind = {type(observation): observation for observation in changed}
         return replace(
-            self, observations=tuple(by_kind.get(type(one), one) for one in self.observations)
+            self,
+            observations=tuple(
+                by_kind.get(type(observation), observation) for observation in self.observations
+            ),
         )
 
     @cached_property
     def tied_balls(self) -> Integers:
         """Indices of the balls of plates that observations tie to others."""
-        ends = [one.balls.ravel() for one in self.observations if one.balls.shape[1] > 1]
+        ends = [
+            observation.balls.ravel()
+            for observation in self.observations
+            if observation.balls.shape[1] > 1
+        ]
         return np.unique(np.concatenate([np.zeros(0, np.int64), *ends]))
 
     @property
@@ -125,7 +134,7 @@ class Design:
         """
         readings = self.readings.select(self.plate_readings)
         count = int((readings.repeats[:, None] * measured(self, readings)).sum())
-        return count + sum(one.count(self) for one in self.observations)
+        return count + sum(observation.count(self) for observation in self.observations)
 
     @property
     def parameter_count(self) -> int:
@@ -144,13 +153,13 @@ class Design:
     @cached_property
     def influence_parameters(self) -> tuple[InfluenceParameter, ...]:
         """The parameters of all influence quantities, less constants."""
-        every = [parameter for one in self.influences for parameter in one.parameters]
+        every = [parameter for influence in self.influences for parameter in influence.parameters]
         return tuple(parameter for parameter in every if parameter.uncertainty)
 
     @cached_property
     def influence_values(self) -> Array:
         """Their stated values (p,)."""
-        return np.array([one.value for one in self.influence_parameters], float)
+        return np.array([parameter.value for parameter in self.influence_parameters], float)
 
     def ball_label(self, ball: int) -> str:
         """Name of a ball, with its artefact's where there are several."""
@@ -240,10 +249,12 @@ def in_sequence(readings: Readings, influences: tuple[Influence, ...]) -> Readin
     if not influences:
         return readings
     order = np.arange(len(readings), dtype=float)
-    found = replace(readings, beside={**(readings.beside or {}), "order": order})
-    for one in influences:
-        found = replace(found, beside={**(found.beside or {}), **one.in_sequence(found)})
-    return found
+    ordered = replace(readings, beside={**(readings.beside or {}), "order": order})
+    for influence in influences:
+        ordered = replace(
+            ordered, beside={**(ordered.beside or {}), **influence.in_sequence(ordered)}
+        )
+    return ordered
 
 
 def disturbed_readings(state: State, readings: Readings, x: Array) -> Disturbed:
@@ -266,20 +277,24 @@ def influence_shifts(
     """What influence quantities add to the locations of readings (m, d), and its derivative by
     their parameters (m, d, p), where the scales say `x` (m, d); metres.
     """
-    at = disturbed_readings(state, readings, x)
+    disturbed = disturbed_readings(state, readings, x)
     shift, parts = np.zeros(x.shape), [np.zeros((*x.shape, 0))]
-    for one in design.influences:
+    for influence in design.influences:
         try:
-            stated, derivative = one.shifts(at)
+            shifts, derivative = influence.shifts(disturbed)
         except MemoryError:
             raise
         except Exception as error:
             frames = traceback.extract_tb(error.__traceback__)
-            own = own_frame(error) or next((f for f in frames[::-1] if f.name == "shifts"), None)
-            text = f"shifts of {type(one).__name__} has failed: {error_text(error, own)}"
+            user_frame = own_frame(error) or next(
+                (f for f in frames[::-1] if f.name == "shifts"), None
+            )
+            text = f"shifts of {type(influence).__name__} has failed: {error_text(error, user_frame)}"
             raise UnusableError(text) from error
-        shift += stated
-        varies = np.array([parameter.uncertainty != 0.0 for parameter in one.parameters], bool)
+        shift += shifts
+        varies = np.array(
+            [parameter.uncertainty != 0.0 for parameter in influence.parameters], bool
+        )
         parts.append(derivative[:, :, varies])
     by_parameter = np.concatenate(parts, axis=2)
     return shift + by_parameter @ (state.influences - design.influence_values), by_parameter
@@ -333,7 +348,7 @@ class Observations(ABC):
     @classmethod
     def joined(cls, parts: Sequence[Observations]) -> Self:
         """The observations of all parts, of this kind, together."""
-        columns = zip(*(vars(one).values() for one in parts), strict=True)
+        columns = zip(*(vars(part).values() for part in parts), strict=True)
         return cls(*(np.concatenate(column) for column in columns))
 
     @property

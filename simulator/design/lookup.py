@@ -123,9 +123,9 @@ class References:
             "is below zero; give it without the sign",
         )
 
-    def has_axes(self, stated: object, steps: Steps) -> bool:
+    def has_axes(self, setting: object, steps: Steps) -> bool:
         """Whether what is stated, if it is a list, has one for each axis; otherwise a message."""
-        count = len(stated) if isinstance(stated, tuple) else self.dimension
+        count = len(setting) if isinstance(setting, tuple) else self.dimension
         return self.require(
             self.dimension in (None, count),
             steps,
@@ -150,19 +150,19 @@ class References:
         """
         index = {name: i for i, name in enumerate(layout.names)}
         if chosen == "all":
-            found = np.arange(len(index))
+            indices = np.arange(len(index))
         elif chosen == "corners":
             try:
-                found = corners(layout)
+                indices = corners(layout)
             except ValueError as error:
                 self.problems.add(steps, str(error))
                 return None
         elif self._known_once("ball", index, chosen, steps):
-            found = np.array([index[name] for name in chosen], dtype=np.intp)
+            indices = np.array([index[name] for name in chosen], dtype=np.intp)
         else:
             return None
-        found.setflags(write=False)
-        return found
+        indices.setflags(write=False)
+        return indices
 
     def has_dimension(self, point: Sequence[float], steps: Steps) -> bool:
         """Tell whether a point has as many co-ordinates as the experiment, after saying where
@@ -190,20 +190,20 @@ class References:
         self.problems.add(steps, "has no meaning in two dimensions; remove it", of_key=True)
 
     def _known_once(
-        self, what: str, known: Collection[str], names: Sequence[str], steps: Steps
+        self, noun: str, names_known: Collection[str], names: Sequence[str], steps: Steps
     ) -> bool:
-        seen: set[str] = set()
+        names_seen: set[str] = set()
         before = len(self.problems.messages)
         for i, name in enumerate(names):
-            if name not in known:
+            if name not in names_known:
                 self.problems.add(
-                    (*steps, i), f'unknown {what} "{shorten(name)}"; {hint(name, known)}'
+                    (*steps, i), f'unknown {noun} "{shorten(name)}"; {hint(name, names_known)}'
                 )
-            elif name in seen:
+            elif name in names_seen:
                 self.problems.add(
-                    (*steps, i), f'{what} "{shorten(name)}" is listed twice; remove one of the two'
+                    (*steps, i), f'{noun} "{shorten(name)}" is listed twice; remove one of the two'
                 )
-            seen.add(name)
+            names_seen.add(name)
         return len(self.problems.messages) == before
 
     def require(self, is_right: bool, steps: Steps, text: Callable[[], str] | str) -> bool:
@@ -214,20 +214,21 @@ class References:
 
 
 def lengths_per_axis(
-    stated: Any, steps: Steps, references: References
+    setting: Any, steps: Steps, references: References
 ) -> tuple[Floats | None, bool]:
     """Lengths of all axes (d,), None where nothing is stated, and whether what is stated is
     right.
     """
     dimension = references.dimension
-    if stated is None or dimension is None:
+    if setting is None or dimension is None:
         return None, True
-    if isinstance(stated, float):
-        return frozen([stated] * dimension), True
-    listed = stated if isinstance(stated, tuple) else (stated.x, stated.y, stated.z)
-    given = tuple(length for length in listed if length is not None)
+    if isinstance(setting, float):
+        return frozen([setting] * dimension), True
+    listed = setting if isinstance(setting, tuple) else (setting.x, setting.y, setting.z)
+    lengths_given = tuple(length for length in listed if length is not None)
     text = (
-        f"has {len(given)} axes, but the experiment has {dimension}; give one length for all, or"
+        f"has {len(lengths_given)} axes, but the experiment has {dimension}; give one length for"
+        " all, or"
         f" {dimension}"
     )
-    return frozen(given), references.require(len(given) == dimension, steps, text)
+    return frozen(lengths_given), references.require(len(lengths_given) == dimension, steps, text)

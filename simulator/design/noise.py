@@ -53,16 +53,16 @@ class Noise:
         dtype: Precision = np.float64,
     ) -> Any:
         """Noise of a `shape` whose `axis` counts readings, made in `position` (m,)."""
-        found = self._independent(generator, shape, dtype)
+        noise = self._independent(generator, shape, dtype)
         if not self.correlation:
-            return found
+            return noise
         names, place = np.unique(position, return_inverse=True)
         of_positions = [*shape]
         of_positions[axis] = len(names)
         common = generator.standard_normal(of_positions).astype(dtype)
-        found *= np.sqrt(1.0 - self.correlation)
-        found += np.sqrt(self.correlation) * np.take(common, place.ravel(), axis)
-        return found.astype(dtype, copy=False)
+        noise *= np.sqrt(1.0 - self.correlation)
+        noise += np.sqrt(self.correlation) * np.take(common, place.ravel(), axis)
+        return noise.astype(dtype, copy=False)
 
     def _independent(
         self, generator: np.random.Generator, shape: tuple[int, ...], dtype: Precision

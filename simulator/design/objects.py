@@ -167,7 +167,7 @@ class Readings:
     def select(self, chosen: NDArray[np.bool_] | Integers) -> Readings:
         """The readings at the given indices."""
         uncertainty = None if self.uncertainty is None else self.uncertainty[chosen]
-        beside = self.beside and {name: one[chosen] for name, one in self.beside.items()}
+        beside = self.beside and {name: column[chosen] for name, column in self.beside.items()}
         return Readings(
             self.ball[chosen],
             self.position[chosen],

@@ -50,8 +50,8 @@ def shared_layout(design: Design) -> SharedLayout:
     columns = np.full((len(design.positions.names), q), -1, np.int64)
     parameters: list[Parameter] = []
     for k in design.posed_positions:
-        own = design.balls.places[design.balls.artefact == design.positions.artefact[k]]
-        arm = max(float(np.ptp(own, axis=0).max(initial=0.0)), 1e-3)
+        own_places = design.balls.places[design.balls.artefact == design.positions.artefact[k]]
+        arm = max(float(np.ptp(own_places, axis=0).max(initial=0.0)), 1e-3)
         for j in np.flatnonzero(~design.positions.held[k]):
             columns[k, j] = len(parameters)
             turning = j >= d
@@ -77,8 +77,8 @@ def shared_layout(design: Design) -> SharedLayout:
     parameters += [Parameter(name, "m", "length", name) for name in design.unknown_lengths.names]
     influences = slice(lengths.stop, lengths.stop + len(design.influence_parameters))
     parameters += [
-        Parameter(one.name, one.unit, "influence", one.name, one.effect)
-        for one in design.influence_parameters
+        Parameter(parameter.name, parameter.unit, "influence", parameter.name, parameter.effect)
+        for parameter in design.influence_parameters
     ]
     scale = np.array([1.0 / p.effect for p in parameters])
     return SharedLayout(tuple(parameters), columns, model, scale, offsets, lengths, influences)

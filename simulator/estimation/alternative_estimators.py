@@ -168,43 +168,53 @@ def _points(design: Design, x: Array) -> _Points:
     chosen = design.plate_readings
     readings = design.readings.select(chosen)
     table = np.stack([readings.position, readings.probe, readings.ball], axis=1)
-    unique, of = np.unique(table, axis=0, return_inverse=True)
-    of = of.ravel()
+    unique, point_index = np.unique(table, axis=0, return_inverse=True)
+    point_index = point_index.ravel()
     weight = readings.repeats[:, None] / reading_uncertainties(design, readings) ** 2
     total, mean = (
         np.zeros((len(unique), design.dimension)),
         np.zeros((len(unique), design.dimension)),
     )
-    np.add.at(total, of, weight)
+    np.add.at(total, point_index, weight)
     # Relative to one of them, so that the mean of equal readings is that reading.
     start = np.zeros_like(mean)
-    start[of] = x[chosen]
-    np.add.at(mean, of, weight * (x[chosen] - start[of]))
+    start[point_index] = x[chosen]
+    np.add.at(mean, point_index, weight * (x[chosen] - start[point_index]))
     position, probe, ball = unique.T
     places, place = np.unique(unique[:, :2], axis=0, return_inverse=True)
     return _Points(ball, probe, place.ravel(), places[:, 0], start + mean / total, 1.0 / total)
 
 
 def _measured(design: Design, points: _Points, pairs: Integers, across_probes: bool) -> _Measured:
-    given = design.of(CalibratedDistances)
-    known = np.stack([given.first, given.second], axis=1)
-    ends, of = np.unique(
-        np.sort(np.concatenate([pairs, known]).reshape(-1, 2), axis=1), axis=0, return_inverse=True
+    lengths_calibrated = design.of(CalibratedDistances)
+    calibrated_pairs = np.stack([lengths_calibrated.first, lengths_calibrated.second], axis=1)
+    ends, pair_index = np.unique(
+        np.sort(np.concatenate([pairs, calibrated_pairs]).reshape(-1, 2), axis=1),
+        axis=0,
+        return_inverse=True,
     )
-    at = np.full((len(design.balls.places), len(points.position)), -1)
-    at[points.ball, points.place] = np.arange(len(points.ball))
-    one, other = np.nonzero(points.position[:, None] == points.position)
+    point_of = np.full((len(design.balls.places), len(points.position)), -1)
+    point_of[points.ball, points.place] = np.arange(len(points.ball))
+    first_point, second_point = np.nonzero(points.position[:, None] == points.position)
     if not across_probes:
-        one = other = np.arange(len(points.position))
-    first, second = at[ends[:, :1], one], at[ends[:, 1:], other]
+        first_point = second_point = np.arange(len(points.position))
+    first, second = point_of[ends[:, :1], first_point], point_of[ends[:, 1:], second_point]
     pair, place = np.nonzero((first >= 0) & (second >= 0))
     first, second = first[pair, place], second[pair, place]
     # Along the line as drawn, so that weights stay what they are while parameters change.
     length, along = _apart(points.x + design.probes.offsets[points.probe], first, second)
     variance = np.einsum("md,md->m", along**2, points.variance[first] + points.variance[second])
-    calibrated = of.ravel()[len(pairs) :]
+    calibrated = pair_index.ravel()[len(pairs) :]
     return _Measured(
-        pair, first, second, length, variance, len(ends), calibrated, given.value, given.uncertainty
+        pair,
+        first,
+        second,
+        length,
+        variance,
+        len(ends),
+        calibrated,
+        lengths_calibrated.value,
+        lengths_calibrated.uncertainty,
     )
 
 
@@ -227,24 +237,26 @@ def _all_rows(
     if (length < COLLAPSE_LIMIT * measured.length).any():
         # Without a known length a machine that shrinks everything to a point fits best of all.
         length = np.full_like(length, np.nan)
-    found = [rows(measured, length, by_model)]
+    row_parts = [rows(measured, length, by_model)]
     if len(design.of(Lengths)):
         of_lengths = design.of(Lengths).rows(design, replace(nominal_state(design), a=a), x)
         assert of_lengths.by_shared is not None
         by_shared = of_lengths.by_shared[:, design.once(shared_layout).model]
-        found.append((of_lengths.residual, by_shared))
+        row_parts.append((of_lengths.residual, by_shared))
     priors = design.of(Priors)
     of_model = np.flatnonzero(priors.of_model)
     if len(of_model):
         weight, of_parameters = 1.0 / priors.uncertainty[of_model], priors.by_model[of_model]
-        stated = priors.value - priors.of_offsets(design.probes.offsets)
-        found.append(
+        differences = priors.value - priors.of_offsets(design.probes.offsets)
+        row_parts.append(
             (
-                weight * (of_parameters @ a - stated[of_model]),
+                weight * (of_parameters @ a - differences[of_model]),
                 weight[:, None] * of_parameters,
             ),
         )
-    return np.concatenate([one[0] for one in found]), np.concatenate([one[1] for one in found])
+    return np.concatenate([row_part[0] for row_part in row_parts]), np.concatenate(
+        [row_part[1] for row_part in row_parts]
+    )
 
 
 def _free_distances(measured: _Measured, length: Array, by_model: Array) -> tuple[Array, Array]:
@@ -276,11 +288,11 @@ def _differences(
 
 
 def _prescribed(
-    measured: _Measured, length: Array, by_model: Array, row: Integers, known: Integers
+    measured: _Measured, length: Array, by_model: Array, row: Integers, calibrated: Integers
 ) -> tuple[Array, Array]:
     """Rows that say that measured distances `row` are those of the certificate, `known`."""
-    weight = 1.0 / np.sqrt(measured.variance[row] + measured.uncertainty[known] ** 2)
-    return weight * (length[row] - measured.value[known]), weight[:, None] * by_model[row]
+    weight = 1.0 / np.sqrt(measured.variance[row] + measured.uncertainty[calibrated] ** 2)
+    return weight * (length[row] - measured.value[calibrated]), weight[:, None] * by_model[row]
 
 
 def _stacked(*parts: tuple[Array, Array]) -> tuple[Array, Array]:
@@ -296,10 +308,10 @@ def _every_two_positions(
     later = (np.cumsum(count)[measured.pair] - 1) - rows
     first = np.repeat(rows, later)
     second = first + 1 + np.arange(len(first)) - np.repeat(np.cumsum(later) - later, later)
-    row, known = np.nonzero(measured.pair[:, None] == measured.calibrated)
+    row, repeated = np.nonzero(measured.pair[:, None] == measured.calibrated)
     return _stacked(
         _differences(measured, length, by_model, first, second),
-        _prescribed(measured, length, by_model, row, known),
+        _prescribed(measured, length, by_model, row, repeated),
     )
 
 
@@ -309,10 +321,10 @@ def _initial_position(measured: _Measured, length: Array, by_model: Array) -> tu
     start = np.cumsum(count) - count
     rows = np.arange(len(measured.pair))
     first = rows[rows > start[measured.pair]]
-    known = np.flatnonzero(count[measured.calibrated])
+    usable = np.flatnonzero(count[measured.calibrated])
     return _stacked(
         _differences(measured, length, by_model, first, start[measured.pair[first]]),
-        _prescribed(measured, length, by_model, start[measured.calibrated[known]], known),
+        _prescribed(measured, length, by_model, start[measured.calibrated[usable]], usable),
     )
 
 

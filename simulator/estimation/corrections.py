@@ -36,9 +36,9 @@ def correction_rows(
     by_offset = offset_sensitivity(design.model, points, state.a, offsets)
     for probe in np.unique(probes):
         estimated = layout.offset_columns[probe] >= 0
-        own = np.flatnonzero(probes == probe)
+        members = np.flatnonzero(probes == probe)
         columns = layout.offset_columns[probe][estimated]
-        rows[own[:, None, None], np.arange(rows.shape[1])[:, None], columns] = by_offset[own][
-            :, :, estimated
-        ]
+        rows[members[:, None, None], np.arange(rows.shape[1])[:, None], columns] = by_offset[
+            members
+        ][:, :, estimated]
     return rows

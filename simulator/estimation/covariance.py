@@ -144,11 +144,13 @@ def _determined(factor: Factor, scale: Array, spanned: Array) -> tuple[Array, Ar
         return values, spanned @ right.T
     # The heaviest rows would take all digits of the smallest singular values, but the inverse has
     # these first.
-    found = triangle(in_order(factor) * scale @ spanned, np.zeros((len(scale), 0)))
+    determined = triangle(in_order(factor) * scale @ spanned, np.zeros((len(scale), 0)))
     inverse = scipy_linalg().solve_triangular(
-        found.root, np.eye(len(found.root)), check_finite=False
+        determined.root, np.eye(len(determined.root)), check_finite=False
     )
-    directions, values, _ = np.linalg.svd(spanned[:, found.order] @ inverse, full_matrices=False)
+    directions, values, _ = np.linalg.svd(
+        spanned[:, determined.order] @ inverse, full_matrices=False
+    )
     return 1.0 / values[::-1], directions[:, ::-1]
 
 
@@ -189,13 +191,15 @@ def ball_covariance(design: Design, factor: Factor, spectrum: Spectrum) -> BallC
     shared, null = spectrum.root, spectrum.null
     rank, nulls, k = shared.shape[1], null.shape[1], d * len(factor.kept)
     ball = np.zeros((n, d, rank + k))
-    own = np.zeros((n, d, d))
+    covariances = np.zeros((n, d, d))
     ball_null = np.zeros((n, d, nulls))
     carried = -solve_balls(factor, factor.ball_shared)
     rows = carried.reshape(d * len(carried), carried.shape[2])
     ball[factor.eliminated, :, :rank] = (rows @ shared).reshape(len(carried), d, rank)
     ball_null[factor.eliminated] = (rows @ null).reshape(len(carried), d, nulls)
-    own[factor.eliminated] = solve_balls(factor, np.broadcast_to(np.eye(d), factor.ball_root.shape))
+    covariances[factor.eliminated] = solve_balls(
+        factor, np.broadcast_to(np.eye(d), factor.ball_root.shape)
+    )
     if k:
         sides = np.concatenate(
             [factor.kept_shared @ shared, factor.kept_shared @ null, -np.eye(k)], axis=1
@@ -204,4 +208,4 @@ def ball_covariance(design: Design, factor: Factor, spectrum: Spectrum) -> BallC
         ball[factor.kept, :, :rank] = solved[:, :rank].reshape(len(factor.kept), d, rank)
         ball_null[factor.kept] = solved[:, rank : rank + nulls].reshape(len(factor.kept), d, nulls)
         ball[factor.kept, :, rank:] = solved[:, rank + nulls :].reshape(len(factor.kept), d, k)
-    return BallCovariance(ball, own, ball_null)
+    return BallCovariance(ball, covariances, ball_null)

@@ -96,16 +96,16 @@ class _Gathered:
     def sum_of_squares(self) -> float:
         """That of the rows that are not eliminated with a ball."""
         rows = [*self.shared, *(rows for _, rows in self.tied)]
-        return sum(float(one.residual @ one.residual) for one in rows)
+        return sum(float(row.residual @ row.residual) for row in rows)
 
 
 def _gathered(design: Design, state: State, x: Array | None) -> _Gathered:
     sorted_: tuple[list[tuple[Integers, Rows]], ...] = ([], [], [])
-    for one in design.observations:
-        if len(one):
-            balls = one.balls
+    for observation in design.observations:
+        if len(observation):
+            balls = observation.balls
             width = balls.shape[1]
-            sorted_[min(width, 2)].append((balls, one.rows(design, state, x)))
+            sorted_[min(width, 2)].append((balls, observation.rows(design, state, x)))
     shared, single, tied = sorted_
     return _Gathered(
         tuple((balls[:, 0], rows) for balls, rows in single),
@@ -130,19 +130,19 @@ def eliminate(design: Design, layout: SharedLayout, state: State, x: Array | Non
 # leaves.
 def _eliminate_alike(design: Design, layout: SharedLayout, state: State, x: Array | None) -> Factor:
     d, s = design.dimension, len(layout)
-    kept, gathered = design.tied_balls, _gathered(design, state, x)
-    single = np.setdiff1d(design.plate_balls, kept, assume_unique=True)
+    balls_kept, gathered = design.tied_balls, _gathered(design, state, x)
+    single = np.setdiff1d(design.plate_balls, balls_kept, assume_unique=True)
     shared = np.zeros((0, s + 1))
     total = 0.0
     roots, tops = [], []
     order = []
-    every = np.concatenate([single, kept])
-    for balls, by_ball, rest in _batches(design, layout, state, x, every, gathered.single):
-        total += float((rest[:, :, -1] ** 2).sum())
+    every = np.concatenate([single, balls_kept])
+    for balls, by_ball, by_rest in _batches(design, layout, state, x, every, gathered.single):
+        total += float((by_rest[:, :, -1] ** 2).sum())
         q, r = np.linalg.qr(by_ball)
-        top = q.transpose(0, 2, 1) @ rest
-        rest -= q @ top
-        shared = _absorbed(shared, rest.reshape(-1, s + 1))
+        top = q.transpose(0, 2, 1) @ by_rest
+        by_rest -= q @ top
+        shared = _absorbed(shared, by_rest.reshape(-1, s + 1))
         order.append(balls)
         roots.append(r)
         tops.append(top)
@@ -153,17 +153,17 @@ def _eliminate_alike(design: Design, layout: SharedLayout, state: State, x: Arra
     shared = np.concatenate([shared, *(_with_residual(rows, s) for rows in gathered.shared)])
     total += gathered.sum_of_squares
 
-    is_kept = np.isin(balls, kept)
-    kept = balls[is_kept]
-    columns = d * len(kept)
+    is_kept = np.isin(balls, balls_kept)
+    balls_kept = balls[is_kept]
+    columns = d * len(balls_kept)
     # Triangular already but for the rows of tied balls, which are absorbed some at a time: there
     # may be far more than columns.
     triangle = np.zeros((columns + s + 1, columns + s + 1), order="F")
-    for place, own in enumerate(root[is_kept]):
-        triangle[d * place : d * place + d, d * place : d * place + d] = own
+    for place, root_of_ball in enumerate(root[is_kept]):
+        triangle[d * place : d * place + d, d * place : d * place + d] = root_of_ball
     triangle[:columns, columns:] = top[is_kept].reshape(columns, s + 1)
     triangle[columns:, columns:] = _square(_triangle(shared), s + 1)
-    for rows in _tied_rows(gathered, _places(design, kept), columns, s):
+    for rows in _tied_rows(gathered, _places(design, balls_kept), columns, s):
         triangle = _with_rows(triangle, rows)
     return Factor(
         layout=layout,
@@ -171,7 +171,7 @@ def _eliminate_alike(design: Design, layout: SharedLayout, state: State, x: Arra
         ball_root=root[~is_kept],
         ball_shared=top[~is_kept][:, :, :-1],
         ball_side=top[~is_kept][:, :, -1],
-        kept=kept,
+        kept=balls_kept,
         kept_root=triangle[:columns, :columns],
         kept_shared=triangle[:columns, columns:-1],
         kept_side=triangle[:columns, -1],
@@ -185,7 +185,11 @@ def _differ(design: Design, state: State) -> bool:
     """Whether the weights of a design's rows differ by more than `ALIKE`."""
     weights = [
         reading_weights(design, design.readings.select(design.plate_readings)),
-        *(one.weights(design, state) for one in design.observations if len(one)),
+        *(
+            observation.weights(design, state)
+            for observation in design.observations
+            if len(observation)
+        ),
     ]
     weights = [some[some > 0.0] for some in weights]
     largest = max(float(some.max(initial=0.0)) for some in weights)
@@ -203,7 +207,9 @@ def _weighted_alike(design: Design, state: State) -> Design:
         machine=replace(design.machine, repeatability=np.ones(design.dimension)),
         readings=readings,
     )
-    return alike.observed(*(one.alike(design, state) for one in design.observations))
+    return alike.observed(
+        *(observation.alike(design, state) for observation in design.observations)
+    )
 
 
 # In one piece: the steps of one elimination, each of which uses up the rows that the one before
@@ -213,22 +219,22 @@ def _eliminate_graded(
 ) -> Factor:
     """The factor where rows' weights differ much: every row keeps its own relative accuracy."""
     d, s = design.dimension, len(layout)
-    kept, gathered = design.tied_balls, _gathered(design, state, x)
-    place_of = _places(design, kept)
-    columns = d * len(kept)
+    is_kept, gathered = design.tied_balls, _gathered(design, state, x)
+    place_of = _places(design, is_kept)
+    columns = d * len(is_kept)
     scale = np.append(layout.scale, 1.0)
-    single = np.setdiff1d(design.plate_balls, kept, assume_unique=True)
+    single = np.setdiff1d(design.plate_balls, is_kept, assume_unique=True)
     balls, roots, orders, tops = [], [], [], []
     total, shared, tied = 0.0, Collected(s, 1), Collected(columns, s + 1)
-    for is_tied, chosen in ((False, single), (True, kept)):
-        for batch, by_ball, rest in _batches(design, layout, state, x, chosen, gathered.single):
-            total += float((rest[:, :, -1] ** 2).sum())
-            rest *= scale
+    for is_tied, chosen in ((False, single), (True, is_kept)):
+        for batch, by_ball, by_rest in _batches(design, layout, state, x, chosen, gathered.single):
+            total += float((by_rest[:, :, -1] ** 2).sum())
+            by_rest *= scale
             weights = np.maximum(
-                np.abs(by_ball).max(axis=2), np.abs(rest[:, :, :-1]).max(axis=2, initial=0.0)
+                np.abs(by_ball).max(axis=2), np.abs(by_rest[:, :, :-1]).max(axis=2, initial=0.0)
             )
-            root, order, top, left = without_balls(by_ball, rest, weights)
-            shared.add(left.reshape(-1, s + 1))
+            root, order, top, remaining = without_balls(by_ball, by_rest, weights)
+            shared.add(remaining.reshape(-1, s + 1))
             if is_tied:
                 rows = np.zeros((len(batch), d, columns + s + 1))
                 ball, row = np.ogrid[: len(batch), :d]
@@ -260,7 +266,7 @@ def _eliminate_graded(
         ball_root=np.concatenate([np.zeros((0, d, d)), *roots]),
         ball_shared=top[:, :, :-1],
         ball_side=top[:, :, -1],
-        kept=kept,
+        kept=is_kept,
         kept_root=of_kept.root,
         kept_shared=kept_top[:, :-1],
         kept_side=kept_top[:, -1],
@@ -274,20 +280,20 @@ def _eliminate_graded(
     )
 
 
-def _places(design: Design, kept: Integers) -> Integers:
+def _places(design: Design, chosen: Integers) -> Integers:
     """Place (n,) of each ball among those kept."""
     place_of = np.zeros(len(design.balls.names), np.int64)
-    place_of[kept] = np.arange(len(kept))
+    place_of[chosen] = np.arange(len(chosen))
     return place_of
 
 
 def _with_residual(rows: Rows, s: int) -> Array:
     """Derivatives by the shared parameters with the residual beside them (m, s + 1)."""
-    found = np.zeros((len(rows.residual), s + 1))
+    with_residual = np.zeros((len(rows.residual), s + 1))
     if rows.by_shared is not None:
-        found[:, :-1] = rows.by_shared
-    found[:, -1] = rows.residual
-    return found
+        with_residual[:, :-1] = rows.by_shared
+    with_residual[:, -1] = rows.residual
+    return with_residual
 
 
 def _tied_rows(gathered: _Gathered, place_of: Integers, columns: int, s: int) -> Iterator[Array]:
@@ -299,10 +305,10 @@ def _tied_rows(gathered: _Gathered, place_of: Integers, columns: int, s: int) ->
             some = slice(start, start + TIED_AT_ONCE)
             by_ball = of_all.by_ball[some]
             rows = np.zeros((len(by_ball), columns + s + 1), order="F")
-            at, d = np.arange(len(by_ball)), by_ball.shape[2]
+            ball_rows, d = np.arange(len(by_ball)), by_ball.shape[2]
             for ball, slope in zip(balls[some].T, by_ball.swapaxes(0, 1), strict=True):
                 for axis in range(d):
-                    rows[at, d * place_of[ball] + axis] += slope[:, axis]
+                    rows[ball_rows, d * place_of[ball] + axis] += slope[:, axis]
             if of_all.by_shared is not None:
                 rows[:, columns:-1] = of_all.by_shared[some]
             rows[:, -1] = of_all.residual[some]
@@ -331,12 +337,12 @@ def _by_panels(triangle: Array, rows: Array, panel: int) -> Array:
     """Triangular factor of a square `triangle` with `rows` below it, both in Fortran's order and in
     place of both.
     """
-    found: Array
+    reduced: Array
     dtpqrt = scipy_linalg().lapack.dtpqrt
-    found, _, _, _ = dtpqrt(
+    reduced, _, _, _ = dtpqrt(
         0, min(panel, len(triangle)), triangle, rows, overwrite_a=1, overwrite_b=1
     )
-    return found
+    return reduced
 
 
 def _triangle(rows: Array) -> Array:
@@ -356,7 +362,7 @@ def _batches(
     state: State,
     x: Array | None,
     balls: Integers,
-    known: tuple[tuple[Integers, Rows], ...],
+    rows_by_ball: tuple[tuple[Integers, Rows], ...],
 ) -> Iterator[tuple[Integers, Array, Array]]:
     """Balls a batch at a time: their indices (b,), rows by the ball (b, rows, d), by the rest (b,
     rows, s + 1).
@@ -370,30 +376,35 @@ def _batches(
     chosen = chosen[np.argsort(readings.ball[chosen], kind="stable")]
     count = np.bincount(readings.ball[chosen], minlength=len(design.balls.names))
     start = np.cumsum(count) - count
-    certified = np.concatenate([np.zeros(0, np.int64), *(ball for ball, _ in known)])
-    slope = np.concatenate([np.zeros((0, d)), *(one.by_ball[:, 0] for _, one in known)])
+    certified = np.concatenate([np.zeros(0, np.int64), *(ball for ball, _ in rows_by_ball)])
+    slope = np.concatenate(
+        [np.zeros((0, d)), *(ball_rows.by_ball[:, 0] for _, ball_rows in rows_by_ball)]
+    )
     by_ball_first = np.argsort(certified, kind="stable")
     extra = np.bincount(certified, minlength=len(design.balls.names))
     extra_start = np.cumsum(extra) - extra
     # Where no shared parameter has a part, columns of zeros are not formed.
-    is_mixed = any(one.by_shared is not None for _, one in known)
-    beside = [_with_residual(one, s) if is_mixed else one.residual[:, None] for _, one in known]
+    is_mixed = any(ball_rows.by_shared is not None for _, ball_rows in rows_by_ball)
+    beside = [
+        _with_residual(ball_rows, s) if is_mixed else ball_rows.residual[:, None]
+        for _, ball_rows in rows_by_ball
+    ]
     known_rest = np.concatenate([np.zeros((0, s + 1 if is_mixed else 1)), *beside])
 
     rows = d * count + extra
     balls = balls[np.argsort(rows[balls], kind="stable")]
-    at = 0
-    while at < len(balls):
-        most = max(int(rows[balls[at]]), 1)
-        batch = balls[at : at + max(ROWS_AT_ONCE // most, 1)]
-        at += len(batch)
+    row = 0
+    while row < len(balls):
+        most = max(int(rows[balls[row]]), 1)
+        batch = balls[row : row + max(ROWS_AT_ONCE // most, 1)]
+        row += len(batch)
         m, c = int(count[batch].max(initial=0)), int(extra[batch].max(initial=0))
         by_ball = np.zeros((len(batch), max(d * m + c, d), d))
-        rest = np.zeros((len(batch), max(d * m + c, d), s + 1))
+        by_rest = np.zeros((len(batch), max(d * m + c, d), s + 1))
         present = np.arange(m) < count[batch][:, None]
-        which = np.where(present, start[batch][:, None] + np.arange(m), 0)
+        reading_index = np.where(present, start[batch][:, None] + np.arange(m), 0)
         if m:
-            index = chosen[which.ravel()]
+            index = chosen[reading_index.ravel()]
             rows_of = reading_blocks(
                 design, state, readings.select(index), None if x is None else x[index]
             )
@@ -402,26 +413,26 @@ def _batches(
                 columns = np.concatenate(
                     [columns, layout.offset_columns[readings.probe[index]]], axis=1
                 )
-            _fill(by_ball[:, : d * m], rest[:, : d * m], rows_of, columns, layout, present)
+            _fill(by_ball[:, : d * m], by_rest[:, : d * m], rows_of, columns, layout, present)
         if c:
             member = np.arange(c) < extra[batch][:, None]
             source = by_ball_first[np.where(member, extra_start[batch][:, None] + np.arange(c), 0)]
             by_ball[:, d * m : d * m + c] = slope[source] * member[:, :, None]
-            beside_ball = rest[:, d * m : d * m + c, -known_rest.shape[1] :]
+            beside_ball = by_rest[:, d * m : d * m + c, -known_rest.shape[1] :]
             beside_ball[:] = known_rest[source] * member[:, :, None]
-        yield batch, by_ball, rest
+        yield batch, by_ball, by_rest
 
 
-def _fill(by_ball, rest, blocks, columns, layout, present) -> None:  # type: ignore[no-untyped-def]
+def _fill(by_ball, by_rest, blocks, columns, layout, present) -> None:  # type: ignore[no-untyped-def]
     """Write reading blocks (b m, d, ...) into the rows of a batch, in place."""
     b, m = present.shape
     d = by_ball.shape[2]
     by_ball[:] = blocks.by_ball.reshape(b, m * d, d)
-    rest[:, :, layout.model] = blocks.by_model.reshape(b, m * d, -1)
+    by_rest[:, :, layout.model] = blocks.by_model.reshape(b, m * d, -1)
     if blocks.by_influence is not None:
-        rest[:, :, layout.influences] = blocks.by_influence.reshape(b, m * d, -1)
-    rest[:, :, -1] = blocks.residual.reshape(b, m * d)
-    flat = rest.reshape(b, m, d, -1)
+        by_rest[:, :, layout.influences] = blocks.by_influence.reshape(b, m * d, -1)
+    by_rest[:, :, -1] = blocks.residual.reshape(b, m * d)
+    flat = by_rest.reshape(b, m, d, -1)
     ball, place = np.nonzero(present)
     used = columns.reshape(b, m, -1)[ball, place]
     by_column = blocks.by_pose

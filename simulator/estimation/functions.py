@@ -190,44 +190,54 @@ class Displacements:
         return Displacements(*(array[chosen] for array in arrays))
 
 
-def displacements(at: Linearisation, places: Places, narrow: bool = True) -> Displacements:
+def displacements(
+    linearisation: Linearisation, places: Places, narrow: bool = True
+) -> Displacements:
     """Displacements of places, in units of the standard deviation of a unit-weight observation.
 
     With `narrow` those of points have variables of their own, no more than there are parameters
     that move points; otherwise those of the linearisation, which balls and observations have in
     common.
     """
-    design, drawn = at.design, at.as_drawn.state
+    design, drawn = linearisation.design, linearisation.as_drawn.state
     if isinstance(places, BallPlaces):
-        own, index = at.balls.own[places.index], places.index
+        own_roots, index = linearisation.balls.own[places.index], places.index
         size = np.full((len(index), design.dimension), MICROMETRE)
-        where = places.at(design, at.state), places.at(design, drawn)
+        where = places.at(design, linearisation.state), places.at(design, drawn)
         return Displacements(
-            where[0], at.balls.common[index], own, at.ball_null[index], where[1], size
+            where[0],
+            linearisation.balls.common[index],
+            own_roots,
+            linearisation.ball_null[index],
+            where[1],
+            size,
         )
     n, d = places.points.shape
-    columns, nulls = _as_slice(moving_columns(at.layout, places)), at.shared_null.shape[1]
-    root = at.shared[columns]
+    columns, nulls = (
+        _as_slice(moving_columns(linearisation.layout, places)),
+        linearisation.shared_null.shape[1],
+    )
+    root = linearisation.shared[columns]
     if narrow:
         # A root of the same covariance: a triangle's has columns of zeros, or another one is found.
         root = root[:, root.any(axis=0)]
         if root.shape[0] < root.shape[1]:
             root = np.asarray(np.linalg.qr(root.T, mode="r")).T
-    common = np.zeros((n, d, root.shape[1] if narrow else at.balls.common.shape[2]))
+    common = np.zeros((n, d, root.shape[1] if narrow else linearisation.balls.common.shape[2]))
     null, size = np.zeros((n, d, nulls)), np.zeros((n, d))
-    for some, rows in point_rows(design, at.layout, at.state, places):
+    for some, rows in point_rows(design, linearisation.layout, linearisation.state, places):
         moving = rows[:, :, columns].reshape(-1, len(root))
         common[some, :, : root.shape[1]] = (moving @ root).reshape(len(rows), d, root.shape[1])
         if not nulls:
             continue
-        if at.drawn is not None:
+        if linearisation.drawn is not None:
             rows = correction_rows(
-                design, at.layout, drawn, places.points[some], places.probes[some]
+                design, linearisation.layout, drawn, places.points[some], places.probes[some]
             )
-        null[some] = rows @ at.shared_null
-        size[some] = np.sqrt(((rows * at.spectrum.scale) ** 2).sum(axis=2))
-    corrected = places.at(design, at.state)
-    as_drawn = corrected if at.drawn is None else places.at(design, drawn)
+        null[some] = rows @ linearisation.shared_null
+        size[some] = np.sqrt(((rows * linearisation.spectrum.scale) ** 2).sum(axis=2))
+    corrected = places.at(design, linearisation.state)
+    as_drawn = corrected if linearisation.drawn is None else places.at(design, drawn)
     return Displacements(corrected, common, np.zeros((n, d, d)), null, as_drawn, size)
 
 
@@ -253,7 +263,7 @@ def point_rows(
         yield some, correction_rows(design, layout, state, places.points[some], places.probes[some])
 
 
-def linear_functions(at: Linearisation, functions: Functions) -> LinearFunctions:
+def linear_functions(linearisation: Linearisation, functions: Functions) -> LinearFunctions:
     """Derivatives of all functions: dense, for some of them rather than for all distances of a
     large plate.
 
@@ -264,34 +274,43 @@ def linear_functions(at: Linearisation, functions: Functions) -> LinearFunctions
     >>> linear_functions(at, length).shared.shape == (1, len(at.layout))
     True
     """
-    found = _derivatives(at, at.state, functions)
-    if at.drawn is None or isinstance(functions, Parameters):
-        return found
-    return replace(found, drawn=_derivatives(at, at.drawn.state, functions))
+    derivatives = _derivatives(linearisation, linearisation.state, functions)
+    if linearisation.drawn is None or isinstance(functions, Parameters):
+        return derivatives
+    return replace(
+        derivatives, drawn=_derivatives(linearisation, linearisation.drawn.state, functions)
+    )
 
 
-def _derivatives(at: Linearisation, state: State, functions: Functions) -> LinearFunctions:
+def _derivatives(
+    linearisation: Linearisation, state: State, functions: Functions
+) -> LinearFunctions:
     if isinstance(functions, Parameters):
         return LinearFunctions(functions.rows)
-    places, design = functions.places, at.design
+    places, design = functions.places, linearisation.design
     where = places.at(design, state)
     n, d = where.shape
     if isinstance(places, MeasuredPoints):
         by_shared = np.concatenate(
-            [rows for _, rows in point_rows(design, at.layout, state, places)]
+            [rows for _, rows in point_rows(design, linearisation.layout, state, places)]
         )
         by_balls = np.zeros((n, d, 0))
     else:
-        by_shared = np.zeros((n, d, len(at.layout)))
+        by_shared = np.zeros((n, d, len(linearisation.layout)))
         by_balls = np.zeros((n, d, len(design.balls.places), d))
         by_balls[np.arange(n)[:, None], np.arange(d), places.index[:, None], np.arange(d)] = 1.0
     by_all = np.concatenate([by_shared, by_balls.reshape(n, d, -1)], axis=2)
     if isinstance(functions, Coordinates):
-        found = by_all.reshape(n * d, -1)
+        by_parameter = by_all.reshape(n * d, -1)
     else:
         first, second = np.triu_indices(n, 1) if functions.pairs is None else functions.pairs.T
         unit = where[first] - where[second]
         unit /= np.sqrt((unit**2).sum(axis=1))[:, None]
-        found = np.einsum("md,mds->ms", unit, by_all[first] - by_all[second])
-    shared, balls = found[:, : len(at.layout)], found[:, len(at.layout) :]
-    return LinearFunctions(shared, balls.reshape(len(found), -1, d) if balls.shape[1] else None)
+        by_parameter = np.einsum("md,mds->ms", unit, by_all[first] - by_all[second])
+    shared, balls = (
+        by_parameter[:, : len(linearisation.layout)],
+        by_parameter[:, len(linearisation.layout) :],
+    )
+    return LinearFunctions(
+        shared, balls.reshape(len(by_parameter), -1, d) if balls.shape[1] else None
+    )

@@ -74,7 +74,7 @@ def gauss_newton(
     x: Array,
     start: State,
     settings: GaussNewtonSettings | None = None,
-    held: Spectrum | None = None,
+    held_spectrum: Spectrum | None = None,
 ) -> Solution:
     """Minimise S^2 over balls, poses and machine errors, from `start`.
 
@@ -93,13 +93,13 @@ def gauss_newton(
             factor = eliminate(design, layout, state, x)
         record.append(Iteration(length, factor.sum_of_squares))
         if not (np.isfinite(factor.sum_of_squares) and np.isfinite(factor.root).all()):
-            found = no_spectrum(layout)
+            found_spectrum = no_spectrum(layout)
             status = "diverged"
             break
-        found = spectrum(factor, held)
+        found_spectrum = spectrum(factor, held_spectrum)
         if status == "converged" or len(record) > settings.iterations:
             break
-        shared, balls = newton_step(design, factor, found)
+        shared, balls = newton_step(design, factor, found_spectrum)
         size = max(
             float(np.abs(shared / layout.scale).max(initial=0.0)),
             float(np.abs(balls).max(initial=0.0)),
@@ -110,7 +110,7 @@ def gauss_newton(
         if size < settings.smallest_step or rounding:
             status = "converged"
         previous = size
-    return Solution(state, factor, found, tuple(record), status)
+    return Solution(state, factor, found_spectrum, tuple(record), status)
 
 
 def estimate(design: Design, x: Array, settings: GaussNewtonSettings | None = None) -> Solution:
@@ -124,19 +124,23 @@ def estimate(design: Design, x: Array, settings: GaussNewtonSettings | None = No
     """
     start = initial_state(design, x)
     drawn = as_drawn(design)
-    held = gauss_newton(design, x, start, settings, drawn)
+    solution_held = gauss_newton(design, x, start, settings, drawn)
     if not drawn.deficiency or len(design.of(Lengths)):
-        return held
+        return solution_held
     followed = gauss_newton(design, x, start, settings)
-    went_far = max(one.step for one in followed.iterations) > NEIGHBOURHOOD
+    went_far = max(iteration.step for iteration in followed.iterations) > NEIGHBOURHOOD
     if followed.status != "converged" or went_far:
-        return held
-    if held.status == "converged" and not _tells_of_open(design, held, followed, drawn.deficiency):
-        return held
+        return solution_held
+    if solution_held.status == "converged" and not _tells_of_open(
+        design, solution_held, followed, drawn.deficiency
+    ):
+        return solution_held
     return replace(followed, spectrum=spectrum(followed.factor, drawn))
 
 
-def _tells_of_open(design: Design, held: Solution, followed: Solution, deficiency: int) -> bool:
+def _tells_of_open(
+    design: Design, held_solution: Solution, followed: Solution, deficiency: int
+) -> bool:
     """Whether S^2 falls by more than noise explains where what is open as drawn is followed: an
     F-test with the scatter of the readings themselves.
     """
@@ -145,9 +149,9 @@ def _tells_of_open(design: Design, held: Solution, followed: Solution, deficienc
     freedom = design.observation_count - design.parameter_count
     if freedom <= 0:
         return False
-    left = followed.factor.sum_of_squares
-    gained = held.factor.sum_of_squares - left
-    ratio = np.inf if left == 0.0 else max(gained, 0.0) / deficiency / (left / freedom)
+    sum_left = followed.factor.sum_of_squares
+    gained = held_solution.factor.sum_of_squares - sum_left
+    ratio = np.inf if sum_left == 0.0 else max(gained, 0.0) / deficiency / (sum_left / freedom)
     return bool(fdtrc(deficiency, freedom, ratio) < CHANCE_OF_NOISE)
 
 
@@ -179,8 +183,8 @@ def newton_step(design: Design, factor: Factor, spectrum: Spectrum) -> tuple[Arr
     side = factor.ball_side + factor.ball_shared @ shared
     balls[factor.eliminated] = -solve_balls(factor, side[:, :, None])[:, :, 0]
     if len(factor.kept):
-        kept = -solve_kept(factor, factor.kept_side + factor.kept_shared @ shared)
-        balls[factor.kept] = kept.reshape(-1, design.dimension)
+        kept_step = -solve_kept(factor, factor.kept_side + factor.kept_shared @ shared)
+        balls[factor.kept] = kept_step.reshape(-1, design.dimension)
     return shared, balls
 
 
@@ -190,12 +194,12 @@ def _shared_step(factor: Factor, spectrum: Spectrum) -> Array:
     determined = spectrum.directions[:, : spectrum.rank]
     if factor.orders is None:
         # root = U diag(values) V' / scale, so U' side follows from root times the directions.
-        left = factor.root @ determined
-        left /= np.sqrt((left**2).sum(axis=0))
-        return np.asarray(-(spectrum.root @ (left.T @ factor.side)))
-    rest = triangle(in_order(factor) @ determined, factor.side[:, None])
-    steps = scipy_linalg().solve_triangular(rest.root, rest.side[:, 0], check_finite=False)
-    return np.asarray(-(determined[:, rest.order] @ steps))
+        rest_root = factor.root @ determined
+        rest_root /= np.sqrt((rest_root**2).sum(axis=0))
+        return np.asarray(-(spectrum.root @ (rest_root.T @ factor.side)))
+    reduced = triangle(in_order(factor) @ determined, factor.side[:, None])
+    steps = scipy_linalg().solve_triangular(reduced.root, reduced.side[:, 0], check_finite=False)
+    return np.asarray(-(determined[:, reduced.order] @ steps))
 
 
 def moved(state: State, layout: SharedLayout, shared: Array, balls: Array) -> State:

@@ -75,9 +75,9 @@ class Collected:
         """Add rows (k, columns + sides)."""
         self._waiting.append(rows[rows.any(axis=1)])
         if sum(map(len, self._waiting)) > COLLECTED * max(self._columns, 64):
-            found = self._reduced()
-            self._waiting = [np.concatenate([found.rows, found.side], axis=1)]
-            self._rest.append(found.rest)
+            reduced = self._reduced()
+            self._waiting = [np.concatenate([reduced.rows, reduced.side], axis=1)]
+            self._rest.append(reduced.rest)
 
     def found(self) -> Triangle:
         """The triangle of all rows."""
@@ -90,7 +90,7 @@ class Collected:
 
 
 def without_balls(
-    by_ball: Array, rest: Array, weights: Array
+    by_ball: Array, by_rest: Array, weights: Array
 ) -> tuple[Array, Integers, Array, Array]:
     """Eliminate a batch of balls from rows by them (b, m, d) and by the rest (b, m, c), sorted by
     `weights` (b, m).
@@ -100,7 +100,10 @@ def without_balls(
     """
     b, m, d = by_ball.shape
     heaviest = np.argsort(-weights, axis=1, kind="stable")[:, :, None]
-    by_ball, rest = np.take_along_axis(by_ball, heaviest, 1), np.take_along_axis(rest, heaviest, 1)
+    by_ball, by_rest = (
+        np.take_along_axis(by_ball, heaviest, 1),
+        np.take_along_axis(by_rest, heaviest, 1),
+    )
     order = np.tile(np.arange(d), (b, 1))
     ball = np.arange(b)
     for step in range(d):
@@ -114,10 +117,10 @@ def without_balls(
         column[:, 0] += np.where(column[:, 0] < 0.0, -length, length)
         square = (column**2).sum(axis=1)
         half = np.where(square > 0.0, 2.0 / np.where(square > 0.0, square, 1.0), 0.0)
-        for array in (by_ball[:, step:, step:], rest[:, step:]):
+        for array in (by_ball[:, step:, step:], by_rest[:, step:]):
             array -= (
                 column[:, :, None]
                 * (half[:, None] * np.einsum("bm,bmc->bc", column, array))[:, None]
             )
         by_ball[:, step + 1 :, step] = 0.0
-    return by_ball[:, :d], order, rest[:, :d], rest[:, d:]
+    return by_ball[:, :d], order, by_rest[:, :d], by_rest[:, d:]

@@ -37,29 +37,41 @@ def initial_state(design: Design, x: Array) -> State:
 
     Where too few balls join a position to the others, the nominal geometry closes the gap.
     """
-    for one in design.observations:
-        design = one.as_read(design, x)
+    for observation in design.observations:
+        design = observation.as_read(design, x)
     d = design.dimension
     balls = design.balls.places.copy()
     rotations, origins = design.positions.rotations.copy(), design.positions.origins.copy()
-    seen = _mean_locations(design, x)
+    mean_locations = _mean_locations(design, x)
     for artefact in design.artefacts.plates:
         members = design.balls.of(artefact)
         places = [int(k) for k in np.flatnonzero(design.positions.artefact == artefact)]
         if len(members) == 1:
             # A single ball has a place in each position and no turn.
             arm = np.einsum("kij,j->ki", rotations[places], balls[members[0]])
-            there = seen[places, members[0]]
+            there = mean_locations[places, members[0]]
             origins[places] = np.where(np.isnan(there), origins[places], there - arm)
-            held = [k for k in places if design.positions.held[k, :d].all()]
-            if held:
-                origins[held] = design.positions.origins[held]
-                first = rotations[held[0]].T @ (seen[held[0], members[0]] - origins[held[0]])
+            held_positions = [k for k in places if design.positions.held[k, :d].all()]
+            if held_positions:
+                origins[held_positions] = design.positions.origins[held_positions]
+                first = rotations[held_positions[0]].T @ (
+                    mean_locations[held_positions[0], members[0]] - origins[held_positions[0]]
+                )
                 balls[members[0]] = np.where(np.isnan(first), balls[members[0]], first)
             continue
-        shape, poses = _assemble(seen[places][:, members], design.balls.places[members], d)
+        shape, poses = _assemble(
+            mean_locations[places][:, members], design.balls.places[members], d
+        )
         turn, shift = _into_frame(design, shape, poses, places, members)
-        if _strength(seen[places[0], members][~np.isnan(seen[places[0], members, 0])], d) > 0.0:
+        if (
+            _strength(
+                mean_locations[places[0], members][
+                    ~np.isnan(mean_locations[places[0], members, 0])
+                ],
+                d,
+            )
+            > 0.0
+        ):
             turn, shift = _with_held(design, shape, poses[0], places[0], members, turn, shift)
         balls[members] = np.where(
             np.isnan(shape), design.balls.places[members], shape @ turn.T + shift
@@ -70,7 +82,9 @@ def initial_state(design: Design, x: Array) -> State:
     if design.positions.across is not None:
         for k, across in enumerate(design.positions.across.tolist()):
             if across >= 0:
-                rotations[k], there = _in_plane(design, k, across, seen[k], balls, origins[k])
+                rotations[k], there = _in_plane(
+                    design, k, across, mean_locations[k], balls, origins[k]
+                )
                 is_held = design.positions.held[k, :d]
                 origins[k] = np.where(is_held, design.positions.origins[k], there)
     readings = design.readings
@@ -81,24 +95,26 @@ def initial_state(design: Design, x: Array) -> State:
                 x[rows] + design.probes.offsets[readings.probe[rows]], origins[k]
             )[0]
     state = replace(nominal_state(design), balls=balls, rotations=rotations, origins=origins)
-    for one in design.observations:
-        state = one.started(design, x, state)
+    for observation in design.observations:
+        state = observation.started(design, x, state)
     return state
 
 
 def _in_plane(
-    design: Design, k: int, across: int, seen: Array, balls: Array, origin: Array
+    design: Design, k: int, across: int, locations: Array, balls: Array, origin: Array
 ) -> tuple[Array, Array]:
     """The pose of a position that is read in its plane, from where its balls (n, 3) were seen: out
     of the plane nothing is read that could tell poses from the drawing's.
     """
     drawn = design.positions.rotations[k]
-    own, inside = ~np.isnan(seen).all(axis=1), np.arange(3) != across
-    turn, places = np.eye(3), balls[own] @ drawn.T
-    if own.sum() > 1 and not design.positions.held[k, 3 + across]:
-        turn[np.ix_(inside, inside)] = fit_motion(places[:, inside], seen[own][:, inside])[0]
-    if own.any():
-        origin = np.where(inside, (seen[own] - places @ turn.T).mean(axis=0), origin)
+    is_seen, inside = ~np.isnan(locations).all(axis=1), np.arange(3) != across
+    turn, places = np.eye(3), balls[is_seen] @ drawn.T
+    if is_seen.sum() > 1 and not design.positions.held[k, 3 + across]:
+        turn[np.ix_(inside, inside)] = fit_motion(places[:, inside], locations[is_seen][:, inside])[
+            0
+        ]
+    if is_seen.any():
+        origin = np.where(inside, (locations[is_seen] - places @ turn.T).mean(axis=0), origin)
     return turn @ drawn, origin
 
 
@@ -113,26 +129,26 @@ def _mean_locations(design: Design, x: Array) -> Array:
         return np.asarray(total / count[:, :, None])
 
 
-def _assemble(seen: Array, nominal: Array, d: int) -> tuple[Array, list[tuple[Array, Array]]]:
+def _assemble(locations: Array, nominal: Array, d: int) -> tuple[Array, list[tuple[Array, Array]]]:
     """Shape (n, d) of an artefact in the frame of its best-read position, and the poses from
     there.
     """
-    present = ~np.isnan(seen[:, :, 0])
+    present = ~np.isnan(locations[:, :, 0])
     first = int(present.sum(axis=1).argmax())
-    shape = np.where(present[first][:, None], seen[first], np.nan)
+    shape = np.where(present[first][:, None], locations[first], np.nan)
     weight = present[first].astype(float)
-    poses: list[tuple[Array, Array]] = [(np.eye(d), np.zeros(d))] * len(seen)
-    waiting = [k for k in range(len(seen)) if k != first]
+    poses: list[tuple[Array, Array]] = [(np.eye(d), np.zeros(d))] * len(locations)
+    waiting = [k for k in range(len(locations)) if k != first]
     while waiting:
         shared = [present[k] & ~np.isnan(shape[:, 0]) for k in waiting]
         choice = int(np.argmax(comparable([_strength(shape[s], d) for s in shared])))
         k, common = waiting.pop(choice), shared[choice]
         if _strength(shape[common], d) > 0:
-            rotation, origin = fit_motion(shape[common], seen[k, common])
+            rotation, origin = fit_motion(shape[common], locations[k, common])
         else:
-            rotation, origin = _by_nominal(seen[k], shape, nominal)
+            rotation, origin = _by_nominal(locations[k], shape, nominal)
         poses[k] = (rotation, origin)
-        here = np.where(present[k][:, None], (seen[k] - origin) @ rotation, 0.0)
+        here = np.where(present[k][:, None], (locations[k] - origin) @ rotation, 0.0)
         old = np.where(np.isnan(shape), 0.0, shape)
         total = weight + present[k]
         with np.errstate(invalid="ignore"):
@@ -152,12 +168,12 @@ def _strength(points: Array, d: int) -> float:
     return float(needed) if needed > FLAT * extent[0] else 0.0
 
 
-def _by_nominal(seen: Array, shape: Array, nominal: Array) -> tuple[Array, Array]:
-    here, known = ~np.isnan(seen[:, 0]), ~np.isnan(shape[:, 0])
-    if not here.any() or not known.any():
-        return np.eye(seen.shape[1]), np.zeros(seen.shape[1])
-    to_position, to_position_origin = fit_motion(nominal[here], seen[here])
-    to_shape, to_shape_origin = fit_motion(nominal[known], shape[known])
+def _by_nominal(locations: Array, shape: Array, nominal: Array) -> tuple[Array, Array]:
+    here, is_known = ~np.isnan(locations[:, 0]), ~np.isnan(shape[:, 0])
+    if not here.any() or not is_known.any():
+        return np.eye(locations.shape[1]), np.zeros(locations.shape[1])
+    to_position, to_position_origin = fit_motion(nominal[here], locations[here])
+    to_shape, to_shape_origin = fit_motion(nominal[is_known], shape[is_known])
     rotation = to_position @ to_shape.T
     return rotation, to_position_origin - rotation @ to_shape_origin
 
@@ -170,18 +186,18 @@ def _into_frame(
     members: Integers,
 ) -> tuple[Array, Array]:
     """Motion that takes the assembled shape into the artefact's own frame."""
-    held = [k for k in places if design.positions.held[k].all()]
-    if held:
-        rotation, origin = poses[places.index(held[0])]
-        turn = design.positions.rotations[held[0]].T @ rotation
-        return turn, design.positions.rotations[held[0]].T @ (
-            origin - design.positions.origins[held[0]]
+    held_positions = [k for k in places if design.positions.held[k].all()]
+    if held_positions:
+        rotation, origin = poses[places.index(held_positions[0])]
+        turn = design.positions.rotations[held_positions[0]].T @ rotation
+        return turn, design.positions.rotations[held_positions[0]].T @ (
+            origin - design.positions.origins[held_positions[0]]
         )
     target, certified, _ = _certified(design, members)
-    known = ~np.isnan(shape[:, 0])
-    chosen = certified & known
+    is_known = ~np.isnan(shape[:, 0])
+    chosen = certified & is_known
     if _strength(target[members[chosen]], design.dimension) == 0.0:
-        chosen = known
+        chosen = is_known
     return fit_motion(shape[chosen], target[members[chosen]])
 
 
@@ -190,13 +206,13 @@ def _certified(design: Design, members: Integers) -> tuple[Array, Flags, Flags]:
     which of their co-ordinates (n, d) these are.
     """
     target = design.balls.places.copy()
-    stated = np.zeros(target.shape, bool)
-    for one in design.observations:
-        ball, axis, value = one.fixing()
+    is_certified = np.zeros(target.shape, bool)
+    for observation in design.observations:
+        ball, axis, value = observation.fixing()
         if len(ball):
             target[ball, axis] = value
-            stated[ball, axis] = True
-    return target, np.asarray(stated[members].any(axis=1)), stated[members]
+            is_certified[ball, axis] = True
+    return target, np.asarray(is_certified[members].any(axis=1)), is_certified[members]
 
 
 def _with_held(
@@ -213,27 +229,27 @@ def _with_held(
 
     Nothing moves later what is held: the readings do not show it.
     """
-    d, held = design.dimension, design.positions.held[position]
-    target, _, stated = _certified(design, members)
-    stated &= ~np.isnan(shape)
-    if not held.any() or held.all() or not stated.any():
+    d, is_held = design.dimension, design.positions.held[position]
+    target, _, is_certified = _certified(design, members)
+    is_certified &= ~np.isnan(shape)
+    if not is_held.any() or is_held.all() or not is_certified.any():
         return turn, shift
     drawn = design.positions.rotations[position], design.positions.origins[position]
     for _ in range(STEPS):
         places = shape @ turn.T + shift
         rotation = pose[0] @ turn.T
         # A motion of the frame moves the pose the other way.
-        by_pose = np.zeros((len(held), len(held)))
+        by_pose = np.zeros((len(is_held), len(is_held)))
         by_pose[:d, :d] = -rotation
         by_pose[d:, d:] = -rotation if d == 3 else -1.0
         turned = vector_from_rotation((rotation @ drawn[0].T)[None])[0]
         off = np.concatenate([pose[1] - rotation @ shift - drawn[1], turned])
-        moves = rigid_motions(places)[stated]
+        moves = rigid_motions(places)[is_certified]
         # There the turn about z stands first.
         moves = moves[:, [0, 1, 2, 4, 5, 3]] if d == 3 else moves
-        rows = np.concatenate([moves, by_pose[held]])
-        left = np.concatenate([(target[members] - places)[stated], -off[held]])
-        motion = np.linalg.lstsq(rows, left, rcond=1e-9)[0]
+        rows = np.concatenate([moves, by_pose[is_held]])
+        residuals = np.concatenate([(target[members] - places)[is_certified], -off[is_held]])
+        motion = np.linalg.lstsq(rows, residuals, rcond=1e-9)[0]
         step = rotation_from_vector(motion[None, d:])[0]
         turn, shift = step @ turn, step @ shift + motion[:d]
     return turn, shift

@@ -96,25 +96,25 @@ def length_estimate(
     :raises NotAMetricError: equations whose solution is no metric.
     """
     equations = _equations(design, x)
-    at = _start(design, x)
-    held = _open_directions(equations, at)
-    everything = np.arange(len(at.values))
+    unknowns = _start(design, x)
+    directions = _open_directions(equations, unknowns)
+    everything = np.arange(len(unknowns.values))
     pivoted = equations.pivot >= 0
     if estimator == "sphere-then-metric" and pivoted.any():
         of_spheres = np.unique(equations.free[pivoted])
-        at, _, _, _ = _solved(equations.gauges(), at, everything[6:])
+        unknowns, _, _, _ = _solved(equations.gauges(), unknowns, everything[6:])
         # Lengths of bars belong to the second step.
         bars = np.setdiff1d(np.arange(len(design.unknown_lengths.names)), of_spheres)
-        second = np.concatenate([everything[:6], 6 + 3 * len(at.pivots) + bars])
-        found, root, iterations, converged = _solved(equations, at, second)
+        second = np.concatenate([everything[:6], 6 + 3 * len(unknowns.pivots) + bars])
+        estimate, root, iterations, converged = _solved(equations, unknowns, second)
     else:
-        found, root, iterations, converged = _solved(equations, at, everything, held)
-    residual, _ = _rows(equations, found)
+        estimate, root, iterations, converged = _solved(equations, unknowns, everything, directions)
+    residual, _ = _rows(equations, estimate)
     used = root.shape[1]
     freedom = len(residual) - used
     scatter = float(np.sqrt(residual @ residual / freedom)) if freedom > 0 else np.nan
-    factors = found.values[:6]
-    lengths = found.values[6 + 3 * len(found.pivots) :]
+    factors = estimate.values[:6]
+    lengths = estimate.values[6 + 3 * len(estimate.pivots) :]
     try:
         parameters = parameters_of_metric(_tensor(factors))
         if equations.all_free:
@@ -126,19 +126,19 @@ def length_estimate(
     except ValueError as error:
         raise NotAMetricError(str(error)) from None
     by_factor = _by_factor()
-    is_open = (np.abs(held) > 1e-7 * np.abs(held).max(initial=0.0)).any(axis=1)
-    end = 6 + 3 * len(found.pivots)
+    is_open = (np.abs(directions) > 1e-7 * np.abs(directions).max(initial=0.0)).any(axis=1)
+    end = 6 + 3 * len(estimate.pivots)
     open_centres = np.zeros(design.positions.origins.shape, bool)
-    open_centres[found.pivots] = is_open[6:end].reshape(-1, 3)
+    open_centres[estimate.pivots] = is_open[6:end].reshape(-1, 3)
     spread = scatter * by_factor @ root[:6] if freedom > 0 else np.full((6, 1), np.nan)
     return LengthSolution(
         estimator,
         factors,
         parameters,
         spread,
-        by_factor @ held[:6],
-        held.shape[1],
-        _centres(design, found),
+        by_factor @ directions[:6],
+        directions.shape[1],
+        _centres(design, estimate),
         lengths,
         is_open[:6],
         open_centres,
@@ -205,18 +205,20 @@ class _Unknowns:
 
 
 def _equations(design: Design, x: Array) -> _Equations:
-    given = design.of(Lengths)
-    seen = x + design.probes.offsets[design.readings.probe]
-    place = seen[given.first]
-    place[~given.to_pivot] -= seen[given.second[~given.to_pivot]]
-    position = design.readings.position[given.first]
+    lengths = design.of(Lengths)
+    places_seen = x + design.probes.offsets[design.readings.probe]
+    place = places_seen[lengths.first]
+    place[~lengths.to_pivot] -= places_seen[lengths.second[~lengths.to_pivot]]
+    position = design.readings.position[lengths.first]
     number = np.full(len(design.positions.names), -1)
     number[design.gauge_positions] = np.arange(len(design.gauge_positions))
-    free = np.full(len(given), -1) if given.free is None else given.free
-    pivot = np.where(given.to_pivot, number[position], -1)
-    groups = [one.rows for joint in design.once(length_whitening).joint for one in joint.together]
-    together = tuple((rows, equation_root(given, rows)) for rows in groups)
-    return _Equations(place, given.direction, pivot, given.value, free, together)
+    free = np.full(len(lengths), -1) if lengths.free is None else lengths.free
+    pivot = np.where(lengths.to_pivot, number[position], -1)
+    groups = [
+        group.rows for joint in design.once(length_whitening).joint for group in joint.together
+    ]
+    together = tuple((rows, equation_root(lengths, rows)) for rows in groups)
+    return _Equations(place, lengths.direction, pivot, lengths.value, free, together)
 
 
 def _start(design: Design, x: Array) -> _Unknowns:
@@ -241,41 +243,41 @@ def _factors(metric: Array) -> Array:
     return np.array([metric[i, j] - (i == j) for i, j in PLACES])
 
 
-def _differences(equations: _Equations, at: _Unknowns) -> tuple[Array, Array]:
+def _differences(equations: _Equations, unknowns: _Unknowns) -> tuple[Array, Array]:
     """D (m, 3) and the lengths (m,) to be compared with."""
     pivoted, free = np.flatnonzero(equations.pivot >= 0), np.flatnonzero(equations.free >= 0)
-    k = len(at.pivots)
+    k = len(unknowns.pivots)
     difference, length = equations.place.copy(), equations.known.copy()
-    difference[pivoted] -= at.values[6 : 6 + 3 * k].reshape(k, 3)[equations.pivot[pivoted]]
-    length[free] = at.values[6 + 3 * k :][equations.free[free]]
+    difference[pivoted] -= unknowns.values[6 : 6 + 3 * k].reshape(k, 3)[equations.pivot[pivoted]]
+    length[free] = unknowns.values[6 + 3 * k :][equations.free[free]]
     return difference, length
 
 
-def _rows(equations: _Equations, at: _Unknowns) -> tuple[Array, Array]:
+def _rows(equations: _Equations, unknowns: _Unknowns) -> tuple[Array, Array]:
     """D' G D - d^2 (r,) and its derivative by all unknowns (r, n), reduced to uncorrelated
     equations.
     """
-    difference, length = _differences(equations, at)
-    pulled = difference @ _tensor(at.values[:6])
+    difference, length = _differences(equations, unknowns)
+    pulled = difference @ _tensor(unknowns.values[:6])
     residual = (pulled * difference).sum(axis=1) - length**2
-    derivative = _derivative(equations, at, difference, pulled, length)
+    derivative = _derivative(equations, unknowns, difference, pulled, length)
     return equations.reduced(residual), equations.reduced(derivative)
 
 
 def _derivative(
-    equations: _Equations, at: _Unknowns, difference: Array, pulled: Array, length: Array
+    equations: _Equations, unknowns: _Unknowns, difference: Array, pulled: Array, length: Array
 ) -> Array:
     pivoted, free = np.flatnonzero(equations.pivot >= 0), np.flatnonzero(equations.free >= 0)
-    rows = np.zeros((len(length), len(at.values)))
+    rows = np.zeros((len(length), len(unknowns.values)))
     for column, (i, j) in enumerate(PLACES):
         rows[:, column] = (1.0 if i == j else 2.0) * difference[:, i] * difference[:, j]
     for axis in range(3):
         rows[pivoted, 6 + 3 * equations.pivot[pivoted] + axis] = -2.0 * pulled[pivoted, axis]
-    rows[free, 6 + 3 * len(at.pivots) + equations.free[free]] = -2.0 * length[free]
+    rows[free, 6 + 3 * len(unknowns.pivots) + equations.free[free]] = -2.0 * length[free]
     return rows
 
 
-def _open_directions(equations: _Equations, at: _Unknowns) -> Array:
+def _open_directions(equations: _Equations, unknowns: _Unknowns) -> Array:
     """Orthonormal directions (n, k), in micrometres and parts per million, that the equations leave
     open.
 
@@ -283,9 +285,9 @@ def _open_directions(equations: _Equations, at: _Unknowns) -> Array:
     What else equations seem to tell of them leads astray: where no length is known, all of them
     hold if all lengths are zero.
     """
-    _, length = _differences(equations, at)
+    _, length = _differences(equations, unknowns)
     exact = equations.direction * length[:, None]
-    rows = equations.reduced(_derivative(equations, at, exact, exact, length)) * MICROMETRE
+    rows = equations.reduced(_derivative(equations, unknowns, exact, exact, length)) * MICROMETRE
     _, values, vh = np.linalg.svd(
         np.linalg.qr(rows, mode="r") if len(rows) > rows.shape[1] else rows
     )
@@ -293,30 +295,33 @@ def _open_directions(equations: _Equations, at: _Unknowns) -> Array:
 
 
 def _solved(
-    equations: _Equations, start: _Unknowns, columns: np.ndarray, held: Array | None = None
+    equations: _Equations,
+    start: _Unknowns,
+    columns: np.ndarray,
+    held_directions: Array | None = None,
 ) -> tuple[_Unknowns, Array, int, bool]:
     """Least squares over some of the unknowns: where it ends, a square root (n, rank) of (J'J)^+,
     iterations.
     """
-    at, previous = start, np.inf
+    unknowns, previous = start, np.inf
     for iteration in range(1, ITERATIONS + 1):
-        residual, rows = _rows(equations, at)
+        residual, rows = _rows(equations, unknowns)
         used = rows[:, columns] * MICROMETRE
-        if held is not None:
-            used = used - (used @ held) @ held.T
+        if held_directions is not None:
+            used = used - (used @ held_directions) @ held_directions.T
         u, values, vh = np.linalg.svd(used, full_matrices=False)
         rank = int((values > EXACT * values.max(initial=0.0)).sum())
-        root = np.zeros((len(at.values), rank))
+        root = np.zeros((len(unknowns.values), rank))
         root[columns] = MICROMETRE * vh[:rank].T / values[:rank]
         step = -root @ (u[:, :rank].T @ residual)
-        at = _Unknowns(at.values + step, at.pivots)
+        unknowns = _Unknowns(unknowns.values + step, unknowns.pivots)
         size = float(np.abs(step).max(initial=0.0))
         if not np.isfinite(size):
             break
         if size < SMALLEST_STEP or (size > 0.5 * previous and size < 1e-9):
-            return at, root, iteration, True
+            return unknowns, root, iteration, True
         previous = size
-    return at, root, iteration, False
+    return unknowns, root, iteration, False
 
 
 def _by_factor() -> Array:

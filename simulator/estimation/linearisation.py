@@ -107,9 +107,9 @@ class Linearisation:
             size = size + MICROMETRE**2 * (as_drawn.balls**2).sum(axis=(1, 2))
         return blank(values, change, np.sqrt(size))
 
-    def covariance(self, functions: LinearFunctions, other: LinearFunctions) -> Array:
+    def covariance(self, functions: LinearFunctions, other_functions: LinearFunctions) -> Array:
         """Covariances (m, k) of functions with others, what is undetermined left out."""
-        first, second = self._root(functions), self._root(other)
+        first, second = self._root(functions), self._root(other_functions)
         width = min(first.shape[1], second.shape[1])
         return np.asarray(first[:, :width] @ second[:, :width].T)
 
@@ -122,8 +122,8 @@ class Linearisation:
             return np.asarray(common)
         of_balls = np.einsum("mnd,ndr->mr", functions.balls, self.balls.common)
         of_balls[:, : self.rank] += common
-        own = np.einsum("mnd,ndj->mnj", functions.balls, self.balls.own)
-        return np.concatenate([of_balls, own.reshape(len(own), -1)], axis=1)
+        own_part = np.einsum("mnd,ndj->mnj", functions.balls, self.balls.own)
+        return np.concatenate([of_balls, own_part.reshape(len(own_part), -1)], axis=1)
 
     def of_balls(self) -> Array:
         """Standard deviations (n, d) of the ball co-ordinates; NaN where open."""

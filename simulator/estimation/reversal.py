@@ -105,9 +105,9 @@ def reverse(first: Array, second: Array, scale: Scale, offsets: bool = True) -> 
             "the balls lie on one line, and do not show both squareness and scale difference"
         )
     x2, y2 = second.T
-    zero, one = np.zeros(len(x2)), np.ones(len(x2))
-    by_x = np.stack([-x2, -x2, -y2, one, zero], axis=1)
-    by_y = np.stack([y2, -y2, -x2, zero, one], axis=1)
+    zero, scale_factors = np.zeros(len(x2)), np.ones(len(x2))
+    by_x = np.stack([-x2, -x2, -y2, scale_factors, zero], axis=1)
+    by_y = np.stack([y2, -y2, -x2, zero, scale_factors], axis=1)
     rows = np.concatenate([by_x, by_y])[:, : 5 if offsets else 3]
     wanted = np.concatenate([first[:, 0] + y2, first[:, 1] - x2])
     # A unit of each column then moves some reading by the plate's size.
@@ -119,14 +119,14 @@ def reverse(first: Array, second: Array, scale: Scale, offsets: bool = True) -> 
         taken out.
         """
         aim = wanted - neglected.T.ravel()
-        found = np.linalg.lstsq(rows / weights, aim, rcond=None)[0] / weights
-        left = aim - rows @ found
-        sigma = float(np.sqrt(left @ left / freedom)) if freedom > 0 else float("nan")
-        return found, found[3:] if offsets else np.zeros(2), left.reshape(2, -1).T, sigma
+        solution = np.linalg.lstsq(rows / weights, aim, rcond=None)[0] / weights
+        remainder = aim - rows @ solution
+        sigma = float(np.sqrt(remainder @ remainder / freedom)) if freedom > 0 else float("nan")
+        return solution, solution[3:] if offsets else np.zeros(2), remainder.reshape(2, -1).T, sigma
 
     freedom = rows.shape[0] - rows.shape[1]
-    found, offset, residuals, sigma = solved(np.zeros_like(second))
-    exact = found
+    solution, offset, residuals, sigma = solved(np.zeros_like(second))
+    exact = solution
     for _ in range(STEPS):
         before, left_out = exact, _left_out(*exact[:3])
         exact, exact_offset, exact_residuals, exact_sigma = solved(second @ left_out.T)
@@ -135,7 +135,7 @@ def reverse(first: Array, second: Array, scale: Scale, offsets: bool = True) -> 
     neglected = arms @ left_out.T
     # Each row of the inverse is how a parameter follows the readings.
     lengths = np.sqrt((np.linalg.pinv(rows / weights) ** 2).sum(axis=1)) / weights
-    alpha, beta, gamma = (float(value) for value in found[:3])
+    alpha, beta, gamma = (float(value) for value in solution[:3])
     return Reversal(
         alpha,
         beta,
@@ -155,7 +155,7 @@ def reverse(first: Array, second: Array, scale: Scale, offsets: bool = True) -> 
         ),
         exact_offset,
         exact_sigma / float(np.sqrt(2.0)),
-        _bias(neglected, np.abs(found - exact)[3:] / lengths[3:], exact_sigma),
+        _bias(neglected, np.abs(solution - exact)[3:] / lengths[3:], exact_sigma),
         lengths,
     )
 

@@ -75,15 +75,15 @@ class LackOfFit:
     @property
     def caution(self) -> str:
         """The warning that a user of the fit's map needs; empty without one."""
-        found = []
+        reasons = []
         if self.is_beyond_limit:
-            found.append(self.complaint)
+            reasons.append(self.complaint)
         elif self.is_significant:
-            found.append(f"S^2 is {self.times:.3g} times what the stated uncertainties explain")
+            reasons.append(f"S^2 is {self.times:.3g} times what the stated uncertainties explain")
         if self.suspected:
             are = "errors are" if self.suspected > 1 else "error is"
-            found.append(f"{self.suspected} gross {are} suspected among the readings")
-        return f"in the fit of the map, {'; '.join(found)}" if found else ""
+            reasons.append(f"{self.suspected} gross {are} suspected among the readings")
+        return f"in the fit of the map, {'; '.join(reasons)}" if reasons else ""
 
 
 def verdict_of(lack: LackOfFit | None) -> str:
@@ -97,9 +97,9 @@ def verdict_of(lack: LackOfFit | None) -> str:
     return "not significant" if lack.degrees_of_freedom > 0 else "not tested"
 
 
-def verdict_line(lack: LackOfFit | None, of: str = "the map") -> str:
+def verdict_line(lack: LackOfFit | None, symbol: str = "the map") -> str:
     """The verdict on a map's fit as a line of text."""
-    line = f"lack of fit of {of}: {verdict_of(lack)}"
+    line = f"lack of fit of {symbol}: {verdict_of(lack)}"
     if lack is None or not lack.degrees_of_freedom:
         return line
     return f"{line} (S^2 is {lack.times:.3g} times what the stated uncertainties explain)"

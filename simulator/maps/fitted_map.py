@@ -56,9 +56,9 @@ class MapData:
     sha256: str
     positions: tuple[str, ...] = ()
 
-    def common(self, other: MapData) -> frozenset[str]:
+    def common(self, other_data: MapData) -> frozenset[str]:
         """Fingerprints of positions whose readings both have."""
-        return frozenset(self.positions) & frozenset(other.positions)
+        return frozenset(self.positions) & frozenset(other_data.positions)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -105,8 +105,8 @@ class FittedMap:
 
     def __repr__(self) -> str:
         open_ = self.undetermined.shape[1]
-        told = f", {open_} undetermined directions" if open_ else ""
-        return f"<FittedMap {self.title}: {len(self.parameters)} parameters{told}>"
+        suffix = f", {open_} undetermined directions" if open_ else ""
+        return f"<FittedMap {self.title}: {len(self.parameters)} parameters{suffix}>"
 
     @property
     def dimension(self) -> int:
@@ -133,8 +133,8 @@ class FittedMap:
         """By how much, in metres, corrected points differ at most from those of the map that this
         one was converted from; None where a fit wrote it.
         """
-        found = [one.value for one in self.left_out if one.kind == CONVERSION]
-        return found[0] if found else None
+        residuals = [part.value for part in self.left_out if part.kind == CONVERSION]
+        return residuals[0] if residuals else None
 
     @cached_property
     def offset_columns(self) -> Integers:
@@ -164,7 +164,7 @@ class FittedMap:
     @cached_property
     def scale(self) -> Array:
         """How much of each parameter (m,) moves some point by a metre."""
-        return np.array([1.0 / one.effect for one in self.parameters])
+        return np.array([1.0 / parameter.effect for parameter in self.parameters])
 
     @cached_property
     def root(self) -> Array:
@@ -172,8 +172,10 @@ class FittedMap:
         spread = np.sqrt(np.diagonal(self.covariance))
         size = np.where(spread > 0.0, spread, 1.0)
         values, vectors = np.linalg.eigh(self.covariance / np.outer(size, size))
-        kept = values > ROUNDING * max(float(values[-1]), 0.0) if len(values) else values > 0.0
-        return np.asarray(size[:, None] * vectors[:, kept] * np.sqrt(values[kept]))
+        is_positive = (
+            values > ROUNDING * max(float(values[-1]), 0.0) if len(values) else values > 0.0
+        )
+        return np.asarray(size[:, None] * vectors[:, is_positive] * np.sqrt(values[is_positive]))
 
     def standard_uncertainties(
         self, rows: Array | None = None, drawn: Array | None = None
@@ -191,15 +193,15 @@ class FittedMap:
         """A square root (..., r) of the joint covariance of linear functions of b with derivatives
         `rows` (..., m); NaN where undetermined, as `drawn` (..., m) tell.
         """
-        at = rows if drawn is None else drawn
-        return self._blanked(at[..., None, :], rows @ self.root)
+        points = rows if drawn is None else drawn
+        return self._blanked(points[..., None, :], rows @ self.root)
 
     def function_covariance(self, rows: Array, drawn: Array | None = None) -> Array:
         """Covariance (k, k) of linear functions of b with derivatives `rows` (k, m); NaN where one
         is undetermined, as `drawn` (k, m) tell.
         """
-        found = self.function_root(rows, drawn)
-        return np.asarray(found @ found.T)
+        root = self.function_root(rows, drawn)
+        return np.asarray(root @ root.T)
 
     def _blanked(self, rows: Array, values: Array) -> Array:
         return blank(values, rows @ self.undetermined, np.linalg.norm(rows * self.scale, axis=-1))
@@ -228,7 +230,11 @@ def determined_only(null: Array, scale: Array) -> Array:
     >>> determined_only(np.array([[2.0, 0.0], [0.0, 0.0]]), np.array([2.0, 1.0])).tolist()
     [[2.0], [0.0]]
     """
-    left, sizes, _ = np.linalg.svd(null / scale[:, None], full_matrices=False)
-    found = scale[:, None] * left[:, sizes > TOUCHED]
-    signs = np.sign(found[np.abs(found / scale[:, None]).argmax(axis=0), np.arange(found.shape[1])])
-    return np.asarray(found * signs)
+    decomposition, sizes, _ = np.linalg.svd(null / scale[:, None], full_matrices=False)
+    directions = scale[:, None] * decomposition[:, sizes > TOUCHED]
+    signs = np.sign(
+        directions[
+            np.abs(directions / scale[:, None]).argmax(axis=0), np.arange(directions.shape[1])
+        ]
+    )
+    return np.asarray(directions * signs)

@@ -73,28 +73,28 @@ class MapMarginal:
     scale: Array
 
 
-def marginal_of(fitted: FittedMap, kept: Integers) -> MapMarginal:
+def marginal_of(fitted: FittedMap, kept_indices: Integers) -> MapMarginal:
     """The marginal of the parameters `kept` (m,), by their places in b."""
-    scale = fitted.scale[kept]
+    scale = fitted.scale[kept_indices]
     return MapMarginal(
-        fitted.estimates[kept],
-        fitted.covariance[np.ix_(kept, kept)],
-        determined_only(fitted.undetermined[kept], scale),
+        fitted.estimates[kept_indices],
+        fitted.covariance[np.ix_(kept_indices, kept_indices)],
+        determined_only(fitted.undetermined[kept_indices], scale),
         scale,
     )
 
 
-def determined_combinations(known: MapMarginal) -> tuple[Array, Array, Array]:
+def determined_combinations(marginal: MapMarginal) -> tuple[Array, Array, Array]:
     """Combinations of parameters of which a map tells values that are not correlated: rows (r, m),
     the values (r,) and their standard uncertainties (r,), in metres.
 
     There is one for each direction that the map determines, across all that it does not.
     """
-    spread = known.covariance / np.outer(known.scale, known.scale)
-    null = known.undetermined / known.scale[:, None]
+    spread = marginal.covariance / np.outer(marginal.scale, marginal.scale)
+    null = marginal.undetermined / marginal.scale[:, None]
     m, k = null.shape
     across = np.linalg.qr(null, mode="complete")[0][:, k:] if k else np.eye(m)
     variances, vectors = np.linalg.eigh(across.T @ spread @ across)
-    rows = (across @ vectors).T / known.scale
+    rows = (across @ vectors).T / marginal.scale
     least = (LEAST**2) * float(variances.max(initial=0.0))
-    return rows, rows @ known.estimates, np.sqrt(np.maximum(variances, least))
+    return rows, rows @ marginal.estimates, np.sqrt(np.maximum(variances, least))

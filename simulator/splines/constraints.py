@@ -61,9 +61,9 @@ class Constraint:
         return tuple(term.at for term in self.terms)
 
 
-def prescribed(at: float, derivative: int, value: float, side: Side = "above") -> Constraint:
+def prescribed(u: float, derivative: int, value: float, side: Side = "above") -> Constraint:
     """A value (derivative 0), slope (1) or higher derivative at a place."""
-    return Constraint((Term(at, derivative, 1.0, side),), value)
+    return Constraint((Term(u, derivative, 1.0, side),), value)
 
 
 def periodic(space: SplineSpace) -> tuple[Constraint, ...]:

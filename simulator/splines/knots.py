@@ -29,15 +29,15 @@ def at_every(
     (3.0, 13.0)
     """
     distinct = np.unique(x)
-    found: list[float] = []
+    knots_found: list[float] = []
     ends = [lower, *boundaries, upper]
     for start, end in zip(ends, ends[1:], strict=False):
         inside = distinct[(distinct >= start) & (distinct <= end)]
         before = 0 if start == lower else NEXT_TO_BOUNDARY
         beyond = 1 if end == upper else NEXT_TO_BOUNDARY
         chosen = range(r - 1, len(inside) - beyond, r)
-        found += [float(inside[k]) for k in chosen if k >= before and start < inside[k] < end]
-    return tuple(found)
+        knots_found += [float(inside[k]) for k in chosen if k >= before and start < inside[k] < end]
+    return tuple(knots_found)
 
 
 def with_boundaries(

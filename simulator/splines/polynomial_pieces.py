@@ -34,10 +34,10 @@ class Pieces:
         """The polynomials at x (m,), those of the first and the last piece beyond the ends."""
         piece = np.clip(np.searchsorted(self.breaks, x, "right") - 1, 0, len(self.coefficients) - 1)
         u = x - self.breaks[piece] if self.powers == "local" else np.asarray(x, dtype=float)
-        found = np.zeros(len(u))
+        results = np.zeros(len(u))
         for k in range(self.coefficients.shape[1] - 1, -1, -1):
-            found = found * u + self.coefficients[piece, k]
-        return found
+            results = results * u + self.coefficients[piece, k]
+        return results
 
     def cancellation(self) -> float:
         """The largest sum of absolute terms over the curve's largest value: how many times rounding

@@ -40,18 +40,18 @@ class SplineSpace:
     knots: tuple[float, ...] = ()
 
     def __post_init__(self) -> None:
-        found = []
+        pieces_found = []
         if self.order < 2:
-            found.append(SplineProblem("a spline's order is at least 2 (broken lines)"))
+            pieces_found.append(SplineProblem("a spline's order is at least 2 (broken lines)"))
         if not self.lower < self.upper:
-            found.append(
+            pieces_found.append(
                 SplineProblem(
                     "the curve ends at {0}, not above its start at {1}", (self.upper, self.lower)
                 )
             )
         outside = [knot for knot in self.knots if not self.lower < knot < self.upper]
         for knot in dict.fromkeys(outside):
-            found.append(
+            pieces_found.append(
                 SplineProblem(
                     "the knot at {0} is not between the ends, {1} and {2}; leave it out",
                     (knot, self.lower, self.upper),
@@ -59,7 +59,7 @@ class SplineSpace:
             )
         for knot, times in Counter(self.knots).items():
             if times > self.order:
-                found.append(
+                pieces_found.append(
                     SplineProblem(
                         f"the knot at {{0}} is given {times} times; give it {self.order}"
                         " times at most",
@@ -67,9 +67,11 @@ class SplineSpace:
                     )
                 )
         if list(self.knots) != sorted(self.knots):
-            found.append(SplineProblem("the knots are out of order; give them in ascending order"))
-        if found:
-            raise SplineError(found)
+            pieces_found.append(
+                SplineProblem("the knots are out of order; give them in ascending order")
+            )
+        if pieces_found:
+            raise SplineError(pieces_found)
 
     @property
     def count(self) -> int:
@@ -101,12 +103,12 @@ class SplineSpace:
         piece, in x scaled.
         """
         start = (self.breaks[:-1] - self.lower) / self.length
-        found = np.empty((len(start), self.order, self.count))
+        pieces_found = np.empty((len(start), self.order, self.count))
         factorial = 1.0
         for k in range(self.order):
             factorial *= max(k, 1)
-            found[:, k] = self._spline(start, nu=k) / factorial  # type: ignore[operator]
-        return found
+            pieces_found[:, k] = self._spline(start, nu=k) / factorial  # type: ignore[operator]
+        return pieces_found
 
     def rows(self, x: Array, derivative: int = 0, side: Side = "above") -> Array:
         """The B-splines' values or derivatives at x (m,), as (m, count), per metre or radian to the
@@ -129,8 +131,8 @@ class SplineSpace:
         piece = np.searchsorted(self.breaks, x, "right" if side == "above" else "left") - 1
         piece = np.clip(piece, 0, len(self.breaks) - 2)
         u = ((x - self.breaks[piece]) / self.length)[:, None]
-        found = np.zeros((len(x), self.count))
+        row_values = np.zeros((len(x), self.count))
         for k in range(self.order - 1, derivative - 1, -1):
             factor = float(np.prod(np.arange(k - derivative + 1, k + 1)))
-            found = found * u + factor * self.pieces[piece, k]
-        return found / self.length**derivative
+            row_values = row_values * u + factor * self.pieces[piece, k]
+        return row_values / self.length**derivative

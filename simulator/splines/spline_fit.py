@@ -136,32 +136,34 @@ def _constrained(
         return np.zeros(space.count), np.eye(space.count), ()
     q, r, order = qr(matrix.T, pivoting=True)
     rank = int((np.abs(np.diag(r)) > NOTHING).sum())
-    kept, rest = order[:rank], sorted(order[rank:].tolist())
-    particular = q[:, :rank] @ solve_triangular(r[:rank, :rank], values[kept], trans="T")
+    rank_rows, free_columns = order[:rank], sorted(order[rank:].tolist())
+    particular = q[:, :rank] @ solve_triangular(r[:rank, :rank], values[rank_rows], trans="T")
     # What is left of a value that is met up to rounding, beside the values that it is made of.
     size = NOTHING * max(float(np.abs(values).max()), float(np.abs(particular).max(initial=0.0)))
-    contradictory = [k for k in rest if abs(matrix[k] @ particular - values[k]) > size]
+    contradictory = [k for k in free_columns if abs(matrix[k] @ particular - values[k]) > size]
     if contradictory:
-        raise SplineError(_contradiction(constraints, matrix, kept, k) for k in contradictory)
-    return particular, q[:, rank:], tuple(constraints[k] for k in rest)
+        raise SplineError(_contradiction(constraints, matrix, rank_rows, k) for k in contradictory)
+    return particular, q[:, rank:], tuple(constraints[k] for k in free_columns)
 
 
 def _contradiction(
-    constraints: tuple[Constraint, ...], matrix: Array, kept: Array, k: int
+    constraints: tuple[Constraint, ...], matrix: Array, kept_rows: Array, k: int
 ) -> SplineProblem:
     """Say what a constraint contradicts: those of which it is a combination."""
     if not matrix[k].any():
         text = f"the {constraints[k].words} is zero for every spline of this order; leave it out"
         return SplineProblem(text, constraints[k].places)
-    parts = np.linalg.lstsq(matrix[kept].T, matrix[k], rcond=None)[0]
-    others = [
-        constraints[j] for j, part in zip(kept.tolist(), parts, strict=True) if abs(part) > NOTHING
+    parts = np.linalg.lstsq(matrix[kept_rows].T, matrix[k], rcond=None)[0]
+    involved = [
+        constraints[j]
+        for j, part in zip(kept_rows.tolist(), parts, strict=True)
+        if abs(part) > NOTHING
     ]
     # One that prescribes the same thing.
     if (
-        len(others) == 1
-        and (one := others[0]).words == constraints[k].words
-        and np.allclose(one.places, constraints[k].places, rtol=1e-12, atol=0.0)
+        len(involved) == 1
+        and (constraint := involved[0]).words == constraints[k].words
+        and np.allclose(constraint.places, constraints[k].places, rtol=1e-12, atol=0.0)
     ):
         return SplineProblem(
             f"the {constraints[k].words} is prescribed twice, differently; leave one of them out",
@@ -169,10 +171,10 @@ def _contradiction(
         )
     texts: list[str] = []
     places: list[float] = []
-    for one in (constraints[k], *others):
-        indices = [f"{{{len(places) + i}}}" for i in range(len(one.places))]
-        texts.append(one.words.format(*indices))
-        places += one.places
+    for constraint in (constraints[k], *involved):
+        indices = [f"{{{len(places) + i}}}" for i in range(len(constraint.places))]
+        texts.append(constraint.words.format(*indices))
+        places += constraint.places
     text = (
         f"the {texts[0]} contradicts the {', the '.join(texts[1:])}; leave one of them out or add a"
         " knot"
@@ -188,10 +190,12 @@ def _refuse_undetermined(space: SplineSpace, x: Array, design: Array, null: Arra
     if null.shape[1] == 0:
         return
     _, values, directions = np.linalg.svd(np.linalg.qr(design, mode="r"), full_matrices=True)
-    known = int((values > UNDETERMINED * max(float(values.max(initial=0.0)), UNDETERMINED)).sum())
-    if known == null.shape[1]:
+    rank_known = int(
+        (values > UNDETERMINED * max(float(values.max(initial=0.0)), UNDETERMINED)).sum()
+    )
+    if rank_known == null.shape[1]:
         return
-    open_ = null @ directions[known:].T
+    open_ = null @ directions[rank_known:].T
     size = np.abs(space.pieces @ open_).max(axis=(1, 2))
     touched = size > 1e-6 * size.max()
     problems = []

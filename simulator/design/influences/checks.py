@@ -36,27 +36,30 @@ def wrong_of_parameters(parameters: tuple[InfluenceParameter, ...], positions: i
 
 def _of_parameters(parameters: tuple[InfluenceParameter, ...], positions: int) -> Iterator[str]:
     units = get_args(Unit)
-    for one in parameters:
-        words = f'parameter "{one.name}"'
-        if not one.name:
+    for parameter in parameters:
+        words = f'parameter "{parameter.name}"'
+        if not parameter.name:
             yield "a parameter has no name; give one"
-        if one.unit not in units:
-            yield f'{words} has the unit "{one.unit}"; give one of {listing(units)}'
-        if not np.isfinite(one.value):
-            yield f"{words} has the value {one.value}; give a finite one"
-        if not one.uncertainty >= 0.0:
+        if parameter.unit not in units:
+            yield f'{words} has the unit "{parameter.unit}"; give one of {listing(units)}'
+        if not np.isfinite(parameter.value):
+            yield f"{words} has the value {parameter.value}; give a finite one"
+        if not parameter.uncertainty >= 0.0:
             yield (
-                f"{words} has the uncertainty {one.uncertainty:g}; give 0 for a constant, inf where"
+                f"{words} has the uncertainty {parameter.uncertainty:g}; give 0 for a constant,"
+                " inf where"
                 " nothing is known, or a positive number"
             )
-        if not (np.isfinite(one.effect) and one.effect > 0.0):
+        if not (np.isfinite(parameter.effect) and parameter.effect > 0.0):
             yield (
-                f"{words} has the effect {one.effect:g}; give what a unit of it moves readings by"
+                f"{words} has the effect {parameter.effect:g}; give what a unit of it moves"
+                " readings by"
                 " where it does most, a positive number of metres"
             )
-        if not -1 <= one.position < positions:
+        if not -1 <= parameter.position < positions:
             yield (
-                f"{words} is of position {one.position}; give an index below {positions}, or -1"
+                f"{words} is of position {parameter.position}; give an index below {positions}, or"
+                " -1"
                 " where it is of several"
             )
 
@@ -74,31 +77,33 @@ def wrong_of_shifts(
     """
     shift, derivative = influence.shifts(at)
     m, d, p = *at.x.shape, len(influence.parameters)
-    for array, shape, what in (
+    for array, shape, description in (
         (shift, (m, d), "shifts"),
         (derivative, (m, d, p), "the derivative of shifts"),
     ):
         if np.shape(array) != shape:
-            return f"{what} of {m} readings has the shape {np.shape(array)}; it must be {shape}"
+            return (
+                f"{description} of {m} readings has the shape {np.shape(array)}; it must be {shape}"
+            )
         if not np.isfinite(array).all():
-            return f"{what} has values that are not finite"
+            return f"{description} has values that are not finite"
     for key, k in _stated(settings, influence):
         name, effect = influence.parameters[k].name, influence.parameters[k].effect
-        steps, found = [], []
+        steps, faults = [], []
         for step in (STEP / effect, -STEP / effect):
             value = getattr(settings, key) + step
             try:
-                other = again(settings.model_copy(update={key: value}))
+                copied = again(settings.model_copy(update={key: value}))
             except ValueError:
                 # No value that is possible.
                 break
-            if not _differ_in_value_only(influence, other, k):
+            if not _differ_in_value_only(influence, copied, k):
                 break
-            steps.append(other.parameters[k].value)
-            found.append(other.shifts(at)[0])
-        if len(found) < 2 or steps[0] == steps[1]:
+            steps.append(copied.parameters[k].value)
+            faults.append(copied.shifts(at)[0])
+        if len(faults) < 2 or steps[0] == steps[1]:
             continue
-        quotient = (found[0] - found[1]) / (steps[0] - steps[1])
+        quotient = (faults[0] - faults[1]) / (steps[0] - steps[1])
         largest = float(max(np.abs(quotient).max(initial=0), np.abs(derivative[..., k]).max()))
         if np.abs(quotient - derivative[..., k]).max(initial=0) > DERIVATIVE * largest:
             reading = np.abs(quotient - derivative[..., k]).max(axis=1).argmax()
@@ -116,8 +121,8 @@ def _stated(settings: InfluenceSettings, influence: Influence) -> Iterator[tuple
     for key in type(settings).model_fields:
         value = getattr(settings, key)
         if isinstance(value, float):
-            for k, one in enumerate(influence.parameters):
-                if one.value == value:
+            for k, parameter in enumerate(influence.parameters):
+                if parameter.value == value:
                     yield key, k
 
 
@@ -127,6 +132,6 @@ def _differ_in_value_only(one: Influence, other: Influence, k: int) -> bool:
         return False
     value = one.parameters[k].value
     return other.parameters[k].value != value and all(
-        replace(theirs, value=own.value) == own if i == k else theirs == own
-        for i, (own, theirs) in enumerate(zip(one.parameters, other.parameters, strict=True))
+        replace(theirs, value=parameter.value) == parameter if i == k else theirs == parameter
+        for i, (parameter, theirs) in enumerate(zip(one.parameters, other.parameters, strict=True))
     )

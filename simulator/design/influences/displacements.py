@@ -71,11 +71,11 @@ def displacements(
     place[used] = np.arange(len(used))
     parameters: list[InfluenceParameter] = []
     for key in used.tolist():
-        at = dict(zip(levels, np.unravel_index(key, sizes), strict=True))
-        what = words({level: names[level][k] for level, k in at.items()})
-        position = int(at.get("position", -1))
+        index_by_level = dict(zip(levels, np.unravel_index(key, sizes), strict=True))
+        label = words({level: names[level][k] for level, k in index_by_level.items()})
+        position = int(index_by_level.get("position", -1))
         parameters += [
-            InfluenceParameter(f"{what}: {axis}", "m", 0.0, uncertainty, 1.0, position, component)
+            InfluenceParameter(f"{label}: {axis}", "m", 0.0, uncertainty, 1.0, position, component)
             for axis in AXIS_NAMES[: design.machine.dimension]
         ]
     return SharedDisplacements(levels, place.reshape(sizes), tuple(parameters), of_tips)

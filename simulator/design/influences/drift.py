@@ -105,10 +105,10 @@ class DriftSettings(InfluenceSettings):
         )
         for name in self.positions or {}:
             references.is_position(name, positions, (*steps, "positions", name))
-        for key, stated in (("axes", self.axes), ("scale", self.scale)):
-            references.has_axes(stated, (*steps, key))
-            for one in stated if isinstance(stated, tuple) else [stated]:
-                u = getattr(one, "standard_uncertainty", None)
+        for key, amounts in (("axes", self.axes), ("scale", self.scale)):
+            references.has_axes(amounts, (*steps, key))
+            for amount in amounts if isinstance(amounts, tuple) else [amounts]:
+                u = getattr(amount, "standard_uncertainty", None)
                 references.is_not_negative(u, (*steps, key, "standard_uncertainty"))
 
     def influence(self, design: DesignParts) -> Drift:
@@ -119,8 +119,8 @@ class DriftSettings(InfluenceSettings):
         clock = Clock(
             times.set_up,
             times.probe_change,
-            tuple(times.reading if one.reading is None else one.reading for one in places),
-            tuple(np.nan if one.start is None else one.start for one in places),
+            tuple(times.reading if amount.reading is None else amount.reading for amount in places),
+            tuple(np.nan if amount.start is None else amount.start for amount in places),
         )
         hours = max(float(np.abs(clock.hours(design.readings)).max(initial=0.0)), LEAST_HOURS)
         reach = float(np.abs(design.machine.volume.corners).max())
@@ -128,10 +128,13 @@ class DriftSettings(InfluenceSettings):
         parameters: list[InfluenceParameter] = []
         if self.axes is not None:
             listed = self.axes if isinstance(self.axes, tuple) else (self.axes,) * d
-            for axis, one in enumerate(listed):
-                words, u = f"drift along {AXIS_NAMES[axis]}", or_unknown(one.standard_uncertainty)
+            for axis, amount in enumerate(listed):
+                words, u = (
+                    f"drift along {AXIS_NAMES[axis]}",
+                    or_unknown(amount.standard_uncertainty),
+                )
                 parts.append((axis, False))
-                parameters.append(InfluenceParameter(words, "m/h", one.value, u, hours))
+                parameters.append(InfluenceParameter(words, "m/h", amount.value, u, hours))
         if self.scale is not None:
             by_axis = isinstance(self.scale, tuple)
             for axis, scale in enumerate(
@@ -171,14 +174,14 @@ class Clock:
         is_next = np.append(True, position[1:] != position[:-1])
         is_changed = np.append(False, probe[1:] != probe[:-1]) & ~is_next
         before = self.set_up * is_next + self.probe_change * is_changed
-        taken = np.array(self.reading)[position] * readings.repeats
-        seconds = np.cumsum(before + taken) - 0.5 * taken
-        seen: set[int] = set()
+        seconds_taken = np.array(self.reading)[position] * readings.repeats
+        seconds = np.cumsum(before + seconds_taken) - 0.5 * seconds_taken
+        positions_seen: set[int] = set()
         for first in np.flatnonzero(is_next).tolist():
             start = self.starts[position[first]]
-            if not np.isnan(start) and int(position[first]) not in seen:
-                seconds[first:] += start - (seconds[first] - 0.5 * taken[first])
-            seen.add(int(position[first]))
+            if not np.isnan(start) and int(position[first]) not in positions_seen:
+                seconds[first:] += start - (seconds[first] - 0.5 * seconds_taken[first])
+            positions_seen.add(int(position[first]))
         return np.asarray(seconds)
 
 
@@ -223,5 +226,5 @@ class Drift(Influence):
         for k, (axis, of_scale) in enumerate(self.parts):
             for j in range(d) if axis < 0 else (axis,):
                 derivative[:, j, k] = hours * at.x[:, j] if of_scale else hours
-        values = np.array([one.value for one in self.listed], float)
+        values = np.array([axis_amounts.value for axis_amounts in self.listed], float)
         return derivative @ values, derivative

@@ -38,13 +38,15 @@ def once_each(classes: Iterable[type[InfluenceSettings]]) -> None:
 
     :raises ExperimentError: two classes have the same kind.
     """
-    found: dict[str, str] = {}
-    for one in classes:
-        for kind in get_args(one.model_fields["kind"].annotation):
-            if kind in found:
-                text = f'{one.__name__} has the kind "{kind}", as {found[kind]} has; name another'
+    owners: dict[str, str] = {}
+    for model in classes:
+        for kind in get_args(model.model_fields["kind"].annotation):
+            if kind in owners:
+                text = (
+                    f'{model.__name__} has the kind "{kind}", as {owners[kind]} has; name another'
+                )
                 raise refused(__file__, text, "INFLUENCES", line=1)
-            found[kind] = one.__name__
+            owners[kind] = model.__name__
 
 
 once_each(INFLUENCES)

@@ -65,8 +65,8 @@ class PositionScaleSettings(InfluenceSettings):
         for k in np.unique(design.readings.position).tolist():
             if names[k] not in (self.positions or names):
                 continue
-            read = design.readings.position == k
-            balls = design.balls.places[np.unique(design.readings.ball[read])]
+            is_at_position = design.readings.position == k
+            balls = design.balls.places[np.unique(design.readings.ball[is_at_position])]
             arms = balls @ design.positions.rotations[k].T
             extent = arms.max(axis=0) - arms.min(axis=0)
             reach = float(np.abs(arms).max(initial=LEAST_EXTENT))
@@ -74,8 +74,8 @@ class PositionScaleSettings(InfluenceSettings):
                 if extent[axes].max() < LEAST_EXTENT:
                     continue
                 place[k, axes] = len(parameters)
-                what = f"scale {AXIS_NAMES[axes[0]]}" if self.by_axis else "scale"
-                words = f"{what} in {names[k]}"
+                name = f"scale {AXIS_NAMES[axes[0]]}" if self.by_axis else "scale"
+                words = f"{name} in {names[k]}"
                 parameters.append(
                     InfluenceParameter(words, "1", 0.0, u, reach, k, "scales of positions")
                 )

@@ -84,7 +84,7 @@ class ProbingSettings(InfluenceSettings):
         :raises ValueError: a probe has neither an offset nor a direction.
         """
         names, d = design.probes.names, design.machine.dimension
-        stated = self.directions or {}
+        directions_stated = self.directions or {}
         chosen = [
             k
             for k in np.unique(design.readings.probe).tolist()
@@ -94,17 +94,19 @@ class ProbingSettings(InfluenceSettings):
         u = or_unknown(self.standard_uncertainty)
         parameters = [InfluenceParameter("probing error", "m", self.value, u, 1.0)]
         for k in chosen:
-            along = np.array(stated.get(names[k], design.probes.offsets[k]), float)
+            along = np.array(directions_stated.get(names[k], design.probes.offsets[k]), float)
             length = float(np.sqrt(along @ along))
-            if length < (0.0 if names[k] in stated else SHORTEST):
+            if length < (0.0 if names[k] in directions_stated else SHORTEST):
                 raise ValueError(NOWHERE.replace("NAME", names[k]))
             directions[k] = along / length
             if self.between_probes:
                 place[k] = len(parameters)
-                own = f"probing error of {names[k]}"
+                prior_name = f"probing error of {names[k]}"
                 u = self.between_probes
                 parameters.append(
-                    InfluenceParameter(own, "m", 0.0, u, 1.0, component="probing errors of probes")
+                    InfluenceParameter(
+                        prior_name, "m", 0.0, u, 1.0, component="probing errors of probes"
+                    )
                 )
         return Probing(directions, place, tuple(parameters))
 

@@ -53,7 +53,7 @@ class ReindexingSettings(InfluenceSettings):
             ("position", "probe"),
             turned,
             or_unknown(self.standard_uncertainty),
-            lambda at: f"re-indexing of {at['probe']} in {at['position']}",
+            lambda position: f"re-indexing of {position['probe']} in {position['position']}",
             "re-indexing",
             of_tips=True,
         )

@@ -63,6 +63,6 @@ class ReproducibilitySettings(InfluenceSettings):
         )
 
 
-def _words(at: Mapping[Level, str]) -> str:
-    named = (f"ball {name}" if level == "ball" else name for level, name in at.items())
+def _words(names_by_level: Mapping[Level, str]) -> str:
+    named = (f"ball {name}" if level == "ball" else name for level, name in names_by_level.items())
     return f"displacement of {', '.join(named)}"

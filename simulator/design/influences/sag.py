@@ -113,11 +113,13 @@ class SagSettings(InfluenceSettings):
         """The sag in a design."""
         d, names = design.machine.dimension, design.artefacts.names
         artefact = names.index(self.artefact) if self.artefact is not None else 0
-        own = design.balls.of(artefact)
-        found = np.zeros(len(design.balls.names))
-        labels = tuple(design.balls.names[k] for k in own)
-        found[own] = _shape(self, labels, design.balls.places[own], d, design.folder)
-        largest = float(np.abs(found).max())
+        balls_of_artefact = design.balls.of(artefact)
+        deflections = np.zeros(len(design.balls.names))
+        labels = tuple(design.balls.names[k] for k in balls_of_artefact)
+        deflections[balls_of_artefact] = _shape(
+            self, labels, design.balls.places[balls_of_artefact], d, design.folder
+        )
+        largest = float(np.abs(deflections).max())
         value = self.value
         if value is None:
             value = largest if self.values is not None else 0.0
@@ -125,7 +127,7 @@ class SagSettings(InfluenceSettings):
         gravity = self.gravity or ("-z" if d == 3 else "-y")
         down = np.eye(d)[AXIS_NAMES.index(gravity[-1])] * (-1.0 if gravity[0] == "-" else 1.0)
         parameter = InfluenceParameter(f"sag of {names[artefact]}", "m", value, u, 1.0)
-        return Sag(found / largest, down, parameter)
+        return Sag(deflections / largest, down, parameter)
 
 
 @dataclass(frozen=True)
@@ -167,7 +169,7 @@ def _shape(
         listed = shape if isinstance(shape, tuple) else (shape,)
         terms = [term.factor * u[:, 0] ** term.x * u[:, 1] ** term.y for term in listed]
         return np.asarray(np.sum(terms, axis=0))
-    along = [AXIS_NAMES.index(one) for one in QUADRATIC[shape or "both"]]
+    along = [AXIS_NAMES.index(component) for component in QUADRATIC[shape or "both"]]
     size = np.append(extent, 0.0)[along]
     squared = ((u[:, along] * size) ** 2).sum(axis=1)
     largest = squared.max(initial=0.0)
@@ -179,19 +181,19 @@ def _values(path: Path, names: tuple[str, ...]) -> Array:
 
     :raises ExperimentError: the file is wrong; a ball is unknown, missing or there twice.
     """
-    found: dict[str, float] = {}
+    values_by_name: dict[str, float] = {}
     messages: list[Message] = []
     for row in read_table(path, ["ball"], ["sag"]):
         (ball,), (value,) = row.texts, row.lengths
         if ball not in names:
             messages.append(row.mark.message("", f'unknown ball "{ball}"; {hint(ball, names)}'))
-        elif ball in found:
+        elif ball in values_by_name:
             messages.append(row.mark.message("", f'ball "{ball}" is there twice; remove a line'))
-        found[ball] = value
-    missing = [name for name in names if name not in found]
+        values_by_name[ball] = value
+    missing = [name for name in names if name not in values_by_name]
     if missing:
         text = f"no line for {listing(missing)}; give what each ball sags by"
         messages.append(Message(str(path), 1, 1, "", text))
     if messages:
         raise ExperimentError(messages)
-    return np.array([found[name] for name in names])
+    return np.array([values_by_name[name] for name in names])

@@ -124,19 +124,19 @@ class TemperaturesSettings(InfluenceSettings):
             )
         for name in self.positions or {}:
             references.is_position(name, positions, (*steps, "positions", name))
-        for what in ("artefact", "scale"):
-            expansion = getattr(self, f"{what}_expansion")
-            temperature = getattr(self, f"{what}_temperature")
+        for quantity in ("artefact", "scale"):
+            expansion = getattr(self, f"{quantity}_expansion")
+            temperature = getattr(self, f"{quantity}_temperature")
             missing = "temperature" if temperature is None else "expansion"
             references.require(
                 (expansion is None) == (temperature is None),
                 steps,
-                f"{what}_expansion and {what}_temperature go together;"
-                f" add {what}_{missing}, or remove the other",
+                f"{quantity}_expansion and {quantity}_temperature go together;"
+                f" add {quantity}_{missing}, or remove the other",
             )
-            _check_uncertainties(expansion, (*steps, f"{what}_expansion"), references)
-            _check_uncertainties(temperature, (*steps, f"{what}_temperature"), references)
-            if what == "artefact" and temperature is not None:
+            _check_uncertainties(expansion, (*steps, f"{quantity}_expansion"), references)
+            _check_uncertainties(temperature, (*steps, f"{quantity}_temperature"), references)
+            if quantity == "artefact" and temperature is not None:
                 references.require(
                     isinstance(temperature.value, float),
                     (*steps, "artefact_temperature", "value"),
@@ -147,10 +147,10 @@ class TemperaturesSettings(InfluenceSettings):
             listed.append((("scale_temperature", "value"), self.scale_temperature.value))
         for name, place in (self.positions or {}).items():
             listed.append((("positions", name, "scales"), place.scales))
-            for key, given in (("artefact", place.artefact), ("scales", place.scales)):
+            for key, temperatures in (("artefact", place.artefact), ("scales", place.scales)):
                 expansion = self.artefact_expansion if key == "artefact" else self.scale_expansion
                 references.require(
-                    given is None or expansion is not None,
+                    temperatures is None or expansion is not None,
                     (*steps, "positions", name, key),
                     "is a temperature of what does not expand; add its expansion, or remove it",
                 )
@@ -165,16 +165,19 @@ class TemperaturesSettings(InfluenceSettings):
         """Report scales with one sensor in some positions and several in others."""
         if self.scale_temperature is None:
             return
-        stated = {name: place.scales for name, place in (self.positions or {}).items()}
+        scales_by_position = {name: place.scales for name, place in (self.positions or {}).items()}
         by_axis = {
             name: isinstance(
-                self.scale_temperature.value if stated.get(name) is None else stated[name], tuple
+                self.scale_temperature.value
+                if scales_by_position.get(name) is None
+                else scales_by_position[name],
+                tuple,
             )
             for name in positions
         }
         if len(set(by_axis.values())) > 1:
             usual = isinstance(self.scale_temperature.value, tuple)
-            name = next(name for name, one in by_axis.items() if one != usual)
+            name = next(name for name, temperature in by_axis.items() if temperature != usual)
             text = (
                 "has one temperature for each axis, and other positions one for all"
                 if by_axis[name]
@@ -208,9 +211,11 @@ class TemperaturesSettings(InfluenceSettings):
                 )
                 references.problems.doubt((*steps, *path), text)
         expansions = [(("artefact_expansion",), self.artefact_expansion)]
-        for path, one in _one_by_one([*expansions, (("scale_expansion",), self.scale_expansion)]):
+        for path, expansion in _one_by_one(
+            [*expansions, (("scale_expansion",), self.scale_expansion)]
+        ):
             for name in ("value", "standard_uncertainty"):
-                size = getattr(one, name, None)
+                size = getattr(expansion, name, None)
                 if size is not None and abs(size) > LARGEST_EXPANSION:
                     text = (
                         f"is {1e6 * size:g} um/m/K, more than {1e6 * LARGEST_EXPANSION:g} um/m/K,"
@@ -271,9 +276,15 @@ class TemperaturesSettings(InfluenceSettings):
 
     def _has_axes(self) -> bool:
         """Whether any temperature of the scales is stated by axis."""
-        stated = [one.scales for one in (self.positions or {}).values()]
+        scales_stated = [
+            position_temperatures.scales
+            for position_temperatures in (self.positions or {}).values()
+        ]
         assert self.scale_temperature is not None
-        return any(isinstance(one, tuple) for one in (self.scale_temperature.value, *stated))
+        return any(
+            isinstance(position_temperatures, tuple)
+            for position_temperatures in (self.scale_temperature.value, *scales_stated)
+        )
 
     def _at_positions(
         self, design: DesignParts, key: str, otherwise: object, axis: int = 0
@@ -282,8 +293,11 @@ class TemperaturesSettings(InfluenceSettings):
         listed = [
             getattr((self.positions or {}).get(name), key, None) for name in design.positions.names
         ]
-        chosen = [otherwise if one is None else one for one in listed]
-        return np.array([one[axis] if isinstance(one, tuple) else one for one in chosen], float)
+        chosen = [otherwise if position is None else position for position in listed]
+        return np.array(
+            [position[axis] if isinstance(position, tuple) else position for position in chosen],
+            float,
+        )
 
 
 @dataclass(frozen=True)
@@ -339,8 +353,8 @@ class Temperatures(Influence):
                 length = np.where((axes == part.axis) | (part.axis == SCALES), -at.x, 0.0)
             difference = part.differences[at.position]
             for column in part.columns:
-                given = at.column(column) - self.reference
-                difference = np.where(np.isnan(given), difference, given)
+                excess = at.column(column) - self.reference
+                difference = np.where(np.isnan(excess), difference, excess)
             shift += part.expansion * difference[:, None] * length
             derivative[:, :, part.coefficient] += difference[:, None] * length
             derivative[:, :, part.sensor] += part.expansion * length
@@ -402,16 +416,16 @@ def _parts(
         yield Part(along, row, value, coefficient, sensor, errors, columns)
 
 
-def _check_uncertainties(stated: object, steps: Steps, references: References) -> None:
-    for one in stated if isinstance(stated, tuple) else [stated]:
+def _check_uncertainties(setting: object, steps: Steps, references: References) -> None:
+    for value in setting if isinstance(setting, tuple) else [setting]:
         for key in ("standard_uncertainty", "sensor_uncertainty"):
-            references.is_not_negative(getattr(one, key, None), (*steps, key))
+            references.is_not_negative(getattr(value, key, None), (*steps, key))
 
 
-def _one_by_one(stated: Iterable[tuple[Steps, object]]) -> Iterator[tuple[Steps, object]]:
+def _one_by_one(settings: Iterable[tuple[Steps, object]]) -> Iterator[tuple[Steps, object]]:
     """Paths and what is stated there, lists taken apart."""
-    for path, value in stated:
+    for path, value in settings:
         if isinstance(value, tuple):
-            yield from (((*path, i), one) for i, one in enumerate(value))
+            yield from (((*path, i), item) for i, item in enumerate(value))
         else:
             yield path, value

@@ -92,17 +92,17 @@ class Calibration(ABC):
 
     def certified_values(self, layout: BallLayout) -> Iterator[CertifiedValue]:
         """What it states, beside what the drawing has for lengths."""
-        given = self.observed(0)
-        drawn = [None] * len(given)
-        if self.are_lengths and isinstance(given, BallObservations):
-            drawn = given.values(layout.coordinates)[0].tolist()
+        observed = self.observed(0)
+        drawn = [None] * len(observed)
+        if self.are_lengths and isinstance(observed, BallObservations):
+            drawn = observed.values(layout.coordinates)[0].tolist()
         # What counts as something in an adjustment is exact in a certificate.
-        uncertainty = np.where(given.is_exact, 0.0, given.uncertainty).tolist()
+        uncertainty = np.where(observed.is_exact, 0.0, observed.uncertainty).tolist()
         for (first, second), value, u, length in zip(
-            self.names(layout), given.value.tolist(), uncertainty, drawn, strict=True
+            self.names(layout), observed.value.tolist(), uncertainty, drawn, strict=True
         ):
             yield CertifiedValue(
-                "", first, second, value, u, given.measured_in, self.are_lengths, length
+                "", first, second, value, u, observed.measured_in, self.are_lengths, length
             )
 
     def true_values(self, design: Design, truth: State, model: ErrorModel, first: int) -> Array:

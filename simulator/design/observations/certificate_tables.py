@@ -26,7 +26,7 @@ def read_rows(
     settings: Any,
     texts: Sequence[str],
     lengths: Sequence[str],
-    others: Sequence[str],
+    further: Sequence[str],
     steps: Steps,
     references: References,
 ) -> tuple[tuple[FileRow, ...], list[Array]] | None:
@@ -34,8 +34,8 @@ def read_rows(
     None after saying what is wrong.
     """
     problems = references.problems
-    own = [f"{one}_{name}" for name in (STANDARD, EXPANDED) for one in lengths]
-    optional = [*others, STANDARD, EXPANDED, *own]
+    columns_allowed = [f"{length}_{name}" for name in (STANDARD, EXPANDED) for length in lengths]
+    optional = [*further, STANDARD, EXPANDED, *columns_allowed]
     columns = [*texts, FACTOR]
     try:
         path = references.file(settings.values)
@@ -51,36 +51,40 @@ def read_rows(
     for row in rows:
         extra = dict(zip(optional, row.lengths[count:], strict=True))
         factor = _factor(row.texts[-1], settings.coverage_factor)
-        found = np.full(count, math.nan)
-        for k, one in enumerate(lengths):
-            stated = [
+        values = np.full(count, math.nan)
+        for k, length in enumerate(lengths):
+            uncertainties_stated = [
                 value
                 for name in (STANDARD, EXPANDED)
-                for value in (extra[f"{one}_{name}"], extra[name])
+                for value in (extra[f"{length}_{name}"], extra[name])
                 if not math.isnan(value)
             ]
-            if len(stated) > 1:
+            if len(uncertainties_stated) > 1:
                 text = "states an uncertainty twice; leave one column out"
                 problems.add_at(row.mark, steps, text)
                 break
-            if not stated:
+            if not uncertainties_stated:
                 continue
-            is_expanded = not all(math.isnan(extra[n]) for n in (EXPANDED, f"{one}_{EXPANDED}"))
-            text = _wrong(stated[0], is_expanded, factor, row.texts[-1])
+            is_expanded = not all(math.isnan(extra[n]) for n in (EXPANDED, f"{length}_{EXPANDED}"))
+            text = _wrong(uncertainties_stated[0], is_expanded, factor, row.texts[-1])
             if text:
                 problems.add_at(row.mark, steps, text)
                 break
-            found[k] = stated[0] / (factor or 1.0) if is_expanded else stated[0]
-        if not is_right_factor(row.texts[-1], extra, own):
+            values[k] = (
+                uncertainties_stated[0] / (factor or 1.0)
+                if is_expanded
+                else uncertainties_stated[0]
+            )
+        if not is_right_factor(row.texts[-1], extra, columns_allowed):
             text = "has a coverage factor k and no expanded uncertainty; call the column"
             problems.add_at(row.mark, steps, f"{text} expanded_uncertainty_um, or leave k out")
-        uncertainties.append(found)
+        uncertainties.append(values)
     return None if len(problems.messages) > before else (rows, uncertainties)
 
 
-def is_right_factor(text: str, extra: dict[str, float], own: list[str]) -> bool:
+def is_right_factor(text: str, extra: dict[str, float], columns_of_row: list[str]) -> bool:
     """Whether a coverage factor stands beside an expanded uncertainty, or there is none."""
-    names = [EXPANDED, *(name for name in own if name.endswith(EXPANDED))]
+    names = [EXPANDED, *(name for name in columns_of_row if name.endswith(EXPANDED))]
     return text == NO_FACTOR or any(not math.isnan(extra[name]) for name in names)
 
 

@@ -168,10 +168,10 @@ def read_coordinates(
     is_right = check_keys(settings, steps, references)
     if balls is None or axes is None or not is_right or dimension is None:
         return None
-    found = _certified_coordinates(settings, balls, axes, layout, steps, references)
-    if found is None:
+    coordinates = _certified_coordinates(settings, balls, axes, layout, steps, references)
+    if coordinates is None:
         return None
-    values, in_file, covariance = found
+    values, in_file, covariance = coordinates
     uncertainty = settings.standard_uncertainty
     of_axes = None
     if isinstance(uncertainty, float):
@@ -180,29 +180,29 @@ def read_coordinates(
         of_axes = np.array(list(uncertainty.stated.values()))
     names = [(layout.names[ball], axis) for ball in balls for axis in axes]
     of_item = None if of_axes is None else np.tile(of_axes, len(balls))
-    known = uncertainties_of(
+    uncertainties = uncertainties_of(
         settings, names, False, of_item, in_file.ravel(), covariance, steps, references
     )
-    if known is None:
+    if uncertainties is None:
         return None
     of_balls = len(np.unique(balls))
     text = (
         f"co-ordinates tie {of_balls} balls together, at most {MOST_TIED_BALLS} are possible; leave"
         " the covariance out"
     )
-    if known.root is not None and not references.require(
+    if uncertainties.root is not None and not references.require(
         of_balls <= MOST_TIED_BALLS, (*steps, "covariance"), text
     ):
         return None
-    is_common = of_axes is not None and known.root is None
+    is_common = of_axes is not None and uncertainties.root is None
     return CoordinateCalibration(
         artefact,
         balls,
         tuple(AXIS_NAMES.index(axis) for axis in axes),
         frozen(values),
         settings.values is not None,
-        frozen(of_axes if is_common else known.standard.reshape(values.shape)),
-        root=known.root,
+        frozen(of_axes if is_common else uncertainties.standard.reshape(values.shape)),
+        root=uncertainties.root,
     )
 
 
@@ -252,17 +252,19 @@ def _certified_coordinates(
         if digital is None:
             return None
         covariance = digital.covariance
-        found = np.array([one.value for one in digital.entries]).reshape(drawn.shape)
-        uncertainty = np.array([one.uncertainty for one in digital.entries]).reshape(drawn.shape)
+        coordinates = np.array([entry.value for entry in digital.entries]).reshape(drawn.shape)
+        uncertainty = np.array([entry.uncertainty for entry in digital.entries]).reshape(
+            drawn.shape
+        )
     else:
         of_table = _table_of_coordinates(settings, balls, axes, layout, steps, references)
         if of_table is None:
             return None
-        found, uncertainty = of_table
-    if text := far_spread(found, drawn):
+        coordinates, uncertainty = of_table
+    if text := far_spread(coordinates, drawn):
         problems.add((*steps, "values"), text)
         return None
-    return found, uncertainty, covariance
+    return coordinates, uncertainty, covariance
 
 
 def _table_of_coordinates(
@@ -274,15 +276,15 @@ def _table_of_coordinates(
     references: References,
 ) -> tuple[Array, Array] | None:
     problems, steps = references.problems, (*steps, "values")
-    others = [axis for axis in AXIS_NAMES if axis not in axes]
-    read = read_rows(settings, ["ball"], axes, others, steps, references)
-    if read is None:
+    forbidden = [axis for axis in AXIS_NAMES if axis not in axes]
+    rows_read = read_rows(settings, ["ball"], axes, forbidden, steps, references)
+    if rows_read is None:
         return None
-    before, known = len(problems.messages), set(layout.names)
+    before, names_known = len(problems.messages), set(layout.names)
     by_ball: dict[str, tuple[Array, Array]] = {}
-    for row, uncertainty in zip(*read, strict=True):
+    for row, uncertainty in zip(*rows_read, strict=True):
         name = row.texts[0]
-        if name not in known:
+        if name not in names_known:
             problems.add_at(row.mark, steps, f'unknown ball "{name}"; {hint(name, layout.names)}')
         if name in by_ball:
             problems.add_at(
@@ -297,7 +299,7 @@ def _table_of_coordinates(
     if len(problems.messages) > before:
         return None
     chosen = [by_ball[layout.names[i]] for i in balls]
-    return np.array([one for one, _ in chosen]), np.array([u for _, u in chosen])
+    return np.array([name for name, _ in chosen]), np.array([u for _, u in chosen])
 
 
 def far_spread(values: Array, drawn: Array) -> str:
@@ -307,11 +309,11 @@ def far_spread(values: Array, drawn: Array) -> str:
     Where their axes begin may be another place than in the drawing.
     """
     # Root mean squares. A plate that is flat as drawn is not quite so as certified.
-    found, expected = (
-        float(np.sqrt(((one - one.mean(axis=0)) ** 2).sum(axis=1).mean()))
-        for one in (values, drawn)
+    spreads, expected = (
+        float(np.sqrt(((points - points.mean(axis=0)) ** 2).sum(axis=1).mean()))
+        for points in (values, drawn)
     )
-    if abs(found - expected) <= FAR_FROM_DRAWING * expected + HARDLY_FLAT:
+    if abs(spreads - expected) <= FAR_FROM_DRAWING * expected + HARDLY_FLAT:
         return ""
-    times = f"{found / expected:.3g} times as far apart as in the artefact's drawing"
+    times = f"{spreads / expected:.3g} times as far apart as in the artefact's drawing"
     return f"the balls of these co-ordinates are {times}; correct one of the two"

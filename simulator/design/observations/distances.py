@@ -203,17 +203,19 @@ def read_distances(
     is_right &= check_keys(settings, steps, references)
     if not is_right:
         return None
-    found = _certified_distances(settings, indices, layout, nominal, steps, references)
-    if found is None:
+    lengths = _certified_distances(settings, indices, layout, nominal, steps, references)
+    if lengths is None:
         return None
-    values, in_file, covariance = found
+    values, in_file, covariance = lengths
     names = [(layout.names[i], layout.names[j]) for i, j in indices]
-    stated = settings.standard_uncertainty
-    of_item = None if stated is None else stated.at(nominal)
-    known = uncertainties_of(settings, names, True, of_item, in_file, covariance, steps, references)
-    if known is None:
+    uncertainty = settings.standard_uncertainty
+    of_item = None if uncertainty is None else uncertainty.at(nominal)
+    uncertainties = uncertainties_of(
+        settings, names, True, of_item, in_file, covariance, steps, references
+    )
+    if uncertainties is None:
         return None
-    if known.root is not None and references.artefacts[artefact].role == "length_standard":
+    if uncertainties.root is not None and references.artefacts[artefact].role == "length_standard":
         text = (
             "a length standard's lengths are read as independent; leave the covariance out, or give"
             f' "{artefact}" the role of a plate'
@@ -227,11 +229,11 @@ def read_distances(
         dimensions,
         frozen(values),
         settings.values is not None,
-        stated if known.root is None else None,
-        known.standard,
+        uncertainty if uncertainties.root is None else None,
+        uncertainties.standard,
         settings.form,
         settings.repeatability,
-        root=known.root,
+        root=uncertainties.root,
     )
 
 
@@ -292,17 +294,17 @@ def _pairs(
         if selection == "all" and not _can_be_tied(len(layout.names), steps, references):
             return None
         try:
-            found = pairs(layout, selection)
+            pair_list = pairs(layout, selection)
         except ValueError as error:
             references.problems.add(steps, str(error))
             return None
         if not references.require(
-            len(found) > 0, steps, "the artefact has a single ball and no pairs; remove it"
+            len(pair_list) > 0, steps, "the artefact has a single ball and no pairs; remove it"
         ):
             return None
-        return found
+        return pair_list
     index = {name: i for i, name in enumerate(layout.names)}
-    seen: dict[frozenset[str], int] = {}
+    pairs_seen: dict[frozenset[str], int] = {}
     is_right = True
     for i, names in enumerate(selection):
         for j, name in enumerate(names):
@@ -311,9 +313,9 @@ def _pairs(
         text = f'a ball has no distance from itself; name two balls, not "{names[0]}" twice'
         is_right &= references.require(names[0] != names[1], (*steps, i), text)
         pair = frozenset(names)
-        text = f"is already in entry [{seen.get(pair)}]; remove one of the two"
-        is_right &= references.require(pair not in seen, (*steps, i), text)
-        seen.setdefault(pair, i)
+        text = f"is already in entry [{pairs_seen.get(pair)}]; remove one of the two"
+        is_right &= references.require(pair not in pairs_seen, (*steps, i), text)
+        pairs_seen.setdefault(pair, i)
     return (
         np.array([[index[a], index[b]] for a, b in selection], dtype=np.intp) if is_right else None
     )
@@ -332,14 +334,14 @@ def _certified_distances(
         return nominal, np.full(len(nominal), np.nan), None
     problems, place = references.problems, (*steps, "values")
     wanted = [(layout.names[i], layout.names[j]) for i, j in indices]
-    read = _entries(settings, wanted, place, references)
-    if read is None:
+    table_entries = _entries(settings, wanted, place, references)
+    if table_entries is None:
         return None
     before = len(problems.messages)
-    by_pair = _by_pair(read.entries, layout, references)
+    by_pair = _by_pair(table_entries.entries, layout, references)
     missing = [f"{a}–{b}" for a, b in wanted if frozenset((a, b)) not in by_pair]
     drawn = {frozenset(pair): float(length) for pair, length in zip(wanted, nominal, strict=True)}
-    for entry in read.entries:
+    for entry in table_entries.entries:
         expected, distance = drawn.get(frozenset(entry.names)), entry.value
         if (
             expected is not None
@@ -354,9 +356,9 @@ def _certified_distances(
         return None
     chosen = [by_pair[frozenset(pair)] for pair in wanted]
     return (
-        np.array([one.value for one in chosen]),
-        np.array([one.uncertainty for one in chosen]),
-        read.covariance,
+        np.array([pair.value for pair in chosen]),
+        np.array([pair.uncertainty for pair in chosen]),
+        table_entries.covariance,
     )
 
 
@@ -370,16 +372,16 @@ def _entries(
     if is_digital(settings.values):
         return read_digital(settings, wanted, True, steps[:-1], references)
     if isinstance(settings.values, str):
-        read = read_rows(settings, ["ball_1", "ball_2"], ["distance"], [], steps, references)
-        if read is None:
+        rows_read = read_rows(settings, ["ball_1", "ball_2"], ["distance"], [], steps, references)
+        if rows_read is None:
             return None
-        found = [
+        entries = [
             CertificateEntry(
                 (row.texts[0], row.texts[1]), row.lengths[0], float(u[0]), row.mark, steps
             )
-            for row, u in zip(*read, strict=True)
+            for row, u in zip(*rows_read, strict=True)
         ]
-        return FileValues(found)
+        return FileValues(entries)
     listed = [
         CertificateEntry(
             entry.balls,
@@ -397,12 +399,12 @@ def _by_pair(
     entries: list[CertificateEntry], layout: BallLayout, references: References
 ) -> dict[frozenset[str], CertificateEntry]:
     """Entries by their balls, after saying which are no distances of two of them, each once."""
-    problems, known = references.problems, set(layout.names)
+    problems, names_known = references.problems, set(layout.names)
     by_pair: dict[frozenset[str], CertificateEntry] = {}
     for entry in entries:
         names, distance, mark, place = entry.names, entry.value, entry.mark, entry.steps
         for name in names:
-            if name not in known:
+            if name not in names_known:
                 problems.add_at(mark, place, f'unknown ball "{name}"; {hint(name, layout.names)}')
         pair = frozenset(names)
         if len(pair) == 1:

@@ -119,29 +119,36 @@ class JointWhitening:
 
     def whitened(self, rows: Array) -> Array:
         """Of all lengths' `rows` (lengths, k) uncorrelated ones (len, k) of unit variance."""
-        told = [one.equations @ rows[one.rows].mean(axis=0) for one in self.consistencies]
-        known = self.known @ np.concatenate([np.zeros((0, rows.shape[1])), *told])
+        means = [
+            consistency.equations @ rows[consistency.rows].mean(axis=0)
+            for consistency in self.consistencies
+        ]
+        known_rows = self.known @ np.concatenate([np.zeros((0, rows.shape[1])), *means])
         first = (
-            np.concatenate([one.root.T @ rows[one.rows] for one in self.together])
-            - self.by_known @ known
+            np.concatenate(
+                [consistency.root.T @ rows[consistency.rows] for consistency in self.together]
+            )
+            - self.by_known @ known_rows
         )
         first = first - self.shared @ (self.gain[:, None] * (self.shared.T @ first))
-        return np.concatenate([first, known])
+        return np.concatenate([first, known_rows])
 
     def pull(self, rows: Array, into: Array) -> None:
         """Add the transpose of `whitened`, of `rows` (len, k), to `into` (lengths, k)."""
-        first, known = np.split(rows, [len(self.by_known)])
+        first, known_part = np.split(rows, [len(self.by_known)])
         first = first - self.shared @ (self.gain[:, None] * (self.shared.T @ first))
-        told = self.known.T @ (known - self.by_known.T @ first)
+        by_mean = self.known.T @ (known_part - self.by_known.T @ first)
         start = 0
-        for each in self.together:
-            stop = start + each.root.shape[1]
-            into[each.rows] += each.root @ first[start:stop]
+        for group in self.together:
+            stop = start + group.root.shape[1]
+            into[group.rows] += group.root @ first[start:stop]
             start = stop
         start = 0
-        for one in self.consistencies:
-            stop = start + len(one.equations)
-            into[one.rows] += one.equations.T @ told[start:stop] / len(one.rows)
+        for consistency in self.consistencies:
+            stop = start + len(consistency.equations)
+            into[consistency.rows] += (
+                consistency.equations.T @ by_mean[start:stop] / len(consistency.rows)
+            )
             start = stop
 
 
@@ -183,7 +190,7 @@ class LengthWhitening:
         flat = rows.reshape(len(rows), -1)
         parts = [
             self.single.whitened(flat[self.alone]),
-            *(one.whitened(flat) for one in self.joint),
+            *(joint_whitening.whitened(flat) for joint_whitening in self.joint),
         ]
         return np.concatenate(parts).reshape(-1, *rows.shape[1:])
 
@@ -197,37 +204,39 @@ class LengthWhitening:
         result = np.zeros((len(self.scatter), flat.shape[1]))
         start = len(self.single)
         result[self.alone] = self.single.pulled(flat[:start])
-        for one in self.joint:
-            one.pull(flat[start : start + len(one)], result)
-            start += len(one)
+        for joint_whitening in self.joint:
+            joint_whitening.pull(flat[start : start + len(joint_whitening)], result)
+            start += len(joint_whitening)
         return result.reshape(-1, *rows.shape[1:])
 
-    def by_position(self, given: LengthArrays, rows: Array) -> ByPosition:
+    def by_position(self, lengths: LengthArrays, rows: Array) -> ByPosition:
         """Rows (r, k) of each position by itself, of lengths' `rows` (m, k).
 
         No position makes use of what others tell of certificates that contradict one another; where
         all read the same lengths of a standard there is nothing more to be told.
         """
         alone = self.alone
-        weight = 1.0 / np.where(given.with_repeatability, self.scatter, given.uncertainty)[alone]
-        of_errors = np.zeros((len(alone), int(given.certificate.max(initial=-1)) + 1))
-        scatters = np.flatnonzero(given.with_repeatability[alone])
-        common = alone[scatters]
-        of_errors[scatters, given.certificate[common]] = (
-            -weight[scatters] * given.uncertainty[common]
+        weight = (
+            1.0 / np.where(lengths.with_repeatability, self.scatter, lengths.uncertainty)[alone]
         )
-        length, found, by_error = [alone], [weight[:, None] * rows[alone]], [of_errors]
-        for each in (one for joint in self.joint for one in joint.together):
-            count = each.root.shape[1]
-            length.append(np.repeat(each.rows[:1], count))
-            found.append(each.root.T @ rows[each.rows])
+        of_errors = np.zeros((len(alone), int(lengths.certificate.max(initial=-1)) + 1))
+        scatters = np.flatnonzero(lengths.with_repeatability[alone])
+        common = alone[scatters]
+        of_errors[scatters, lengths.certificate[common]] = (
+            -weight[scatters] * lengths.uncertainty[common]
+        )
+        length, parts, by_error = [alone], [weight[:, None] * rows[alone]], [of_errors]
+        for group in (group for joint in self.joint for group in joint.together):
+            count = group.root.shape[1]
+            length.append(np.repeat(group.rows[:1], count))
+            parts.append(group.root.T @ rows[group.rows])
             by_error.append(np.zeros((count, of_errors.shape[1])))
-            by_error[-1][:, given.certificate[each.rows]] = each.by_error
-        return ByPosition(np.concatenate(length), np.concatenate(found), np.concatenate(by_error))
+            by_error[-1][:, lengths.certificate[group.rows]] = group.by_error
+        return ByPosition(np.concatenate(length), np.concatenate(parts), np.concatenate(by_error))
 
 
 def length_whitening_of(
-    given: LengthArrays, noise: Array, standard: Integers, place: Integers
+    lengths: LengthArrays, noise: Array, standard: Integers, place: Integers
 ) -> LengthWhitening:
     """Whitening of lengths (m,) whose readings have the standard uncertainties `noise` (readings,
     d), in metres.
@@ -235,114 +244,122 @@ def length_whitening_of(
     `standard` and `place` (m,) number the artefact, and the position and probe, of each length.
     Directions are the nominal ones, so that weights stay what they are while parameters change.
     """
-    variance = noise[given.first] ** 2 + np.where(
-        given.to_pivot[:, None], 0.0, noise[given.second] ** 2
+    variance = noise[lengths.first] ** 2 + np.where(
+        lengths.to_pivot[:, None], 0.0, noise[lengths.second] ** 2
     )
-    scatter = np.sqrt((given.direction**2 * variance).sum(axis=1)) * given.with_repeatability
-    is_joint = given.with_repeatability & _shares_readings(given, standard)
+    scatter = np.sqrt((lengths.direction**2 * variance).sum(axis=1)) * lengths.with_repeatability
+    is_joint = lengths.with_repeatability & _shares_readings(lengths, standard)
     alone = np.flatnonzero(~is_joint)
-    _, group = np.unique(given.certificate[alone], return_inverse=True)
-    single = whitening(scatter[alone], given.uncertainty[alone], group.ravel())
+    _, group = np.unique(lengths.certificate[alone], return_inverse=True)
+    single = whitening(scatter[alone], lengths.uncertainty[alone], group.ravel())
     joint = [
-        joint_whitening(given, noise, place, np.flatnonzero(is_joint & (standard == k)))
+        joint_whitening(lengths, noise, place, np.flatnonzero(is_joint & (standard == k)))
         for k in np.unique(standard[is_joint])
     ]
     return LengthWhitening(scatter, alone, single, tuple(joint))
 
 
-def _shares_readings(given: LengthArrays, standard: Integers) -> NDArray[np.bool_]:
+def _shares_readings(lengths: LengthArrays, standard: Integers) -> NDArray[np.bool_]:
     """Which lengths (m,) are of standards of which some reading is an end of several lengths."""
-    chosen = np.flatnonzero(given.with_repeatability & ~given.to_pivot)
-    ends = np.concatenate([given.first[chosen], given.second[chosen]])
+    chosen = np.flatnonzero(lengths.with_repeatability & ~lengths.to_pivot)
+    ends = np.concatenate([lengths.first[chosen], lengths.second[chosen]])
     _, inverse, count = np.unique(ends, return_inverse=True, return_counts=True)
     shared = np.tile(chosen, 2)[count[inverse.ravel()] > 1]
-    return np.isin(standard, standard[shared]) & ~given.to_pivot
+    return np.isin(standard, standard[shared]) & ~lengths.to_pivot
 
 
 def joint_whitening(
-    given: LengthArrays, noise: Array, place: Integers, chosen: Integers
+    lengths: LengthArrays, noise: Array, place: Integers, chosen: Integers
 ) -> JointWhitening:
     """Whitening of the lengths `chosen` (m,), all of one standard."""
-    numbers, inverse = np.unique(given.certificate[chosen], return_inverse=True)
+    numbers, inverse = np.unique(lengths.certificate[chosen], return_inverse=True)
     certificate, count = inverse.ravel(), len(numbers)
     groups: list[tuple[Integers, Array, Array]] = []
     alike: dict[bytes, list[int]] = {}
     size = 0.0
     for k in np.unique(place[chosen]):
-        own = np.flatnonzero(place[chosen] == k)
-        own = own[np.argsort(certificate[own], kind="stable")]
-        rows = chosen[own]
-        within, triangle = _range_and_noise(given, noise, rows)
+        certificate_rows = np.flatnonzero(place[chosen] == k)
+        certificate_rows = certificate_rows[
+            np.argsort(certificate[certificate_rows], kind="stable")
+        ]
+        rows = chosen[certificate_rows]
+        within, triangle = _range_and_noise(lengths, noise, rows)
         size = max(size, float(np.abs(triangle).max()))
         root = np.asarray(np.linalg.solve(triangle.T, within.T).T, float)
-        alike.setdefault(certificate[own].tobytes(), []).append(len(groups))
+        alike.setdefault(certificate[certificate_rows].tobytes(), []).append(len(groups))
         groups.append((rows, within, root))
     together: list[Together] = []
-    consistencies, told, errors = [], [np.zeros((0, count))], []
+    consistencies, equations_found, errors = [], [np.zeros((0, count))], []
     for members in alike.values():
         same = np.stack([groups[k][0] for k in members])
-        uncertainty = given.uncertainty[same[0]]
-        own = certificate[np.searchsorted(chosen, same[0])]
+        uncertainty = lengths.uncertainty[same[0]]
+        certificate_rows = certificate[np.searchsorted(chosen, same[0])]
         outside = _outside(groups[members[0]][1], uncertainty, size)
         if len(outside):
             consistencies.append(
                 Consistency(same, outside / np.maximum(uncertainty, SMALLEST * size))
             )
-            told.append(np.zeros((len(outside), count)))
-            told[-1][:, own] = outside
+            equations_found.append(np.zeros((len(outside), count)))
+            equations_found[-1][:, certificate_rows] = outside
         for k in members:
             rows, _, root = groups[k]
             by_error = -root.T * uncertainty
             errors.append(np.zeros((root.shape[1], count)))
-            errors[-1][:, own] = by_error
+            errors[-1][:, certificate_rows] = by_error
             together.append(Together(rows, root, by_error - (by_error @ outside.T) @ outside))
-    known, directions = _independent(np.concatenate(told), len(consistencies) == 1)
+    known_directions, directions = _independent(
+        np.concatenate(equations_found), len(consistencies) == 1
+    )
     by_error = -np.concatenate(errors)
     by_known = by_error @ directions
-    left, values, _ = np.linalg.svd(by_error - by_known @ directions.T, full_matrices=False)
+    decomposition, values, _ = np.linalg.svd(
+        by_error - by_known @ directions.T, full_matrices=False
+    )
     gain = 1.0 - 1.0 / np.sqrt(1.0 + values**2)
-    return JointWhitening(tuple(together), tuple(consistencies), known, by_known, left, gain)
+    return JointWhitening(
+        tuple(together), tuple(consistencies), known_directions, by_known, decomposition, gain
+    )
 
 
-def equation_root(given: LengthArrays, rows: Integers) -> Array:
+def equation_root(lengths: LengthArrays, rows: Integers) -> Array:
     """Root (m, r) that makes uncorrelated equations of those of the squares of lengths `rows` (m,)
     read together.
 
     Noise is the same in all readings. An equation that shared no reading would keep the weight 1,
     were its length the root mean square of all.
     """
-    size = given.value[rows] / np.sqrt(2.0 * (given.value[rows] ** 2).mean())
-    readings = int(max(given.first.max(), given.second.max())) + 1
-    within, triangle = _range_and_noise(given, np.ones((readings, 1)), rows, size)
+    size = lengths.value[rows] / np.sqrt(2.0 * (lengths.value[rows] ** 2).mean())
+    readings = int(max(lengths.first.max(), lengths.second.max())) + 1
+    within, triangle = _range_and_noise(lengths, np.ones((readings, 1)), rows, size)
     return np.asarray(np.linalg.solve(triangle.T, within.T).T)
 
 
 def _range_and_noise(
-    given: LengthArrays, noise: Array, rows: Integers, size: Array | float = 1.0
+    lengths: LengthArrays, noise: Array, rows: Integers, size: Array | float = 1.0
 ) -> tuple[Array, Array]:
     """Basis (m, r) of what readings change of lengths `rows` (m,), each times its `size`, with a
     triangle (r, r).
 
     The noise of basis' lengths has the covariance triangle' triangle.
     """
-    along, of_noise = _directions(given, noise, rows)
+    along, of_noise = _directions(lengths, noise, rows)
     scale = np.broadcast_to(size, (len(rows),))[:, None]
     within, of_noise = _range(scale * along), scale * of_noise
     return within, np.asarray(np.linalg.qr(of_noise.T @ within, mode="r"))
 
 
-def _directions(given: LengthArrays, noise: Array, rows: Integers) -> tuple[Array, Array]:
+def _directions(lengths: LengthArrays, noise: Array, rows: Integers) -> tuple[Array, Array]:
     """What displacements of the readings change lengths `rows` (m,) by, (m, readings d): by a
     metre, and by noise.
     """
-    ends = np.stack([given.first[rows], given.second[rows]])
-    read, place = np.unique(ends, return_inverse=True)
+    ends = np.stack([lengths.first[rows], lengths.second[rows]])
+    balls_read, place = np.unique(ends, return_inverse=True)
     place = place.reshape(ends.shape)
-    m, d = len(rows), given.direction.shape[1]
-    along = np.zeros((m, len(read), d))
-    along[np.arange(m), place[0]] = given.direction[rows]
-    along[np.arange(m), place[1]] -= given.direction[rows]
-    return along.reshape(m, -1), (along * noise[read]).reshape(m, -1)
+    m, d = len(rows), lengths.direction.shape[1]
+    along = np.zeros((m, len(balls_read), d))
+    along[np.arange(m), place[0]] = lengths.direction[rows]
+    along[np.arange(m), place[1]] -= lengths.direction[rows]
+    return along.reshape(m, -1), (along * noise[balls_read]).reshape(m, -1)
 
 
 def _range(along: Array) -> Array:
@@ -373,6 +390,8 @@ def _independent(equations: Array, told_once: bool) -> tuple[Array, Array]:
         return np.zeros((0, 0)), np.zeros((equations.shape[1], 0))
     if told_once:
         return np.eye(len(equations)), equations.T
-    left, values, right = np.linalg.svd(equations, full_matrices=False)
-    kept = values > TOLD_TWICE * values[0]
-    return np.asarray(left[:, kept].T / values[kept, None]), np.asarray(right[kept].T)
+    decomposition, values, right = np.linalg.svd(equations, full_matrices=False)
+    is_independent = values > TOLD_TWICE * values[0]
+    return np.asarray(
+        decomposition[:, is_independent].T / values[is_independent, None]
+    ), np.asarray(right[is_independent].T)

@@ -71,11 +71,11 @@ class JointValues(BallObservations):
     @property
     def balls(self) -> Integers:
         """All balls of the block of each row; where it has fewer than others, its first again."""
-        found = self._balls
-        result = np.zeros((len(self), max(map(len, found), default=0)), np.int64)
-        for part, own in zip(self._parts, found, strict=True):
-            result[part] = own[0]
-            result[part, : len(own)] = own
+        balls_by_part = self._balls
+        result = np.zeros((len(self), max(map(len, balls_by_part), default=0)), np.int64)
+        for part, balls_of_part in zip(self._parts, balls_by_part, strict=True):
+            result[part] = balls_of_part[0]
+            result[part, : len(balls_of_part)] = balls_of_part
         return result
 
     @property
@@ -86,9 +86,12 @@ class JointValues(BallObservations):
         """Values (..., m), and their derivatives (..., m, k, d) by `balls`, not whitened."""
         value = np.zeros((*balls.shape[:-2], len(self)))
         slope = np.zeros((*value.shape, self.balls.shape[1], balls.shape[-1]))
-        for part, own, block in zip(self._parts, self._balls, self.blocks, strict=True):
+        for part, balls_of_part, block in zip(self._parts, self._balls, self.blocks, strict=True):
             value[..., part], by_ball = block.values(balls)
-            place, row = np.searchsorted(own, block.balls), np.arange(part.start, part.stop)
+            place, row = (
+                np.searchsorted(balls_of_part, block.balls),
+                np.arange(part.start, part.stop),
+            )
             for column in range(place.shape[1]):
                 slope[..., row, place[:, column], :] += by_ball[..., column, :]
         return value, slope
@@ -120,12 +123,14 @@ class JointValues(BallObservations):
         """
         slope = self.values(design.balls.places)[1]
         sizes = np.abs(slope).max(axis=(1, 2), initial=0.0)
-        own = np.where(sizes > 0.0, sizes, 1.0)
+        divisors = np.where(sizes > 0.0, sizes, 1.0)
         roots = tuple(
-            CovarianceRoot(own[part], np.eye(part.stop - part.start), np.ones(len(own[part])))
+            CovarianceRoot(
+                divisors[part], np.eye(part.stop - part.start), np.ones(len(divisors[part]))
+            )
             for part in self._parts
         )
-        return replace(self, roots=roots, uncertainty=own)
+        return replace(self, roots=roots, uncertainty=divisors)
 
     def enlarged(self, times: Array) -> JointValues:
         parts = zip(self._parts, self.roots, strict=True)
@@ -154,8 +159,10 @@ class JointValues(BallObservations):
 
     def fixing(self) -> tuple[Integers, Integers, Array]:
         none = np.zeros(0, np.int64)
-        found = [(none, none, np.zeros(0)), *(block.fixing() for block in self._current)]
-        ball, axis, value = (np.concatenate(one) for one in zip(*found, strict=True))
+        parts = [(none, none, np.zeros(0)), *(block.fixing() for block in self._current)]
+        ball, axis, value = (
+            np.concatenate(block_parts) for block_parts in zip(*parts, strict=True)
+        )
         return ball, axis, value
 
     def scaled(self) -> Array:

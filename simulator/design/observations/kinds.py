@@ -53,7 +53,14 @@ def read_calibration(
     settings: Any, artefact: str, steps: Steps, references: References
 ) -> Calibration | None:
     """The item of an artefact that settings describe, or None after saying what is wrong."""
-    read = next((read for one, read in CALIBRATIONS.items() if isinstance(settings, one)), None)
-    read = read or provided("calibrations", settings.kind, "read")
-    assert read is not None
-    return read(settings, artefact, steps, references)
+    reader = next(
+        (
+            reader
+            for settings_class, reader in CALIBRATIONS.items()
+            if isinstance(settings, settings_class)
+        ),
+        None,
+    )
+    reader = reader or provided("calibrations", settings.kind, "read")
+    assert reader is not None
+    return reader(settings, artefact, steps, references)

@@ -43,9 +43,9 @@ class Lengths(LengthArrays, Observations):
         if not len(self):
             none = np.zeros((0, len(design.once(shared_layout))))
             return Rows(np.zeros(0), none, np.zeros((0, 0, design.dimension)))
-        residual, found = _length_residuals(design, state, x)
+        residual, residuals = _length_residuals(design, state, x)
         by_shared = design.once(length_whitening).whitened(
-            _length_derivative(design, design.once(shared_layout), state, found)
+            _length_derivative(design, design.once(shared_layout), state, residuals)
         )
         return Rows(residual, by_shared, np.zeros((len(residual), 0, design.dimension)))
 
@@ -58,11 +58,11 @@ class Lengths(LengthArrays, Observations):
         return np.asarray(self.uncertainty * drawn[:, self.certificate])
 
     def weights(self, design: Design, state: State) -> Array:
-        own = 1.0 / self.uncertainty[self.uncertainty > 0.0]
+        weights_known = 1.0 / self.uncertainty[self.uncertainty > 0.0]
         return (
-            np.append(own, 1.0 / design.machine.repeatability)
+            np.append(weights_known, 1.0 / design.machine.repeatability)
             if self.with_repeatability.any()
-            else own
+            else weights_known
         )
 
     def alike(self, design: Design, state: State) -> Lengths:
@@ -87,26 +87,28 @@ class Lengths(LengthArrays, Observations):
 
 def length_whitening(design: Design) -> LengthWhitening:
     """What makes uncorrelated observations of unit variance of the lengths of standards."""
-    given, readings = design.of(Lengths), design.readings
+    lengths, readings = design.of(Lengths), design.readings
     noise = reading_noise(design, readings)
-    standard = design.balls.artefact[readings.ball[given.first]]
-    place = readings.position[given.first] * len(design.probes.names) + readings.probe[given.first]
-    return length_whitening_of(given, noise, standard, place)
+    standard = design.balls.artefact[readings.ball[lengths.first]]
+    place = (
+        readings.position[lengths.first] * len(design.probes.names) + readings.probe[lengths.first]
+    )
+    return length_whitening_of(lengths, noise, standard, place)
 
 
 def length_name(design: Design, length: int, of_reading: bool = True) -> str:
     """A length of a standard by its ends, or a gauge's radius, of one reading or as it is
     certified.
     """
-    given, readings = design.of(Lengths), design.readings
-    ball = int(readings.ball[given.first[length]])
+    lengths, readings = design.of(Lengths), design.readings
+    ball = int(readings.ball[lengths.first[length]])
     artefact = design.artefacts.names[design.balls.artefact[ball]]
-    if given.second[length] < 0:
+    if lengths.second[length] < 0:
         return f"radius of {artefact}" + (
             f" to ball {design.balls.names[ball]}" if of_reading else ""
         )
-    other = readings.ball[given.second[length]]
-    return f"length {design.balls.names[ball]}-{design.balls.names[other]} of {artefact}"
+    second_ball = readings.ball[lengths.second[length]]
+    return f"length {design.balls.names[ball]}-{design.balls.names[second_ball]} of {artefact}"
 
 
 def length_derivative(design: Design, state: State) -> Array:
@@ -118,9 +120,9 @@ def length_derivative(design: Design, state: State) -> Array:
 def _length_derivative(
     design: Design, layout: SharedLayout, state: State, measured: _Measured
 ) -> Array:
-    given = design.of(Lengths)
+    lengths = design.of(Lengths)
     # What is held goes to the extra column.
-    rows = np.zeros((len(given), len(layout) + 1))
+    rows = np.zeros((len(lengths), len(layout) + 1))
     for end in measured.ends:
         along = measured.unit[end.rows]
         by_model = design.model.jacobian(end.points, state.a, end.offsets)
@@ -133,14 +135,14 @@ def _length_derivative(
                 (end.rows[:, None], columns),
                 end.sign * np.einsum("md,mdj->mj", along, by_offset),
             )
-    pivoted = np.flatnonzero(given.to_pivot)
+    pivoted = np.flatnonzero(lengths.to_pivot)
     columns = layout.pose_columns[
-        design.readings.position[given.first[pivoted]], : design.dimension
+        design.readings.position[lengths.first[pivoted]], : design.dimension
     ]
     np.add.at(rows, (pivoted[:, None], columns), -measured.unit[pivoted])
-    if given.free is not None:
-        free = np.flatnonzero(given.free >= 0)
-        rows[free, layout.lengths.start + given.free[free]] -= 1.0
+    if lengths.free is not None:
+        free = np.flatnonzero(lengths.free >= 0)
+        rows[free, layout.lengths.start + lengths.free[free]] -= 1.0
     return rows[:, :-1]
 
 
@@ -169,14 +171,14 @@ class _Measured:
 
 
 def _measured(design: Design, state: State, x: Array | None) -> _Measured:
-    given = design.of(Lengths)
-    difference = np.zeros((len(given), design.dimension))
-    pivoted = np.flatnonzero(given.to_pivot)
-    pivot = state.origins[design.readings.position[given.first[pivoted]]]
+    lengths = design.of(Lengths)
+    difference = np.zeros((len(lengths), design.dimension))
+    pivoted = np.flatnonzero(lengths.to_pivot)
+    pivot = state.origins[design.readings.position[lengths.first[pivoted]]]
     ends = []
     for sign, chosen, rows in (
-        (1.0, given.first, np.arange(len(given))),
-        (-1.0, given.second, np.flatnonzero(~given.to_pivot)),
+        (1.0, lengths.first, np.arange(len(lengths))),
+        (-1.0, lengths.second, np.flatnonzero(~lengths.to_pivot)),
     ):
         readings = design.readings.select(chosen[rows])
         p = state.probes[readings.probe]
@@ -186,7 +188,7 @@ def _measured(design: Design, state: State, x: Array | None) -> _Measured:
             points = expected_readings(design, state, readings)
             if sign > 0:
                 # Where the ball of a gauge was, which need not be where it was to be.
-                reach = length_values(design, state)[pivoted, None] * given.direction[pivoted]
+                reach = length_values(design, state)[pivoted, None] * lengths.direction[pivoted]
                 points[pivoted] = pivot + reach - p[pivoted]
         difference[rows] += sign * (
             points + (p if x is None else design.model.error(points, state.a, p))
@@ -194,16 +196,16 @@ def _measured(design: Design, state: State, x: Array | None) -> _Measured:
         ends.append(_End(sign, rows, points, p, readings.probe))
     difference[pivoted] -= pivot
     unit = difference / np.sqrt((difference**2).sum(axis=1))[:, None]
-    unit = np.where(given.projected[:, None], given.direction, unit)
+    unit = np.where(lengths.projected[:, None], lengths.direction, unit)
     length = np.einsum("md,md->m", unit, difference)
     return _Measured(length, unit, (ends[0], ends[1]))
 
 
 def _length_residuals(design: Design, state: State, x: Array | None) -> tuple[Array, _Measured]:
     """Whitened residuals (r,) of lengths, and what these are formed of."""
-    found = _measured(design, state, x)
-    off = found.length - length_values(design, state)
-    return design.once(length_whitening).whitened(off), found
+    residuals = _measured(design, state, x)
+    off = residuals.length - length_values(design, state)
+    return design.once(length_whitening).whitened(off), residuals
 
 
 def length_deviations(design: Design, state: State, x: Array | None) -> tuple[Array, Array]:
@@ -214,9 +216,9 @@ def length_deviations(design: Design, state: State, x: Array | None) -> tuple[Ar
     """
     if not len(design.of(Lengths)):
         return np.zeros(0), np.ones(0)
-    found = _measured(design, state, x)
+    measured = _measured(design, state, x)
     scatter = design.once(length_whitening).scatter
-    return found.length - length_values(design, state), np.hypot(
+    return measured.length - length_values(design, state), np.hypot(
         scatter, design.of(Lengths).uncertainty
     )
 
@@ -232,43 +234,43 @@ def length_values(design: Design, state: State) -> Array:
     """Values (m,) at `state` that lengths of standards are compared with: those certified, or the
     unknown ones.
     """
-    given = design.of(Lengths)
-    if given.free is None or not len(design.unknown_lengths.names):
-        return given.value
-    return np.where(given.free >= 0, state.lengths[given.free], given.value)
+    lengths = design.of(Lengths)
+    if lengths.free is None or not len(design.unknown_lengths.names):
+        return lengths.value
+    return np.where(lengths.free >= 0, state.lengths[lengths.free], lengths.value)
 
 
 def true_lengths(design: Design, truth: State) -> Array:
     """Lengths (m,) of the design's standards as they truly are; the same wherever one certificate's
     is read.
     """
-    given = design.of(Lengths)
-    if not len(given):
-        return given.value
+    lengths = design.of(Lengths)
+    if not len(lengths):
+        return lengths.value
     there = locations(design, truth, design.readings)
-    pivot = truth.origins[design.readings.position[given.first]]
-    between = there[given.first] - np.where(
-        given.to_pivot[:, None], pivot, there[np.maximum(given.second, 0)]
+    pivot = truth.origins[design.readings.position[lengths.first]]
+    between = there[lengths.first] - np.where(
+        lengths.to_pivot[:, None], pivot, there[np.maximum(lengths.second, 0)]
     )
-    along = np.abs(np.einsum("md,md->m", given.direction, between))
-    length = np.where(given.projected, along, np.sqrt((between**2).sum(axis=1)))
-    _, first = np.unique(given.certificate, return_index=True)
-    return np.asarray(length[first][given.certificate])
+    along = np.abs(np.einsum("md,md->m", lengths.direction, between))
+    length = np.where(lengths.projected, along, np.sqrt((between**2).sum(axis=1)))
+    _, first = np.unique(lengths.certificate, return_index=True)
+    return np.asarray(length[first][lengths.certificate])
 
 
 def _measured_lengths(design: Design, origins: Array, x: Array) -> Array:
     """Unknown lengths as the readings have them, in the mean; as drawn where there are none."""
-    given = design.of(Lengths)
-    if given.free is None or not len(design.unknown_lengths.names):
+    lengths = design.of(Lengths)
+    if lengths.free is None or not len(design.unknown_lengths.names):
         return design.unknown_lengths.drawn
-    seen = x + design.probes.offsets[design.readings.probe]
-    other = np.where(
-        given.to_pivot[:, None],
-        origins[design.readings.position[given.first]],
-        seen[np.maximum(given.second, 0)],
+    places_seen = x + design.probes.offsets[design.readings.probe]
+    second_place = np.where(
+        lengths.to_pivot[:, None],
+        origins[design.readings.position[lengths.first]],
+        places_seen[np.maximum(lengths.second, 0)],
     )
-    length = np.sqrt(((seen[given.first] - other) ** 2).sum(axis=1))
-    found = design.unknown_lengths.drawn.copy()
-    for number in np.unique(given.free[given.free >= 0]):
-        found[number] = length[given.free == number].mean()
-    return found
+    length = np.sqrt(((places_seen[lengths.first] - second_place) ** 2).sum(axis=1))
+    lengths_measured = design.unknown_lengths.drawn.copy()
+    for number in np.unique(lengths.free[lengths.free >= 0]):
+        lengths_measured[number] = length[lengths.free == number].mean()
+    return lengths_measured

@@ -96,8 +96,8 @@ class PythonValues(BallObservations):
     def values(self, balls: Array) -> tuple[Array, Array]:
         mine = balls[..., self.ball, :]
         flat = mine.reshape(-1, *mine.shape[-2:])
-        value = np.array([self.functions.values(one) for one in flat], float)
-        slope = np.array([self.functions.derivatives(one) for one in flat], float)
+        value = np.array([self.functions.values(value) for value in flat], float)
+        slope = np.array([self.functions.derivatives(value) for value in flat], float)
         lead = mine.shape[:-2]
         return value.reshape(*lead, -1), slope.reshape(*lead, *slope.shape[1:])
 
@@ -191,19 +191,19 @@ def read_python_values(
     except CustomModelError as error:
         references.problems.add((*steps, error.key), str(error))
         return None
-    found = _values(settings, functions, drawn, steps, references)
-    if found is None:
+    stated_values = _values(settings, functions, drawn, steps, references)
+    if stated_values is None:
         return None
-    values, in_file, covariance = found
-    stated = _stated(settings, functions, steps, references)
-    if stated is not None and np.isnan(stated).any():
+    values, in_file, covariance = stated_values
+    stated_uncertainty = _stated(settings, functions, steps, references)
+    if stated_uncertainty is not None and np.isnan(stated_uncertainty).any():
         return None
-    known = uncertainties_of(
-        settings, functions.names, False, stated, in_file, covariance, steps, references
+    uncertainties = uncertainties_of(
+        settings, functions.names, False, stated_uncertainty, in_file, covariance, steps, references
     )
-    if known is None:
+    if uncertainties is None:
         return None
-    root = known.root or covariance_root(np.diag(known.standard**2))
+    root = uncertainties.root or covariance_root(np.diag(uncertainties.standard**2))
     return PythonCalibration(
         artefact,
         settings.object,
@@ -213,7 +213,7 @@ def read_python_values(
         np.asarray(balls, np.int64),
         frozen(values),
         settings.values is not None,
-        known.standard,
+        uncertainties.standard,
         root,
     )
 
@@ -232,11 +232,11 @@ def ball_functions(
     """
     build = named_object(name, folder, trust, GROUP)
     key = "options" if options else "object"
-    found = attempt(
+    functions = attempt(
         f"{name} has failed", lambda: build(names, drawn.copy(), **with_quantities(options)), key
     )
-    _check(name, found, drawn)
-    return GuardedFunctions(found, tuple(found.names), found.unit)
+    _check(name, functions, drawn)
+    return GuardedFunctions(functions, tuple(functions.names), functions.unit)
 
 
 @dataclass(frozen=True)
@@ -270,8 +270,8 @@ def _values(
         text = f"has {len(settings.values)} values; the functions have {count}"
         if not references.require(len(settings.values) == count, place, text):
             return None
-        found = _parsed(settings.values, functions.unit, place, references)
-        return None if np.isnan(found).any() else (found, none, None)
+        parsed = _parsed(settings.values, functions.unit, place, references)
+        return None if np.isnan(parsed).any() else (parsed, none, None)
     text = f"a file holds lengths, and these are in {functions.unit}; write a list of values"
     if not references.require(functions.unit == "m", place, text):
         return None
@@ -280,20 +280,20 @@ def _values(
         if digital is None:
             return None
         values, in_file = (
-            np.array([getattr(one, what) for one in digital.entries])
-            for what in ("value", "uncertainty")
+            np.array([getattr(entry, column) for entry in digital.entries])
+            for column in ("value", "uncertainty")
         )
         return values, in_file, digital.covariance
-    read = read_rows(settings, ["first", "second"], ["value"], [], place, references)
-    if read is None:
+    rows_read = read_rows(settings, ["first", "second"], ["value"], [], place, references)
+    if rows_read is None:
         return None
-    at = {names: k for k, names in enumerate(functions.names)}
+    index_by_names = {names: k for k, names in enumerate(functions.names)}
     values, in_file, before = none.copy(), none.copy(), len(problems.messages)
-    for row, uncertainty in zip(*read, strict=True):
-        k = at.get((row.texts[0], row.texts[1]))
+    for row, uncertainty in zip(*rows_read, strict=True):
+        k = index_by_names.get((row.texts[0], row.texts[1]))
         if k is None:
-            known = listing(", ".join(one) for one in functions.names)
-            text = f'no value "{", ".join(row.texts[:2])}"; known: {known}'
+            names_listed = listing(", ".join(entry) for entry in functions.names)
+            text = f'no value "{", ".join(row.texts[:2])}"; known: {names_listed}'
             problems.add_at(row.mark, place, text)
             continue
         if not np.isnan(values[k]):
@@ -309,42 +309,44 @@ def _stated(
     settings: PythonValuesSettings, functions: BallFunctions, steps: Steps, references: References
 ) -> Array | None:
     """Standard uncertainties (m,) of the item, NaN where one is wrong, None without any."""
-    stated, count = settings.standard_uncertainty, len(functions.names)
-    if stated is None:
+    texts_stated, count = settings.standard_uncertainty, len(functions.names)
+    if texts_stated is None:
         return None
     place = (*steps, "standard_uncertainty")
-    texts = (stated,) * count if isinstance(stated, str) else stated
+    texts = (texts_stated,) * count if isinstance(texts_stated, str) else texts_stated
     text = f"has {len(texts)} entries; the functions have {count} values"
     if not references.require(len(texts) == count, place, text):
         return np.full(count, np.nan)
-    found = _parsed(texts, functions.unit, place, references)
-    if not references.require(not (found < 0.0).any(), place, "is below zero; correct it"):
+    uncertainties = _parsed(texts, functions.unit, place, references)
+    if not references.require(not (uncertainties < 0.0).any(), place, "is below zero; correct it"):
         return np.full(count, np.nan)
-    return found
+    return uncertainties
 
 
 def _parsed(texts: tuple[str, ...], unit: Unit, steps: Steps, references: References) -> Array:
     """Quantities (m,), NaN where one is wrong, after saying so once."""
-    found = np.full(len(texts), np.nan)
+    values = np.full(len(texts), np.nan)
     for k, text in enumerate(texts):
         try:
-            found[k] = PARSERS[unit](text)
+            values[k] = PARSERS[unit](text)
         except QuantityError as error:
             references.problems.add(steps, str(error))
             break
-    return found
+    return values
 
 
 # In one piece: each check relies on those before it.
 def _check(name: str, functions: Any, drawn: Array) -> None:
     """Raise what is wrong with functions of balls, the first thing that is."""
     members = ("names", "unit", "values", "derivatives")
-    missing = [one for one in members if not hasattr(functions, one)]
+    missing = [member for member in members if not hasattr(functions, member)]
     if missing:
         text = f"what {name} returns, {type(functions).__name__}, has no {listing(missing)}"
         raise CustomModelError(f"{text}; add them")
     names = attempt(f"{name}: names has failed", lambda: tuple(map(tuple, functions.names)))
-    is_named = all(len(one) == 2 and all(isinstance(part, str) for part in one) for one in names)
+    is_named = all(
+        len(member) == 2 and all(isinstance(part, str) for part in member) for member in names
+    )
     if not names or not is_named or len(set(names)) < len(names):
         text = "names must be pairs of texts, one pair for each value, no two the same"
         raise CustomModelError(f"{name}: {text}")
@@ -353,16 +355,16 @@ def _check(name: str, functions: Any, drawn: Array) -> None:
     m, (n, d) = len(names), drawn.shape
     extent = float(np.ptp(drawn, axis=0).max()) or 1.0
 
-    def found(what: str, balls: Array, shape: tuple[int, ...]) -> Array:
-        given = np.asarray(
-            attempt(f"{name}: {what} has failed", lambda: getattr(functions, what)(balls.copy()))
+    def found(noun: str, balls: Array, shape: tuple[int, ...]) -> Array:
+        returned = np.asarray(
+            attempt(f"{name}: {noun} has failed", lambda: getattr(functions, noun)(balls.copy()))
         )
-        if given.shape != shape:
-            text = f"{what} returns the shape {given.shape}; {shape} is needed"
+        if returned.shape != shape:
+            text = f"{noun} returns the shape {returned.shape}; {shape} is needed"
             raise CustomModelError(f"{name}: {text}")
-        if given.dtype.kind not in "fiu" or not np.isfinite(given).all():
-            raise CustomModelError(f"{name}: {what} returns values that are not finite numbers")
-        return np.asarray(given, float)
+        if returned.dtype.kind not in "fiu" or not np.isfinite(returned).all():
+            raise CustomModelError(f"{name}: {noun} returns values that are not finite numbers")
+        return np.asarray(returned, float)
 
     found("values", drawn, (m,))
     generator = np.random.default_rng(np.random.SeedSequence(1))
@@ -376,16 +378,17 @@ def _check(name: str, functions: Any, drawn: Array) -> None:
             off = np.abs(change / (2.0 * STEP * extent) - np.tensordot(slope, way, axes=2))
             wrong = np.flatnonzero(off > DERIVATIVE * np.maximum(size, 1e-300) * np.sqrt(n * d))
             if len(wrong):
-                told = ", ".join(names[int(wrong[0])])
-                text = f'derivatives is not the derivative of values for "{told}"'
+                names_listed = ", ".join(names[int(wrong[0])])
+                text = f'derivatives is not the derivative of values for "{names_listed}"'
                 raise CustomModelError(f"{name}: {text}")
         for motion in _motions(balls):
             moved = np.abs(np.tensordot(slope, motion, axes=2))
             wrong = np.flatnonzero(moved > OF_FRAME * size * np.sqrt(n))
             if len(wrong):
-                told = ", ".join(names[int(wrong[0])])
+                names_listed = ", ".join(names[int(wrong[0])])
                 text = (
-                    f'"{told}" depends on where the frame of the artefact is; only functions of'
+                    f'"{names_listed}" depends on where the frame of the artefact is; only'
+                    " functions of"
                     " distances and angles are possible, co-ordinates have kind: coordinates"
                 )
                 raise CustomModelError(f"{name}: {text}")

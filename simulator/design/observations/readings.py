@@ -54,10 +54,10 @@ def seen_places(design: Design, readings: Readings, x: Array) -> Array:
     """Where scale readings x (m, d) were made on a machine without errors (m, d), influence
     quantities at their stated values.
     """
-    seen = x + design.probes.offsets[readings.probe]
+    places_seen = x + design.probes.offsets[readings.probe]
     if design.influences:
-        seen = seen - influence_shifts(design, nominal_state(design), readings, x)[0]
-    return np.asarray(seen)
+        places_seen = places_seen - influence_shifts(design, nominal_state(design), readings, x)[0]
+    return np.asarray(places_seen)
 
 
 def offset_sensitivity(model: ErrorModel, x: Array, a: Array, p: Array) -> Array:

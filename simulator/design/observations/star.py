@@ -92,8 +92,8 @@ def _moves(star: Star) -> Array:
 
 def _free(star: Star) -> Array:
     """Orthonormal directions (l d, k) in which its tips move as one body."""
-    left, sizes, _ = np.linalg.svd(_moves(star), full_matrices=False)
-    return np.asarray(left[:, sizes > IN_LINE * sizes.max(initial=0.0)])
+    decomposition, sizes, _ = np.linalg.svd(_moves(star), full_matrices=False)
+    return np.asarray(decomposition[:, sizes > IN_LINE * sizes.max(initial=0.0)])
 
 
 def _in_line(star: Star) -> bool:
@@ -108,14 +108,14 @@ def _shape(star: Star) -> tuple[Array, Integers]:
     """
     free = _free(star)
     across = np.eye(len(free)) - free @ free.T
-    left, chosen = across.copy(), []
+    remainder, chosen = across.copy(), []
     for _ in range(len(free) - free.shape[1]):
-        size = (left**2).sum(axis=0)
+        size = (remainder**2).sum(axis=0)
         # Of those that are as large but for rounding, the first.
         k = int(np.flatnonzero(size > size.max() * (1.0 - 1e-6))[0])
         chosen.append(k)
-        direction = left[:, k] / np.sqrt(size[k])
-        left = left - np.outer(direction, direction @ left)
+        direction = remainder[:, k] / np.sqrt(size[k])
+        remainder = remainder - np.outer(direction, direction @ remainder)
     places = np.sort(np.array(chosen, np.int64))
     u, _, vh = np.linalg.svd(across[:, places], full_matrices=False)
     return np.asarray(u @ vh), places
@@ -142,27 +142,27 @@ class Stars(Observations):
     def rows(self, design: Design, state: State, x: Array | None) -> Rows:
         columns = design.once(shared_layout).offset_columns
         by_shared = np.zeros((len(self), len(design.once(shared_layout)) + 1))
-        at = 0
+        row = 0
         for star, probes, basis in zip(self.stars, self.probes, self.bases, strict=True):
             turn = star.rotation(state.probes[probes])
             slopes = np.einsum("ldm,ed->mle", basis.reshape(*star.coordinates.shape, -1), turn)
             # What is held goes to the extra column.
-            by_shared[at : at + basis.shape[1], columns[probes].ravel()] = slopes.reshape(
+            by_shared[row : row + basis.shape[1], columns[probes].ravel()] = slopes.reshape(
                 basis.shape[1], -1
             )
-            at += basis.shape[1]
+            row += basis.shape[1]
         by_shared = by_shared[:, :-1] / self.uncertainty[:, None]
         residual = (self.values(state.probes) - self.value) / self.uncertainty
         return Rows(residual, by_shared, np.zeros((len(self), 0, design.dimension)))
 
     def values(self, offsets: Array) -> Array:
         """Values (..., m) with offsets (..., probes, d), turned back into the stars' frames."""
-        found = []
+        departures = []
         for star, probes, basis in zip(self.stars, self.probes, self.bases, strict=True):
-            own = offsets[..., probes, :]
-            turned = own @ star.rotation(own)
-            found.append(turned.reshape(*turned.shape[:-2], -1) @ basis)
-        return np.concatenate(found, axis=-1)
+            star_offsets = offsets[..., probes, :]
+            turned = star_offsets @ star.rotation(star_offsets)
+            departures.append(turned.reshape(*turned.shape[:-2], -1) @ basis)
+        return np.concatenate(departures, axis=-1)
 
     def true_values(self, design: Design, truth: State, model: ErrorModel) -> Array:
         return self.values(truth.probes)
@@ -187,13 +187,13 @@ class Stars(Observations):
         forces = np.zeros(offsets.shape)
         first = 0
         for star, probes, basis in zip(self.stars, self.probes, self.bases, strict=True):
-            own = slice(first, first + basis.shape[1])
-            pull = (residual[:, own] / self.uncertainty[own]) @ basis.T
+            star_columns = slice(first, first + basis.shape[1])
+            pull = (residual[:, star_columns] / self.uncertainty[star_columns]) @ basis.T
             turned = pull.reshape(len(pull), *star.coordinates.shape) @ star.rotation(
                 offsets[:, probes]
             ).swapaxes(-1, -2)
             forces[:, probes] += turned
-            first = own.stop
+            first = star_columns.stop
         probe, axis = np.nonzero(at.offsets >= 0)
         at.by_shared[:, at.offsets[probe, axis]] += forces[:, probe, axis]
 
@@ -229,13 +229,13 @@ def _turned(star: Star, probes: Integers, design: Design, x: Array) -> Array:
     _, place, count = np.unique(key, return_inverse=True, return_counts=True)
     # Every ball in every position has a place of its own, whatever it is read with: tip and scale
     # reading together.
-    seen = np.zeros((len(count), len(probes)))
+    counts = np.zeros((len(count), len(probes)))
     total = np.zeros((len(count), len(probes), x.shape[1]))
-    np.add.at(seen, (place, tip), 1.0)
+    np.add.at(counts, (place, tip), 1.0)
     np.add.at(total, (place, tip), x[rows])
-    times = seen.sum(axis=1)
-    weights = np.diag(seen.sum(axis=0)) - seen.T @ (seen / times[:, None])
-    sides = -(total.sum(axis=0) - seen.T @ (total.sum(axis=1) / times[:, None]))
+    times = counts.sum(axis=1)
+    weights = np.diag(counts.sum(axis=0)) - counts.T @ (counts / times[:, None])
+    sides = -(total.sum(axis=0) - counts.T @ (total.sum(axis=1) / times[:, None]))
     if np.linalg.matrix_rank(weights, hermitian=True) < len(probes) - 1:
         return drawn
     offsets = np.linalg.lstsq(weights, sides, rcond=1e-9)[0]
@@ -243,7 +243,7 @@ def _turned(star: Star, probes: Integers, design: Design, x: Array) -> Array:
     turn = alone.rotation(offsets)
     if star.has_place:
         return np.asarray(star.coordinates @ turn.T)
-    held = np.flatnonzero(~design.probes.free[probes].any(axis=1))
+    held_probes = np.flatnonzero(~design.probes.free[probes].any(axis=1))
     turned = star.coordinates @ turn.T
-    of = held if len(held) else np.arange(len(probes))
-    return np.asarray(turned + (drawn[of] - turned[of]).mean(axis=0))
+    reference_probes = held_probes if len(held_probes) else np.arange(len(probes))
+    return np.asarray(turned + (drawn[reference_probes] - turned[reference_probes]).mean(axis=0))

@@ -107,8 +107,8 @@ def uncertainties_of(
     settings: Any,
     names: Sequence[tuple[str, str]],
     is_pair: bool,
-    stated: Array | None,
-    found: Array,
+    stated_uncertainty: Array | None,
+    uncertainties_read: Array,
     covariance: tuple[Array, Array] | None,
     steps: Steps,
     references: References,
@@ -116,40 +116,51 @@ def uncertainties_of(
     """Uncertainties of values with `names`: those `stated` (m,) with the item, or those `found`
     (m,) in its file, and those of a covariance; None after saying what is wrong.
     """
-    problems, own = references.problems, (*steps, "standard_uncertainty")
-    in_file = not np.isnan(found).any()
+    problems, own_uncertainty = references.problems, (*steps, "standard_uncertainty")
+    in_file = not np.isnan(uncertainties_read).any()
     matrix = covariance
     if settings.covariance is not None:
         matrix = _of_file(
-            settings, names, is_pair, stated if stated is not None else found, steps, references
+            settings,
+            names,
+            is_pair,
+            stated_uncertainty if stated_uncertainty is not None else uncertainties_read,
+            steps,
+            references,
         )
         if matrix is None:
             return None
     is_correlation = settings.covariance is not None and len(matrix or ()) == 3
     states = in_file or (matrix is not None and not is_correlation)
-    if stated is not None and states:
+    if stated_uncertainty is not None and states:
         where = settings.values if in_file or not settings.covariance else settings.covariance
-        problems.add(own, f"{where} states uncertainties; remove one of the two", of_key=True)
+        problems.add(
+            own_uncertainty, f"{where} states uncertainties; remove one of the two", of_key=True
+        )
         return None
-    of_values = np.diag(matrix[0]) if states and matrix is not None else found
+    of_values = np.diag(matrix[0]) if states and matrix is not None else uncertainties_read
     without = np.flatnonzero(np.isnan(of_values))
     if 0 < len(without) < len(of_values):
-        told = listing(value_name(names[k], is_pair) for k in without.tolist())
-        text = f"states no uncertainty of {told}, and of others it does; leave these out"
+        names_listed = listing(value_name(names[k], is_pair) for k in without.tolist())
+        text = f"states no uncertainty of {names_listed}, and of others it does; leave these out"
         problems.add((*steps, "values"), text)
         return None
-    if stated is None and not states:
+    if stated_uncertainty is None and not states:
         text = 'missing; add "standard_uncertainty", or values with their uncertainties'
-        problems.add(own, text)
+        problems.add(own_uncertainty, text)
         return None
     if matrix is None:
-        return Uncertainties(_frozen(found if stated is None else stated))
+        return Uncertainties(
+            _frozen(uncertainties_read if stated_uncertainty is None else stated_uncertainty)
+        )
     place = (*steps, "covariance") if settings.covariance is not None else (*steps, "values")
     size = np.sqrt(np.diag(matrix[0]))
     if in_file and not is_correlation:
-        wrong = np.flatnonzero(np.abs(size - found) > AGREE * np.maximum(size, found) + 1e-12)
+        wrong = np.flatnonzero(
+            np.abs(size - uncertainties_read) > AGREE * np.maximum(size, uncertainties_read) + 1e-12
+        )
         if len(wrong):
-            problems.add(place, _disagreement(names, is_pair, size, found, wrong))
+            problems.add(place, _disagreement(names, is_pair, size, uncertainties_read, wrong))
             return None
     if len(size) > MOST_JOINT_VALUES:
         problems.add(
@@ -168,14 +179,18 @@ def uncertainties_of(
 
 
 def _disagreement(
-    names: Sequence[tuple[str, str]], is_pair: bool, size: Array, found: Array, wrong: Integers
+    names: Sequence[tuple[str, str]],
+    is_pair: bool,
+    size: Array,
+    uncertainties_read: Array,
+    wrong: Integers,
 ) -> str:
     k = int(wrong[0])
     text = (
         f"the covariance has the standard uncertainty {1e6 * size[k]:.4g} µm for"
-        f" {value_name(names[k], is_pair)}, beside it stands {1e6 * found[k]:.4g} µm"
+        f" {value_name(names[k], is_pair)}, beside it stands {1e6 * uncertainties_read[k]:.4g} µm"
     )
-    ratio = size[wrong] / np.maximum(found[wrong], 1e-300)
+    ratio = size[wrong] / np.maximum(uncertainties_read[wrong], 1e-300)
     if len(wrong) == len(size) and np.ptp(ratio) < 0.05 * ratio.mean() and ratio.mean() < 10.0:
         text += (
             f", always {ratio.mean():.3g} times; is one of the two expanded? State standard"
@@ -208,25 +223,28 @@ def _of_file(
     for k, (first, second) in enumerate(names):
         index[f"{first} {second}"] = k
         index[f"{second} {first}"] = k
-    at = np.full(len(names), -1)
+    entry_of_name = np.full(len(names), -1)
     messages: list[Message] = []
     for i, name in enumerate(matrix.names):
-        known = index.get(" ".join(name.split()))
-        if known is None:
+        position_in_names = index.get(" ".join(name.split()))
+        if position_in_names is None:
             text = f'"{shorten(name)}" names no value of this item; {hint(name, index)}'
             messages.append(matrix.marks[i].message("", text))
-        elif at[known] >= 0:
+        elif entry_of_name[position_in_names] >= 0:
             messages.append(matrix.marks[i].message("", f'"{shorten(name)}" stands there twice'))
         else:
-            at[known] = i
-    missing = [value_name(names[k], is_pair) for k in np.flatnonzero(at < 0).tolist()]
+            entry_of_name[position_in_names] = i
+    missing = [value_name(names[k], is_pair) for k in np.flatnonzero(entry_of_name < 0).tolist()]
     if missing and not messages:
         problems.add(place, f"no covariance of {listing(missing)}; add it")
         return None
     if messages:
         problems.take(ExperimentError(messages), place)
         return None
-    values, rounding = matrix.values[np.ix_(at, at)], matrix.rounding[np.ix_(at, at)]
+    values, rounding = (
+        matrix.values[np.ix_(entry_of_name, entry_of_name)],
+        matrix.rounding[np.ix_(entry_of_name, entry_of_name)],
+    )
     if not matrix.is_correlation:
         return values, rounding
     scale = np.outer(standard, standard)
@@ -238,9 +256,9 @@ def _of_file(
 
 
 def _frozen(values: Array) -> Array:
-    found = np.array(values, float)
-    found.setflags(write=False)
-    return found
+    frozen = np.array(values, float)
+    frozen.setflags(write=False)
+    return frozen
 
 
 def read_digital(
@@ -253,10 +271,10 @@ def read_digital(
     """The wanted values in a digital calibration certificate, which an extension reads; None after
     saying what is wrong.
     """
-    read = optional_service("read_digital")
-    if read is None:
+    reader = optional_service("read_digital")
+    if reader is None:
         text = "digital certificates need the extension certificates, which is not installed"
         references.problems.add((*steps, "values"), text)
         return None
-    found: FileValues | None = read(settings, wanted, is_pair, steps, references)
-    return found
+    file_values: FileValues | None = reader(settings, wanted, is_pair, steps, references)
+    return file_values

@@ -51,7 +51,7 @@ def _along(values: Array, rows: Array) -> Array:
     return values.reshape(-1, *[1] * (rows.ndim - 1))
 
 
-def whitening(own: Array, shared: Array, group: Integers) -> Whitening:
+def whitening(own_uncertainty: Array, shared: Array, group: Integers) -> Whitening:
     """From standard uncertainties (m,) of each row's own error and of the error that it shares with
     its group.
 
@@ -64,9 +64,9 @@ def whitening(own: Array, shared: Array, group: Integers) -> Whitening:
     array([[25., 16.],
            [16., 25.]])
     """
-    alone = (np.bincount(group, minlength=1)[group] == 1) | (own == 0.0)
-    total = np.where(alone, np.hypot(own, shared), own)
-    ratio = np.where(alone, 0.0, shared / np.where(alone, 1.0, own))
+    alone = (np.bincount(group, minlength=1)[group] == 1) | (own_uncertainty == 0.0)
+    total = np.where(alone, np.hypot(own_uncertainty, shared), own_uncertainty)
+    ratio = np.where(alone, 0.0, shared / np.where(alone, 1.0, own_uncertainty))
     square = np.bincount(group, ratio**2)[group] if len(group) else ratio
     # (1 - 1 / sqrt(1 + q)) / q without the difference.
     root = np.sqrt(1.0 + square)
@@ -147,17 +147,17 @@ def covariance_root(covariance: Array, rounding: Array | float = 0.0) -> Covaria
     """
     size = np.sqrt(np.diag(covariance))
     exact = size <= EXACT
-    own = np.where(exact, EXACT, size)
+    variances = np.where(exact, EXACT, size)
     inner = ~exact
-    vectors, deviations = np.eye(len(own)), np.ones(len(own))
+    vectors, deviations = np.eye(len(variances)), np.ones(len(variances))
     if inner.any():
-        scale = np.outer(own[inner], own[inner])
+        scale = np.outer(variances[inner], variances[inner])
         correlation = covariance[np.ix_(inner, inner)] / scale
-        values, found = np.linalg.eigh((correlation + correlation.T) / 2.0)
+        values, decomposition = np.linalg.eigh((correlation + correlation.T) / 2.0)
         share = np.broadcast_to(rounding, covariance.shape)[np.ix_(inner, inner)] / scale
         floor = max(SINGULAR, float(np.sqrt((share**2).sum())))
         if values[0] < -floor * len(values):
             raise IndefiniteError(float(values[0] / values[-1]))
-        vectors[np.ix_(inner, inner)] = found
+        vectors[np.ix_(inner, inner)] = decomposition
         deviations[inner] = np.sqrt(np.maximum(values, floor))
-    return CovarianceRoot(own, vectors, deviations)
+    return CovarianceRoot(variances, vectors, deviations)
