@@ -143,7 +143,9 @@ def reference(design: Design, truth: Truth) -> Reference:
         )
     )
     held_spectrum = drawn.spectrum if drawn.deficiency else None
-    solution = gauss_newton(observed, exact, initial_state(observed, exact), held_spectrum=held_spectrum)
+    solution = gauss_newton(
+        observed, exact, initial_state(observed, exact), held_spectrum=held_spectrum
+    )
     if solution.status != "converged":
         raise DivergedError(f"the estimate from its readings without noise has {solution.status}")
     start, plates = solution.state, observed.plate_readings

@@ -289,7 +289,9 @@ def influence_shifts(
             user_frame = own_frame(error) or next(
                 (f for f in frames[::-1] if f.name == "shifts"), None
             )
-            text = f"shifts of {type(influence).__name__} has failed: {error_text(error, user_frame)}"
+            text = (
+                f"shifts of {type(influence).__name__} has failed: {error_text(error, user_frame)}"
+            )
             raise UnusableError(text) from error
         shift += shifts
         varies = np.array(

@@ -106,7 +106,7 @@ class Bootstrap(Result):
 
     def _ratios(self) -> Array:
         """Standard deviations (m,) in the linear ones; NaN where these are rounding."""
-        units = np.array([one.unit for one in self.functions])
+        units = np.array([function.unit for function in self.functions])
         u = np.nan_to_num(self.uncertainties)
         largest = np.array([u[units == unit].max() for unit in units])
         return np.asarray(self.standard_deviations / np.where(u > EXACT * largest, u, np.nan))
@@ -119,12 +119,12 @@ class Bootstrap(Result):
 
     def headline(self) -> str:
         failed = f", {len(self.failed)} not converged" if self.failed else ""
-        known = self._ratios()[np.isfinite(self._ratios())]
-        if not len(known):
+        finite_ratios = self._ratios()[np.isfinite(self._ratios())]
+        if not len(finite_ratios):
             return f"{self.trials} data sets{failed}"
         return (
-            f"{self.trials} data sets{failed}, standard deviations {known.min():.3g} to"
-            f" {known.max():.3g} times the linear ones"
+            f"{self.trials} data sets{failed}, standard deviations {finite_ratios.min():.3g} to"
+            f" {finite_ratios.max():.3g} times the linear ones"
         )
 
     def lines(self) -> list[str]:
@@ -154,12 +154,12 @@ class Bootstrap(Result):
         if DIFFERS * self.ratio_error > TOO_FEW:
             return [*lines, "so few data sets tell nothing of standard deviations; try a hundred"]
         differing = self.differing
-        told = f"within {100 * DIFFERS * self.ratio_error:.2g} % of the linear ones"
+        comparison = f"within {100 * DIFFERS * self.ratio_error:.2g} % of the linear ones"
         if not differing:
-            return [*lines, f"all standard deviations are {told}"]
+            return [*lines, f"all standard deviations are {comparison}"]
         names = ", ".join(differing[:5]) + (", …" if len(differing) > 5 else "")
         count = len(differing)
-        return [*lines, f"{count} standard deviations are not {told}: {names}"]
+        return [*lines, f"{count} standard deviations are not {comparison}: {names}"]
 
     def data(self) -> dict[str, Any]:
         return {
@@ -211,19 +211,22 @@ def replicated(
     noise = design.noise.draw(generator, x.shape, readings.position, 0)
     x = x + sigma * noise * reading_noise(design, readings)
     drawn = [
-        one.given(
-            value=one.true_values(design, truth, design.model) + sigma * one.errors(generator, 1)[0]
+        observation.given(
+            value=observation.true_values(design, truth, design.model)
+            + sigma * observation.errors(generator, 1)[0]
         )
-        for one in design.observations
+        for observation in design.observations
     ]
-    given = design.observed(*drawn)
-    solution = estimate(given, x)
+    drawn_design = design.observed(*drawn)
+    solution = estimate(drawn_design, x)
     if solution.status != "converged":
         return Replicate(solution.status, np.zeros(0), float("nan"))
-    at = linearised_fit(given, solution)
-    freedom = at.degrees_of_freedom
-    left = solution.factor.sum_of_squares / max(freedom, 1)
-    return Replicate("converged", estimated_functions(at, monomials).values, float(np.sqrt(left)))
+    linearisation = linearised_fit(drawn_design, solution)
+    freedom = linearisation.degrees_of_freedom
+    variance = solution.factor.sum_of_squares / max(freedom, 1)
+    return Replicate(
+        "converged", estimated_functions(linearisation, monomials).values, float(np.sqrt(variance))
+    )
 
 
 def _task(
@@ -252,39 +255,41 @@ def bootstrap(
 
     :raises ValueError: the errors are so large that there are no readings of them.
     """
-    at = functions.at
-    design = at.design
-    own = [one.name for one in functions.functions if one.kind == "machine"]
-    monomials = own != [parameter.name for parameter in design.model.parameters]
-    truth = replace(at.state, lengths=design.unknown_lengths.drawn)
+    linearisation = functions.at
+    design = linearisation.design
+    names = [item.name for item in functions.functions if item.kind == "machine"]
+    monomials = names != [parameter.name for parameter in design.model.parameters]
+    truth = replace(linearisation.state, lengths=design.unknown_lengths.drawn)
     true = functions.values.copy()
-    of_lengths = [k for k, one in enumerate(functions.functions) if one.kind == "length"]
+    of_lengths = [k for k, item in enumerate(functions.functions) if item.kind == "length"]
     true[of_lengths] = design.unknown_lengths.drawn
     tasks = (
         (design, truth, sigma, monomials, seed, first, min(first + AT_ONCE, trials))
         for first in range(0, trials, AT_ONCE)
     )
-    found: list[Replicate] = []
+    replicates: list[Replicate] = []
     try:
         for some in in_processes(_task, tasks, workers):
-            found += some
-            report(ProgressStep(f"data sets of {label}", len(found), trials))
+            replicates += some
+            report(ProgressStep(f"data sets of {label}", len(replicates), trials))
     except NoReadingError as error:
         raise ValueError(str(error)) from None
-    kept = [one for one in found if one.status == "converged"]
+    converged = [item for item in replicates if item.status == "converged"]
     uncertainties = sigma * functions.uncertainties()
     is_open = np.isnan(uncertainties)
-    values = np.array([one.values for one in kept]).reshape(len(kept), len(true))
+    values = np.array([item.values for item in converged]).reshape(len(converged), len(true))
     return Bootstrap(
         label,
         title,
         trials,
         seed,
-        tuple((k, one.status) for k, one in enumerate(found) if one.status != "converged"),
+        tuple((k, item.status) for k, item in enumerate(replicates) if item.status != "converged"),
         functions.functions,
         np.where(is_open, np.nan, functions.values),
         uncertainties,
         np.where(is_open, np.nan, values - true),
-        np.array([one.sigma for one in kept]) / sigma if sigma > 0.0 else np.ones(len(kept)),
+        np.array([item.sigma for item in converged]) / sigma
+        if sigma > 0.0
+        else np.ones(len(converged)),
         sigma_is_estimated,
     )

@@ -73,32 +73,32 @@ class UncertaintyBudget(Result):
         return f"{self.sources[0]} {_share(chosen, 0)} of the variance of {chosen.name}"
 
     def lines(self) -> list[str]:
-        of = "the fit" if self.of_fit else "the design, at zero machine error"
+        subject = "the fit" if self.of_fit else "the design, at zero machine error"
         chosen = _ranking(self.figures)
         order = f"; sources by their part of {chosen.name}, the largest first" if chosen else ""
-        lines = [self.heading, f"uncertainty budget of {of}{order}", ""]
+        lines = [self.heading, f"uncertainty budget of {subject}{order}", ""]
         for start in range(0, len(self.figures), SIDE_BY_SIDE):
             lines += [*self._table(self.figures[start : start + SIDE_BY_SIDE]), ""]
-        lines += [f"{one.name}: {_words(one)}" for one in self.figures]
+        lines += [f"{figure.name}: {_words(figure)}" for figure in self.figures]
         return lines
 
     def _table(self, figures: Sequence[BudgetFigure]) -> list[str]:
-        rows = [["standard uncertainty, µm", *(one.name for one in figures)]]
+        rows = [["standard uncertainty, µm", *(figure.name for figure in figures)]]
         for k, source in enumerate(self.sources):
-            rows.append([source, *(_cell(one, k) for one in figures)])
-        rows.append(["together, in squares", *(_micrometres(one, 1.0) for one in figures)])
+            rows.append([source, *(_cell(figure, k) for figure in figures)])
+        rows.append(["together, in squares", *(_micrometres(figure, 1.0) for figure in figures)])
         expanded = f"expanded, k = {self.coverage_factor:g}"
-        rows.append([expanded, *(_micrometres(one, self.coverage_factor) for one in figures)])
+        rows.append([expanded, *(_micrometres(figure, self.coverage_factor) for figure in figures)])
         return aligned(rows, [False, *[True] * len(figures)])
 
     def columns(self) -> tuple[Columns, Sequence[Any]]:
         """One row for each source and figure."""
         count = len(self.sources)
-        pairs = [(one, k) for one in self.figures for k in range(count)]
+        pairs = [(figure, k) for figure in self.figures for k in range(count)]
         columns = {
-            "figure": [one.name for one, _ in pairs],
+            "figure": [figure.name for figure, _ in pairs],
             "source": list(self.sources) * len(self.figures),
-            "standard uncertainty, µm": [one.contributions[k] for one, k in pairs],
+            "standard uncertainty, µm": [figure.contributions[k] for figure, k in pairs],
             "share of variance": [_ratio(*pair) for pair in pairs],
             "unit": ["m"] * len(pairs),
         }
@@ -111,21 +111,21 @@ class UncertaintyBudget(Result):
             **picked(self, "sigma", "coverage_factor"),
             "figures": [
                 {
-                    "figure": one.name,
-                    **picked(one, "description", "standard_uncertainty"),
-                    "expanded_uncertainty": self.coverage_factor * one.standard_uncertainty,
+                    "figure": figure.name,
+                    **picked(figure, "description", "standard_uncertainty"),
+                    "expanded_uncertainty": self.coverage_factor * figure.standard_uncertainty,
                     "unit": "m",
-                    **picked(one, "count", "undetermined"),
+                    **picked(figure, "count", "undetermined"),
                     "contributions": [
                         {
                             "source": source,
-                            "standard_uncertainty": one.contributions[k],
-                            "share_of_variance": _ratio(one, k),
+                            "standard_uncertainty": figure.contributions[k],
+                            "share_of_variance": _ratio(figure, k),
                         }
                         for k, source in enumerate(self.sources)
                     ],
                 }
-                for one in self.figures
+                for figure in self.figures
             ],
             "warnings": self.warnings,
         }
@@ -135,33 +135,34 @@ class UncertaintyBudget(Result):
         return (self.caution,) if self.caution else ()
 
 
-def _ratio(one: BudgetFigure, k: int) -> float:
+def _ratio(figure: BudgetFigure, k: int) -> float:
     """The share of a source in the variance; NaN where there is none."""
-    if not one.standard_uncertainty > 0.0:
+    if not figure.standard_uncertainty > 0.0:
         return float("nan")
-    return (one.contributions[k] / one.standard_uncertainty) ** 2
+    return (figure.contributions[k] / figure.standard_uncertainty) ** 2
 
 
-def _share(one: BudgetFigure, k: int) -> str:
-    percentage = 100.0 * _ratio(one, k)
+def _share(figure: BudgetFigure, k: int) -> str:
+    percentage = 100.0 * _ratio(figure, k)
     return f"{percentage:.0f} %" if percentage >= 0.95 else f"{percentage:.1g} %"
 
 
-def _cell(one: BudgetFigure, k: int) -> str:
-    if not one.standard_uncertainty > 0.0:
-        return "undetermined" if np.isnan(one.standard_uncertainty) else "0"
-    return f"{number(1e6 * one.contributions[k], 3)} ({_share(one, k)})"
+def _cell(figure: BudgetFigure, k: int) -> str:
+    if not figure.standard_uncertainty > 0.0:
+        return "undetermined" if np.isnan(figure.standard_uncertainty) else "0"
+    return f"{number(1e6 * figure.contributions[k], 3)} ({_share(figure, k)})"
 
 
-def _micrometres(one: BudgetFigure, factor: float) -> str:
-    u = factor * one.standard_uncertainty
+def _micrometres(figure: BudgetFigure, factor: float) -> str:
+    u = factor * figure.standard_uncertainty
     return "undetermined" if np.isnan(u) else number(1e6 * u)
 
 
-def _words(one: BudgetFigure) -> str:
-    if not one.undetermined or one.count == one.undetermined:
-        return one.description
-    return f"{one.description}; {one.undetermined} of {one.count} are undetermined and left out"
+def _words(figure: BudgetFigure) -> str:
+    if not figure.undetermined or figure.count == figure.undetermined:
+        return figure.description
+    undetermined = f"{figure.undetermined} of {figure.count} are undetermined and left out"
+    return f"{figure.description}; {undetermined}"
 
 
 @single_threaded
@@ -174,18 +175,20 @@ def budget(
 
     :raises ValueError: the fit has not converged.
     """
-    at, x = (
+    linearisation_and_x, x = (
         (linearise(lay_out(experiment)), None)
         if fit is None
         else (fit.functions.at, fit.observed.x)
     )
     sigma = 1.0 if fit is None else fit.sigma
-    sums = source_sums(at, x, sources_of(at.design, experiment, by))
+    sums = source_sums(
+        linearisation_and_x, x, sources_of(linearisation_and_x.design, experiment, by)
+    )
     caution = ""
     if fit is not None and fit.sigma_is_estimated:
         remedy = "--sigma given takes the uncertainties as stated"
         caution = few_degrees_of_freedom(fit.degrees_of_freedom, "sigma", remedy)
-    names, figures = _largest_first(sums.names, tuple(_figures(at, sums, sigma)))
+    names, figures = _largest_first(sums.names, tuple(_figures(linearisation_and_x, sums, sigma)))
     return UncertaintyBudget(
         experiment.label,
         experiment.title,
@@ -202,8 +205,10 @@ def _ranking(figures: Sequence[BudgetFigure]) -> BudgetFigure | None:
     """The figure that sources are ranked by: U6 or, where it is undetermined, the first that is
     not.
     """
-    known = [one for one in figures if one.standard_uncertainty > 0.0]
-    return next((one for one in known if one.name == "U6"), known[0] if known else None)
+    positive = [figure for figure in figures if figure.standard_uncertainty > 0.0]
+    return next(
+        (figure for figure in positive if figure.name == "U6"), positive[0] if positive else None
+    )
 
 
 def _largest_first(
@@ -217,16 +222,19 @@ def _largest_first(
         return sources, figures
     order = np.argsort(-comparable(chosen.contributions), kind="stable").tolist()
     ordered = (
-        replace(one, contributions=tuple(one.contributions[k] for k in order)) for one in figures
+        replace(figure, contributions=tuple(figure.contributions[k] for k in order))
+        for figure in figures
     )
     return tuple(sources[k] for k in order), tuple(ordered)
 
 
-def _figures(at: Linearisation, sums: SourceSums, sigma: float) -> Iterator[BudgetFigure]:
-    design, places = at.design, evaluation_points(at.design)
-    every = [linear_functions(at, Coordinates(places))]
+def _figures(
+    linearisation: Linearisation, sums: SourceSums, sigma: float
+) -> Iterator[BudgetFigure]:
+    design, places = linearisation.design, evaluation_points(linearisation.design)
+    every = [linear_functions(linearisation, Coordinates(places))]
     words = "error function at the evaluation points, root mean square of its co-ordinates"
-    yield _mean_square("U4", words, at, sums, every, sigma)
+    yield _mean_square("U4", words, linearisation, sums, every, sigma)
     count = len(places.points)
     some = np.unique(np.linspace(0, count - 1, min(count, MOST_PLACES)).round().astype(int))
     if len(some) > 1:
@@ -234,7 +242,9 @@ def _figures(at: Linearisation, sums: SourceSums, sigma: float) -> Iterator[Budg
         words = "distances between corrected points, root mean square"
         if len(some) < count:
             words += f"; between {len(some)} of the {count} evaluation points"
-        yield _mean_square("U6", words, at, sums, _distances(at, chosen), sigma)
+        yield _mean_square(
+            "U6", words, linearisation, sums, _distances(linearisation, chosen), sigma
+        )
     starts, ends = design.machine.volume.diagonals
     names = tuple(f"diagonal {k + 1}" for k in range(len(starts)))
     points = np.stack([starts, ends], axis=1).reshape(-1, design.dimension)
@@ -243,50 +253,65 @@ def _figures(at: Linearisation, sums: SourceSums, sigma: float) -> Iterator[Budg
     diagonals = Distances(MeasuredPoints(points, probes), pairs, names)
     words = "length of the body diagonal" if design.dimension == 3 else "length of the diagonal"
     tasks = [(task_distances(design), "length of the measuring task")] if design.tasks.names else []
-    for given, what in [(diagonals, words), *tasks]:
-        told = [f"{what} {_ends(given, k)}" for k in range(len(given.names))]
-        yield from _each(given.names, told, at, sums, linear_functions(at, given), sigma)
+    for distances, description in [(diagonals, words), *tasks]:
+        descriptions = [f"{description} {_ends(distances, k)}" for k in range(len(distances.names))]
+        yield from _each(
+            distances.names,
+            descriptions,
+            linearisation,
+            sums,
+            linear_functions(linearisation, distances),
+            sigma,
+        )
 
 
-def _ends(given: Distances, k: int) -> str:
-    assert given.pairs is not None and isinstance(given.places, MeasuredPoints)
-    ends = 1e3 * given.places.points[given.pairs[k]] + 0.0
-    return "from {} to {} mm".format(*(f"({', '.join(f'{v:.6g}' for v in one)})" for one in ends))
+def _ends(distances: Distances, k: int) -> str:
+    assert distances.pairs is not None and isinstance(distances.places, MeasuredPoints)
+    ends = 1e3 * distances.places.points[distances.pairs[k]] + 0.0
+    return "from {} to {} mm".format(*(f"({', '.join(f'{v:.6g}' for v in end)})" for end in ends))
 
 
-def _distances(at: Linearisation, places: MeasuredPoints) -> Iterator[LinearFunctions]:
+def _distances(linearisation: Linearisation, places: MeasuredPoints) -> Iterator[LinearFunctions]:
     """Distances between all places that are apart, those from one place at a time."""
-    found = linear_functions(at, Coordinates(places))
-    as_drawn = found.drawn or found
-    now, drawn = places.at(at.design, at.state), places.at(at.design, at.as_drawn.state)
+    functions_of_places = linear_functions(linearisation, Coordinates(places))
+    as_drawn = functions_of_places.drawn or functions_of_places
+    now, drawn = (
+        places.at(linearisation.design, linearisation.state),
+        places.at(linearisation.design, linearisation.as_drawn.state),
+    )
     n, d = now.shape
-    rows, of_drawn = found.shared.reshape(n, d, -1), as_drawn.shared.reshape(n, d, -1)
+    rows, of_drawn = functions_of_places.shared.reshape(n, d, -1), as_drawn.shared.reshape(n, d, -1)
 
-    def along(where: Array, derivatives: Array, k: int, others: Integers) -> Array:
-        unit = where[others] - where[k]
+    def along(where: Array, derivatives: Array, k: int, later: Integers) -> Array:
+        unit = where[later] - where[k]
         unit /= np.linalg.norm(unit, axis=1)[:, None]
-        return np.asarray(np.einsum("md,mds->ms", unit, derivatives[others] - derivatives[k]))
+        return np.asarray(np.einsum("md,mds->ms", unit, derivatives[later] - derivatives[k]))
 
     for k in range(n - 1):
-        others = k + 1 + np.flatnonzero((drawn[k + 1 :] != drawn[k]).any(axis=1))
-        of_pairs = LinearFunctions(along(drawn, of_drawn, k, others))
-        yield LinearFunctions(along(now, rows, k, others), drawn=of_pairs)
+        later = k + 1 + np.flatnonzero((drawn[k + 1 :] != drawn[k]).any(axis=1))
+        of_pairs = LinearFunctions(along(drawn, of_drawn, k, later))
+        yield LinearFunctions(along(now, rows, k, later), drawn=of_pairs)
 
 
 def _mean_square(
     name: str,
     description: str,
-    at: Linearisation,
+    linearisation: Linearisation,
     sums: SourceSums,
     functions: Iterable[LinearFunctions],
     sigma: float,
 ) -> BudgetFigure:
     """The root mean square of the uncertainties of many functions that are determined."""
-    squares, total, count, undetermined = np.zeros((at.rank, at.rank)), 0.0, 0, 0
+    squares, total, count, undetermined = (
+        np.zeros((linearisation.rank, linearisation.rank)),
+        0.0,
+        0,
+        0,
+    )
     for some in functions:
-        values = at.uncertainty(some)
+        values = linearisation.uncertainty(some)
         is_known = ~np.isnan(values)
-        roots = some.shared[is_known] @ at.shared
+        roots = some.shared[is_known] @ linearisation.shared
         squares += roots.T @ roots
         total += float((values[is_known] ** 2).sum())
         count, undetermined = count + len(values), undetermined + int((~is_known).sum())
@@ -306,17 +331,17 @@ def _mean_square(
 def _each(
     names: Sequence[str],
     descriptions: Sequence[str],
-    at: Linearisation,
+    linearisation: Linearisation,
     sums: SourceSums,
     functions: LinearFunctions,
     sigma: float,
 ) -> Iterator[BudgetFigure]:
     """Figures of single functions."""
-    values = at.uncertainty(functions)
-    shares = sums.variances(functions.shared @ at.shared)
+    values = linearisation.uncertainty(functions)
+    shares = sums.variances(functions.shared @ linearisation.shared)
     shares[:, np.isnan(values)] = np.nan
     contributions = sigma * np.sqrt(np.maximum(shares, 0.0)).T
-    for name, words, value, own in zip(
+    for name, words, value, parts in zip(
         names, descriptions, (sigma * values).tolist(), contributions.tolist(), strict=True
     ):
-        yield BudgetFigure(name, words, value, tuple(own), 1, int(np.isnan(value)))
+        yield BudgetFigure(name, words, value, tuple(parts), 1, int(np.isnan(value)))

@@ -71,10 +71,10 @@ class RungFit:
     def model(self) -> LadderModel:
         return self.fitted.model
 
-    def sigma(self, given: bool) -> float:
+    def sigma(self, is_given: bool) -> float:
         """What multiplies stated uncertainties."""
-        left = self.fitted.sum_of_squares / self.fitted.degrees_of_freedom
-        return 1.0 if given else float(np.sqrt(left))
+        variance = self.fitted.sum_of_squares / self.fitted.degrees_of_freedom
+        return 1.0 if is_given else float(np.sqrt(variance))
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,7 +95,7 @@ class Climb:
     @property
     def richest(self) -> FittedSum:
         """That with the most parameters."""
-        return max(self.every, key=lambda one: one.model.count)
+        return max(self.every, key=lambda fitted: fitted.model.count)
 
     def unconfirmed(self, model: LadderModel) -> tuple[str, bool]:
         """Why nothing shows that a model has coefficients enough, empty where something does, and
@@ -104,19 +104,23 @@ class Climb:
         reached = limits_reached(model, self.grid, self.every)
         if not reached:
             return "", False
-        told = "the readings call for as many coefficients as "
+        reason = "the readings call for as many coefficients as "
         ended = any("empirical" in words for words in self.beyond)
         if ended if reached == (0,) else self.most not in reached:
-            return f"{told}this design determines: nothing shows that these are enough", True
+            return f"{reason}this design determines: nothing shows that these are enough", True
         return (
-            f"{told}were tried, and would for more, as where an error repeats over short distances",
+            f"{reason}were tried, and would for more, as where an error repeats over short"
+            " distances",
             False,
         )
 
 
 @single_threaded
 def climb(
-    experiment: Experiment, observed: ObservedReadings, given: bool, most: int = MOST_COEFFICIENTS
+    experiment: Experiment,
+    observed: ObservedReadings,
+    is_given: bool,
+    most: int = MOST_COEFFICIENTS,
 ) -> Climb:
     """Choose the poorest model that no richer one beats; `most` coefficients at most.
 
@@ -125,8 +129,8 @@ def climb(
     """
     refuse_priors(experiment, observed.design)
 
-    def make(position: int, rotation: int, own: dict[str, int]) -> LadderModel:
-        return kinematic_rung(experiment, position, rotation, own)
+    def make(position: int, rotation: int, own_degrees: dict[str, int]) -> LadderModel:
+        return kinematic_rung(experiment, position, rotation, own_degrees)
 
     judge = _Judge(observed.design, deficiency(observed.design, make(*POOREST, {})))
     richest, beyond = _richest_polynomials(make, judge, most)
@@ -144,7 +148,7 @@ def climb(
             beyond = (*beyond, f"empirical, {count} coefficients or more")
             break
         every.append(fit_rung(experiment, observed, model).fitted)
-    test = Comparison(given, observed.design.observation_count)
+    test = Comparison(is_given, observed.design.observation_count)
     return Climb(grid, every, *first_adequate(grid, every, test), beyond, most)
 
 
@@ -176,8 +180,8 @@ def _richest_polynomials(
         m += 1
     if n == m == most:
         return make(n, m, {}), ()
-    told = f"kinematic, more than {n} and {m} coefficients"
-    return make(n, m, {}), (told,)
+    reason = f"kinematic, more than {n} and {m} coefficients"
+    return make(n, m, {}), (reason,)
 
 
 def fit_rung(experiment: Experiment, observed: ObservedReadings, model: LadderModel) -> RungFit:
@@ -193,9 +197,9 @@ def fit_rung(experiment: Experiment, observed: ObservedReadings, model: LadderMo
             " ballplate fit"
         )
         raise refused(experiment.source, text, "error_model")
-    at = linearised_fit(design, solution)
-    freedom = at.degrees_of_freedom
-    return RungFit(FittedSum(model, solution.factor.sum_of_squares, freedom), at)
+    linearisation = linearised_fit(design, solution)
+    freedom = linearisation.degrees_of_freedom
+    return RungFit(FittedSum(model, solution.factor.sum_of_squares, freedom), linearisation)
 
 
 @single_threaded
@@ -212,46 +216,46 @@ def compared_models(
 
     :raises ExperimentError: as `climb`.
     """
-    given = (sigma or experiment.sigma) == "given"
-    found = climb(experiment, observed, given, most)
-    file = _of_file(experiment, observed.design.model, found)
-    test = Comparison(given, observed.design.observation_count)
-    models = _shown(found, file, test)
+    is_given = (sigma or experiment.sigma) == "given"
+    climbed = climb(experiment, observed, is_given, most)
+    file = _of_file(experiment, observed.design.model, climbed)
+    test = Comparison(is_given, observed.design.observation_count)
+    models = _shown(climbed, file, test)
     fits = []
     for model in models:
         fits.append(fit_rung(experiment, observed, model))
         report(ProgressStep(f"error models of {experiment.label}", len(fits), len(models)))
-    fits = _with_best_richer(experiment, observed, fits, found, file, test)
+    fits = _with_best_richer(experiment, observed, fits, climbed, file, test)
     chosen, richest = (
-        next(one for one in fits if one.model.words == wanted.model.words)
-        for wanted in (found.chosen, found.richest)
+        next(fit for fit in fits if fit.model.words == wanted.model.words)
+        for wanted in (climbed.chosen, climbed.richest)
     )
     repeats = pure_error(chosen.at.design, chosen.at.state, observed.x)
-    faults, beaten = _faults(chosen, observed.x, repeats, given), found.beaten
-    if faults and richest is not chosen and not _faults(richest, observed.x, repeats, given):
+    faults, beaten = _faults(chosen, observed.x, repeats, is_given), climbed.beaten
+    if faults and richest is not chosen and not _faults(richest, observed.x, repeats, is_given):
         chosen, faults, beaten = richest, (), Beaten(1.0, 0, "")
-    unconfirmed, for_want = found.unconfirmed(chosen.model)
+    unconfirmed, for_want = climbed.unconfirmed(chosen.model)
     unsure = unconfirmed if for_want else ""
     if unconfirmed and not for_want:
         faults = (*faults, unconfirmed)
     elif not (unconfirmed or faults or beaten.count):
         unsure = NO_RICHER
-    mistakes = _mistakes(fits, file, observed.x, given)
-    scale = chosen.sigma(given)
+    mistakes = _mistakes(fits, file, observed.x, is_given)
+    scale = chosen.sigma(is_given)
     rungs = (
         Rung(
-            one.model.words,
-            one.model.count,
-            one.fitted.sum_of_squares,
-            one.fitted.degrees_of_freedom,
-            test.criteria(one.fitted),
-            test.beaten(one.fitted, richer(one.fitted, found.every)),
-            _change(one.at, chosen.at),
-            one is chosen,
-            one.model.words == file.words,
-            max(one.at.deficiency - richest.at.deficiency, 0),
+            fit.model.words,
+            fit.model.count,
+            fit.fitted.sum_of_squares,
+            fit.fitted.degrees_of_freedom,
+            test.criteria(fit.fitted),
+            test.beaten(fit.fitted, richer(fit.fitted, climbed.every)),
+            _change(fit.at, chosen.at),
+            fit is chosen,
+            fit.model.words == file.words,
+            max(fit.at.deficiency - richest.at.deficiency, 0),
         )
-        for one in fits
+        for fit in fits
     )
     return ComparedModels(
         experiment.label,
@@ -261,12 +265,12 @@ def compared_models(
         chosen.model.words,
         chosen.model.settings.model_dump(mode="json", exclude_unset=True, exclude_none=True),
         mistakes or faults,
-        given,
+        is_given,
         scale,
         repeats,
         _lack_of_fit(chosen.fitted, repeats),
         beaten,
-        found.beyond,
+        climbed.beyond,
         uncertainties(chosen.at, scale, None, ("U6",))["U6"],
         2.0 if experiment.coverage_factor == 1.0 else experiment.coverage_factor,
         tuple(filter(None, (unsure, _untested(chosen.at.design)))),
@@ -278,19 +282,19 @@ def _with_best_richer(
     experiment: Experiment,
     observed: ObservedReadings,
     fits: list[RungFit],
-    found: Climb,
+    climbed: Climb,
     file: LadderModel,
     test: Comparison,
 ) -> list[RungFit]:
     """The fits with those of the richer models that explain most beside the chosen one and the
     file's, which are told by name.
     """
-    own = next(one.fitted for one in fits if one.model.words == file.words)
-    named = {found.beaten.by, test.beaten(own, richer(own, found.every)).by}
-    missing = named - {one.model.words for one in fits}
-    more = [one.model for one in found.every if one.model.words in missing]
-    fits = [*fits, *(fit_rung(experiment, observed, one) for one in more)]
-    return sorted(fits, key=lambda one: one.model.count)
+    fit_of_file = next(fit.fitted for fit in fits if fit.model.words == file.words)
+    named = {climbed.beaten.by, test.beaten(fit_of_file, richer(fit_of_file, climbed.every)).by}
+    missing = named - {fit.model.words for fit in fits}
+    more = [fit.model for fit in climbed.every if fit.model.words in missing]
+    fits = [*fits, *(fit_rung(experiment, observed, fit) for fit in more)]
+    return sorted(fits, key=lambda fit: fit.model.count)
 
 
 def _untested(design: Design) -> str:
@@ -298,29 +302,38 @@ def _untested(design: Design) -> str:
     return f"{text}: the residuals were not searched for structure" if text else ""
 
 
-def _of_file(experiment: Experiment, model: ErrorModel, found: Climb) -> LadderModel:
+def _of_file(experiment: Experiment, model: ErrorModel, climbed: Climb) -> LadderModel:
     """The file's own model, as a rung where it is one."""
-    given = experiment.error_model
-    made = next((one.model for one in found.every if one.model.model == model), None)
-    if made is None and isinstance(given, KinematicSettings) and given.functions is None:
-        made = found.grid.make(given.position_coefficients, given.rotation_coefficients, {})
+    model_settings = experiment.error_model
+    made = next((fit.model for fit in climbed.every if fit.model.model == model), None)
+    if (
+        made is None
+        and isinstance(model_settings, KinematicSettings)
+        and model_settings.functions is None
+    ):
+        made = climbed.grid.make(
+            model_settings.position_coefficients, model_settings.rotation_coefficients, {}
+        )
     return made if made is not None and made.model == model else own_rung(experiment, model)
 
 
-def _shown(found: Climb, file: LadderModel, test: Comparison) -> list[LadderModel]:
+def _shown(climbed: Climb, file: LadderModel, test: Comparison) -> list[LadderModel]:
     """Models of a way up, the chosen one, empirical ones and the file's own, with the fewest
     parameters first.
     """
-    polynomials = [one for one in found.every if one.model.numbers is not None]
-    models = [one.model for one in path(polynomials, test)]
-    models += [one.model for one in found.every if one.model.numbers is None]
-    unique = {one.words: one for one in [*models, found.chosen.model, file]}
-    return sorted(unique.values(), key=lambda one: one.count)
+    polynomials = [rung for rung in climbed.every if rung.model.numbers is not None]
+    models = [rung.model for rung in path(polynomials, test)]
+    models += [rung.model for rung in climbed.every if rung.model.numbers is None]
+    unique = {rung.words: rung for rung in [*models, climbed.chosen.model, file]}
+    return sorted(unique.values(), key=lambda rung: rung.count)
 
 
-def _change(at: Linearisation, other: Linearisation) -> LengthChange:
+def _change(linearisation: Linearisation, other_linearisation: Linearisation) -> LengthChange:
     """How two fits differ in the lengths between all evaluation points."""
-    first, second = (_lengths(one.design, one.state) for one in (at, other))
+    first, second = (
+        _lengths(rung_linearisation.design, rung_linearisation.state)
+        for rung_linearisation in (linearisation, other_linearisation)
+    )
     change = first - second
     return LengthChange(float(np.abs(change).max()), float(np.sqrt((change**2).mean())))
 
@@ -340,44 +353,48 @@ def _lack_of_fit(fitted: FittedSum, repeats: PureError) -> float:
     dimensions = fitted.degrees_of_freedom - repeats.degrees_of_freedom
     if not repeats.degrees_of_freedom or dimensions <= 0:
         return float("nan")
-    left = max(fitted.sum_of_squares - repeats.sum_of_squares, 0.0)
+    sum_left = max(fitted.sum_of_squares - repeats.sum_of_squares, 0.0)
     least = ROUNDING * fitted.degrees_of_freedom
-    if left <= least:
+    if sum_left <= least:
         return 1.0
     return chance_of(
-        left, dimensions, max(repeats.sum_of_squares, least), repeats.degrees_of_freedom, False
+        sum_left, dimensions, max(repeats.sum_of_squares, least), repeats.degrees_of_freedom, False
     )
 
 
-def _mistakes(fits: list[RungFit], file: LadderModel, x: Array, given: bool) -> tuple[str, ...]:
+def _mistakes(fits: list[RungFit], file: LadderModel, x: Array, is_given: bool) -> tuple[str, ...]:
     """Mistakes in the file's offsets or arrangement that explain an S^2 of its own model that is
     too large, in words.
     """
-    fit = next(one for one in fits if one.model.words == file.words)
+    fit = next(suspect for suspect in fits if suspect.model.words == file.words)
     square, freedom = fit.fitted.sum_of_squares, fit.fitted.degrees_of_freedom
     if too_many_entries(fit.at.design) or chance_of(square, freedom, 0.0, 0, True) > MISFIT:
         return ()
-    found = diagnosis_with_refits(fit.at, x, freedom, not given)
-    suspects = (one for one in found.suspects if one.patterns.kind[one.pattern] == "probe")
-    words = [refit_words(found.refit)] if found.refit else []
+    diagnosis = diagnosis_with_refits(fit.at, x, freedom, not is_given)
+    suspects = (
+        suspect
+        for suspect in diagnosis.suspects
+        if suspect.patterns.kind[suspect.pattern] == "probe"
+    )
+    words = [refit_words(diagnosis.refit)] if diagnosis.refit else []
     return (*words, *map(suspect_words, suspects))
 
 
-def _faults(fit: RungFit, x: Array, repeats: PureError, given: bool) -> tuple[str, ...]:
+def _faults(fit: RungFit, x: Array, repeats: PureError, is_given: bool) -> tuple[str, ...]:
     """What a model leaves unexplained, in words."""
-    found, fitted, design = [], fit.fitted, fit.at.design
+    faults, fitted, design = [], fit.fitted, fit.at.design
     chance = _lack_of_fit(fitted, repeats)
     if chance < MISFIT:
-        found.append(
+        faults.append(
             f"lack of fit: the residuals are larger than the scatter of repeated readings explains"
             f" (chance {chance_words(chance)})"
         )
     square, freedom = fitted.sum_of_squares, fitted.degrees_of_freedom
-    if given and chance_of(square, freedom, 0.0, 0, True) < MISFIT:
-        found.append(f"S^2 is {square / freedom:.3g} times what the stated uncertainties explain")
+    if is_given and chance_of(square, freedom, 0.0, 0, True) < MISFIT:
+        faults.append(f"S^2 is {square / freedom:.3g} times what the stated uncertainties explain")
     if not too_many_entries(design):
-        left = diagnosis_of_all(fit.at, x, freedom, not given).unexplained
-        if left is not None and (left.words or left.too_large):
-            words = left.words or "no single error of the kinds that are looked for"
-            found.append(f"the residuals have a structure; what explains most of it is {words}")
-    return tuple(found)
+        unexplained = diagnosis_of_all(fit.at, x, freedom, not is_given).unexplained
+        if unexplained is not None and (unexplained.words or unexplained.too_large):
+            words = unexplained.words or "no single error of the kinds that are looked for"
+            faults.append(f"the residuals have a structure; what explains most of it is {words}")
+    return tuple(faults)

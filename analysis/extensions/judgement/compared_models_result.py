@@ -122,21 +122,21 @@ class ComparedModels(FitResult):
             )
         else:
             why = "it is the richest that this design determines"
-        found = [f"recommended: {self.recommended}; {why}"]
-        file = next((one for one in self.rungs if one.is_of_file), None)
+        lines = [f"recommended: {self.recommended}; {why}"]
+        file = next((rung for rung in self.rungs if rung.is_of_file), None)
         if file is not None and not file.is_recommended:
-            found.append(self._of_file(file))
-        return found
+            lines.append(self._of_file(file))
+        return lines
 
     def _of_file(self, file: Rung) -> str:
-        chosen = next(one for one in self.rungs if one.is_recommended)
+        chosen = next(rung for rung in self.rungs if rung.is_recommended)
         if file.undetermined:
-            told = "is not determined by this design"
+            sentence = "is not determined by this design"
         elif file.beaten.chance < FALSE_STEP and file.beaten.count:
             chance = chance_words(file.beaten.chance)
-            told = f"is too poor: {file.beaten.by} explains more (chance {chance})"
+            sentence = f"is too poor: {file.beaten.by} explains more (chance {chance})"
         elif file.parameters > chosen.parameters:
-            told = "has more parameters than the readings call for"
+            sentence = "has more parameters than the readings call for"
         else:
             apart = file.criteria.bic - chosen.criteria.bic
             word = (
@@ -146,24 +146,27 @@ class ComparedModels(FitResult):
                 if apart < 0
                 else "the worse"
             )
-            told = f"is no poorer or richer form of these; by BIC it is {word}"
-        told = f"the file's error model, {file.model.removeprefix(FILE)}, {told}"
+            sentence = f"is no poorer or richer form of these; by BIC it is {word}"
+        sentence = f"the file's error model, {file.model.removeprefix(FILE)}, {sentence}"
         if self.lengths.undetermined:
-            return told
-        return f"{told}; it changes lengths by {self._length(file.change.rms)} µm rms"
+            return sentence
+        return f"{sentence}; it changes lengths by {self._length(file.change.rms)} µm rms"
 
     def lines(self) -> list[str]:
         how = "given" if self.sigma_is_given else "estimated"
         test = "chi-squared" if self.sigma_is_given else "F"
-        least = [min(getattr(one.criteria, key) for one in self.rungs) for key in ("aic", "bic")]
+        least = [min(getattr(rung.criteria, key) for rung in self.rungs) for key in ("aic", "bic")]
         columns = {
             "": "model",
             "parameters": "parameters",
             "freedom": "degrees_of_freedom",
             "sigma": ("sigma", "{:.4g}".format),
-            f"{test}: chance": (_chance, lambda one: "-" if math.isnan(one) else chance_words(one)),
-            "AIC": (lambda one: one.criteria.aic - least[0], "{:.1f}".format),
-            "BIC": (lambda one: one.criteria.bic - least[1], "{:.1f}".format),
+            f"{test}: chance": (
+                _chance,
+                lambda rung: "-" if math.isnan(rung) else chance_words(rung),
+            ),
+            "AIC": (lambda rung: rung.criteria.aic - least[0], "{:.1f}".format),
+            "BIC": (lambda rung: rung.criteria.bic - least[1], "{:.1f}".format),
             "largest change": ("change.largest", self._length),
             "rms, µm": ("change.rms", self._length),
             " ": self._marks,
@@ -185,11 +188,11 @@ class ComparedModels(FitResult):
             lines.append(f"not determined by this design, and no candidates: {self._beyond()}")
         return [*lines, *self.verdict()]
 
-    def _marks(self, one: Rung) -> str:
+    def _marks(self, rung: Rung) -> str:
         marks = {
-            "recommended": one.is_recommended and not self.is_none,
-            "the file's": one.is_of_file and not one.model.startswith(FILE),
-            f"{one.undetermined} undetermined": one.undetermined > 0,
+            "recommended": rung.is_recommended and not self.is_none,
+            "the file's": rung.is_of_file and not rung.model.startswith(FILE),
+            f"{rung.undetermined} undetermined": rung.undetermined > 0,
         }
         words = ", ".join(word for word, is_so in marks.items() if is_so)
         return f"<- {words}" if words else ""
@@ -213,14 +216,15 @@ class ComparedModels(FitResult):
     def _of_repeats(self) -> list[str]:
         if not self.repeats.degrees_of_freedom:
             return ["no reading is repeated: lack of fit cannot be tested against repeats"]
-        told = (
+        sentence = (
             f"repeated readings scatter {self.repeats.sigma:.3g} times as stated, with"
             f" {freedom_words(self.repeats.degrees_of_freedom)}"
         )
         if math.isnan(self.lack_of_fit):
-            return [f"{told}; nothing else is left to test lack of fit"]
+            return [f"{sentence}; nothing else is left to test lack of fit"]
         return [
-            f"{told}; lack of fit of {self.recommended}: chance {chance_words(self.lack_of_fit)}"
+            f"{sentence}; lack of fit of {self.recommended}: chance"
+            f" {chance_words(self.lack_of_fit)}"
         ]
 
     def data(self) -> dict[str, Any]:
@@ -245,19 +249,19 @@ class ComparedModels(FitResult):
         names = ("model", "parameters", "degrees_of_freedom", "sum_of_squares")
         return [
             {
-                **picked(one, *names),
-                **vars(one.criteria),
-                "chance": one.beaten.chance if one.beaten.count else None,
-                "richer_models": one.beaten.count,
-                "best_richer_model": one.beaten.by or None,
-                "largest_change": None if lengths_are_open else one.change.largest,
-                "rms_change": None if lengths_are_open else one.change.rms,
+                **picked(rung, *names),
+                **vars(rung.criteria),
+                "chance": rung.beaten.chance if rung.beaten.count else None,
+                "richer_models": rung.beaten.count,
+                "best_richer_model": rung.beaten.by or None,
+                "largest_change": None if lengths_are_open else rung.change.largest,
+                "rms_change": None if lengths_are_open else rung.change.rms,
                 "unit": "m",
-                "recommended": one.is_recommended,
-                "of_the_file": one.is_of_file,
-                "undetermined": one.undetermined,
+                "recommended": rung.is_recommended,
+                "of_the_file": rung.is_of_file,
+                "undetermined": rung.undetermined,
             }
-            for one in self.rungs
+            for rung in self.rungs
         ]
 
     @property
@@ -267,5 +271,5 @@ class ComparedModels(FitResult):
         return "none of the error models explains the readings" if self.is_none else ""
 
 
-def _chance(one: Rung) -> float:
-    return one.beaten.chance if one.beaten.count else math.nan
+def _chance(rung: Rung) -> float:
+    return rung.beaten.chance if rung.beaten.count else math.nan

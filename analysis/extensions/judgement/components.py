@@ -96,8 +96,8 @@ class VarianceComponents(Result):
         return reweighted(design, groups_of(design, self.by), np.array(self.weighting))
 
     def headline(self) -> str:
-        count = sum(one.is_estimated for one in self.groups)
-        larger = [one.name for one in self.groups if one.verdict == LARGER]
+        count = sum(group.is_estimated for group in self.groups)
+        larger = [group.name for group in self.groups if group.verdict == LARGER]
         words = f"{count} of {len(self.groups)} variance components estimated"
         return f"{words}; {LARGER}: {', '.join(larger)}" if larger else words
 
@@ -108,7 +108,7 @@ class VarianceComponents(Result):
     def rows(self) -> list[dict[str, Any]]:
         """One row for each group."""
         names = ("observations", "redundancy", *RATIO, "verdict")
-        return [{"group": one.name, **picked(one, *names)} for one in self.groups]
+        return [{"group": group.name, **picked(group, *names)} for group in self.groups]
 
     def data(self) -> dict[str, Any]:
         return {"by": self.by, "false_alarm": FALSE_ALARM, "groups": self.rows()}
@@ -159,15 +159,15 @@ def _told_apart(sums: GroupSums, names: Sequence[str]) -> tuple[Integers, tuple[
     """Groups whose variances the design tells apart, where these are as stated, and why others
     have no estimate.
     """
-    stated = at_ratios(sums, np.ones(len(sums.counts)))
+    at_unit_ratios = at_ratios(sums, np.ones(len(sums.counts)))
     reasons = [""] * len(names)
     free = list(range(len(names)))
-    for k, redundancy in enumerate(stated.redundancies.tolist()):
+    for k, redundancy in enumerate(at_unit_ratios.redundancies.tolist()):
         if redundancy < LEAST_FREEDOM:
             reasons[k] = "cannot be estimated: too little redundancy"
             free.remove(k)
     while free:
-        information = stated.information[np.ix_(free, free)]
+        information = at_unit_ratios.information[np.ix_(free, free)]
         freedom = degrees_of_freedom(information)
         # The last of those that are equally poor, so that rounding does not choose.
         worst = int(np.flatnonzero(freedom <= freedom.min() + 1e-6)[-1])
@@ -175,52 +175,52 @@ def _told_apart(sums: GroupSums, names: Sequence[str]) -> tuple[Integers, tuple[
             break
         common = information[worst] / np.sqrt(np.diagonal(information))
         common[worst] = -np.inf
-        other = names[free[int(np.argmax(np.round(common, 6)))]]
-        reasons[free[worst]] = f"cannot be told from {other}"
+        confounded = names[free[int(np.argmax(np.round(common, 6)))]]
+        reasons[free[worst]] = f"cannot be told from {confounded}"
         del free[worst]
     return np.array(free, np.int64), tuple(reasons)
 
 
 @single_threaded
 def variance_components(
-    label: str, title: str, at: Linearisation, x: Array, by: Grouping
+    label: str, title: str, linearisation: Linearisation, x: Array, by: Grouping
 ) -> VarianceComponents:
     """Variance components of a fit to scale readings x (readings, d), which has converged.
 
     :raises ValueError: there are too many groups or observations for the memory.
     """
-    groups = groups_of(at.design, by)
-    reason = too_many_groups(at.design, groups)
+    groups = groups_of(linearisation.design, by)
+    reason = too_many_groups(linearisation.design, groups)
     if reason:
         raise ValueError(reason)
-    found = told_apart(group_sums(leftover(at, x, 0), groups), groups)
-    components = tuple(judged(found))
-    used = np.flatnonzero([one.is_to_be_used for one in components])
-    weighting = estimated_ratios(found.sums, used)
+    estimated = told_apart(group_sums(leftover(linearisation, x, 0), groups), groups)
+    components = tuple(judged(estimated))
+    used = np.flatnonzero([component.is_to_be_used for component in components])
+    weighting = estimated_ratios(estimated.sums, used)
     return VarianceComponents(label, title, by, components, tuple(weighting.tolist()))
 
 
-def judged(found: Estimated) -> list[VarianceComponent]:
+def judged(estimated: Estimated) -> list[VarianceComponent]:
     """Estimates with their uncertainties and verdicts."""
-    at = at_ratios(found.sums, found.ratios)
-    freedom = degrees_of_freedom(at.information[np.ix_(found.free, found.free)])
-    whitened = Whitened(found.sums, found.ratios, found.free)
-    stated = at_ratios(found.sums, np.ones(len(found.groups)))
+    at_estimates = at_ratios(estimated.sums, estimated.ratios)
+    freedom = degrees_of_freedom(at_estimates.information[np.ix_(estimated.free, estimated.free)])
+    whitened = Whitened(estimated.sums, estimated.ratios, estimated.free)
+    at_unit_ratios = at_ratios(estimated.sums, np.ones(len(estimated.groups)))
     result = []
-    limit = 0.5 * FALSE_ALARM / max(len(found.free), 1)
-    for k, group in enumerate(found.groups):
-        place = np.flatnonzero(found.free == k)
-        known = group.name, len(group.rows), float(stated.redundancies[k])
+    limit = 0.5 * FALSE_ALARM / max(len(estimated.free), 1)
+    for k, group in enumerate(estimated.groups):
+        place = np.flatnonzero(estimated.free == k)
+        facts = group.name, len(group.rows), float(at_unit_ratios.redundancies[k])
         if not len(place):
             nothing = (np.nan,) * 4
-            result.append(VarianceComponent(*known, *nothing, found.reasons[k]))
+            result.append(VarianceComponent(*facts, *nothing, estimated.reasons[k]))
             continue
         test = whitened.test_of(int(place[0]))
         chance = test.chance(1.0)
         verdict = LARGER if chance < limit else SMALLER if chance > 1.0 - limit else AS_STATED
         # At the bound there is no scatter but what others explain.
-        ratio = float(found.ratios[k]) if found.ratios[k] > SMALLEST else 0.0
+        ratio = float(estimated.ratios[k]) if estimated.ratios[k] > SMALLEST else 0.0
         spread = ratio * float(np.sqrt(2.0 / freedom[place[0]])) if ratio else np.nan
         ends = test.end(0.5 * OUTSIDE), test.end(1.0 - 0.5 * OUTSIDE)
-        result.append(VarianceComponent(*known, ratio, spread, *ends, verdict))
+        result.append(VarianceComponent(*facts, ratio, spread, *ends, verdict))
     return result

@@ -40,13 +40,13 @@ def linear_map(inner: ErrorModel, outer: ErrorModel) -> Array:
     count = len(outer.parameters)
     x = lower + (upper - lower) * generator.random((count, len(lower)))
     p = USUAL_OFFSET * float((upper - lower).max()) * generator.standard_normal(x.shape)
-    known = outer.jacobian(x, np.zeros(count), p).reshape(-1, count)
-    wanted = inner.jacobian(x, np.zeros(len(inner.parameters)), p).reshape(len(known), -1)
-    scale = np.linalg.norm(known, axis=0)
-    matrix = np.linalg.lstsq(known / scale, wanted, rcond=1e-13)[0] / scale[:, None]
-    left = np.abs(known @ matrix - wanted).max(axis=0) / np.abs(wanted).max(axis=0)
+    jacobian = outer.jacobian(x, np.zeros(count), p).reshape(-1, count)
+    wanted = inner.jacobian(x, np.zeros(len(inner.parameters)), p).reshape(len(jacobian), -1)
+    scale = np.linalg.norm(jacobian, axis=0)
+    matrix = np.linalg.lstsq(jacobian / scale, wanted, rcond=1e-13)[0] / scale[:, None]
+    misfits = np.abs(jacobian @ matrix - wanted).max(axis=0) / np.abs(wanted).max(axis=0)
     missing = tuple(
-        p.name for p, part in zip(inner.parameters, left, strict=True) if part > CONTAINED
+        p.name for p, part in zip(inner.parameters, misfits, strict=True) if part > CONTAINED
     )
     if missing:
         raise NotContainedError(missing)

@@ -71,7 +71,7 @@ def validate(
     return predicted(chosen, observed, sigma, report)
 
 
-def budget(given: Experiment | PathLike | Fit, by: Grouping = "calibration") -> UncertaintyBudget:
+def budget(subject: Experiment | PathLike | Fit, by: Grouping = "calibration") -> UncertaintyBudget:
     """What each source contributes to U4, U6, the body diagonals and the measuring tasks of the
     design of an experiment, or of a fit.
 
@@ -89,8 +89,10 @@ def budget(given: Experiment | PathLike | Fit, by: Grouping = "calibration") -> 
     from .budget import budget as budget_of
 
     ensure_one_of(GROUPINGS, by=str(by))
-    if isinstance(given, Fit):
-        if given.experiment is None:
-            raise ValueError(f"the estimate has {given.solution.status}; there is no budget of it")
-        return budget_of(given.experiment, given, by)
-    return budget_of(experiment_of(given), None, by)
+    if isinstance(subject, Fit):
+        if subject.experiment is None:
+            raise ValueError(
+                f"the estimate has {subject.solution.status}; there is no budget of it"
+            )
+        return budget_of(subject.experiment, subject, by)
+    return budget_of(experiment_of(subject), None, by)

@@ -70,7 +70,9 @@ def chance_words(chance: float) -> str:
     return f"{chance:.2g}" if chance >= LEAST_TOLD else f"<{LEAST_TOLD:.0e}"
 
 
-def chance_of(square: float, dimensions: int, rest: float, freedom: int, given: bool) -> float:
+def chance_of(
+    square: float, dimensions: int, sum_of_rest: float, freedom: int, is_given: bool
+) -> float:
     """Chance that so many dimensions explain a sum of squares so large, beside a `rest` with its
     degrees of freedom: of chi-squared with `given` sigma, otherwise of Fisher's F.
 
@@ -82,10 +84,10 @@ def chance_of(square: float, dimensions: int, rest: float, freedom: int, given: 
     from scipy.special import chdtrc, fdtrc
 
     square = max(square, 0.0)
-    if dimensions <= 0 or (not given and freedom <= 0):
+    if dimensions <= 0 or (not is_given and freedom <= 0):
         return 1.0
-    if given:
+    if is_given:
         return float(chdtrc(dimensions, square))
-    if rest <= 0.0:
+    if sum_of_rest <= 0.0:
         return 1.0 if square == 0.0 else 0.0
-    return float(fdtrc(dimensions, freedom, square / dimensions / (rest / freedom)))
+    return float(fdtrc(dimensions, freedom, square / dimensions / (sum_of_rest / freedom)))

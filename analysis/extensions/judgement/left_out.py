@@ -74,30 +74,35 @@ def groups_to_leave(design: Design) -> list[LeftGroup]:
     """All positions that were read, all plates and standards, and all directions of plates; none
     that is all there is.
     """
-    read = np.unique(design.readings.position)
-    found = [LeftGroup("position", design.positions.names[k], np.array([k])) for k in read.tolist()]
-    artefact = design.positions.artefact[read]
+    positions_read = np.unique(design.readings.position)
+    groups = [
+        LeftGroup("position", design.positions.names[k], np.array([k]))
+        for k in positions_read.tolist()
+    ]
+    artefact = design.positions.artefact[positions_read]
     for k in np.unique(artefact).tolist():
-        found.append(LeftGroup("plate", design.artefacts.names[k], read[artefact == k], k))
-    plates = read[design.artefacts.is_plate[artefact]]
-    found += [LeftGroup("direction", name, same) for name, same in _directions(design, plates)]
-    return [one for one in found if len(one.positions) < len(read)]
+        groups.append(
+            LeftGroup("plate", design.artefacts.names[k], positions_read[artefact == k], k)
+        )
+    plates = positions_read[design.artefacts.is_plate[artefact]]
+    groups += [LeftGroup("direction", name, same) for name, same in _directions(design, plates)]
+    return [group for group in groups if len(group.positions) < len(positions_read)]
 
 
 def _directions(design: Design, positions: Integers) -> Iterator[tuple[str, Integers]]:
     """Positions whose normals are parallel, in the plane whose sides are."""
     d = design.dimension
     axes = design.positions.rotations[positions][:, :, -1 if d == 3 else 0]
-    left = np.arange(len(positions))
-    while len(left):
-        axis = axes[left[0]]
-        same = np.abs(axes[left] @ axis) > PARALLEL
+    remaining = np.arange(len(positions))
+    while len(remaining):
+        axis = axes[remaining[0]]
+        same = np.abs(axes[remaining] @ axis) > PARALLEL
         of_machine = np.abs(axis) > PARALLEL
         letter = AXIS_NAMES[int(of_machine.argmax())] if of_machine.any() else ""
         word = ("across" if d == 3 else "along") + f" {letter}"
-        name = word if letter else f"as {design.positions.names[positions[left[0]]]}"
-        yield name, positions[left[same]]
-        left = left[~same]
+        name = word if letter else f"as {design.positions.names[positions[remaining[0]]]}"
+        yield name, positions[remaining[same]]
+        remaining = remaining[~same]
 
 
 def without(design: Design, group: LeftGroup) -> tuple[Design, Flags]:
@@ -107,20 +112,24 @@ def without(design: Design, group: LeftGroup) -> tuple[Design, Flags]:
     uncertainty = reading_uncertainties(design, readings) * np.where(out, OUT, 1.0)[:, None]
     changed: list[Observations] = [lengths.select(~out[lengths.first])]
     is_out: dict[type[Observations], Flags] = {}
-    for one in design.observations:
-        if not isinstance(one, Lengths):
-            mine = np.zeros(one.count(design), bool)
-            if group.artefact >= 0 and one.balls.shape[1]:
-                mine = design.balls.artefact[one.balls[:, 0]] == group.artefact
-            is_out[type(one)] = mine
-            changed.append(one.enlarged(np.where(mine, OUT, 1.0)) if mine.any() else one)
-    rest = replace(design, readings=replace(readings, uncertainty=uncertainty)).observed(*changed)
-    places, rows = row_places(rest), np.zeros(row_count(rest), bool)
+    for observation in design.observations:
+        if not isinstance(observation, Lengths):
+            mine = np.zeros(observation.count(design), bool)
+            if group.artefact >= 0 and observation.balls.shape[1]:
+                mine = design.balls.artefact[observation.balls[:, 0]] == group.artefact
+            is_out[type(observation)] = mine
+            changed.append(
+                observation.enlarged(np.where(mine, OUT, 1.0)) if mine.any() else observation
+            )
+    design_left = replace(design, readings=replace(readings, uncertainty=uncertainty)).observed(
+        *changed
+    )
+    places, rows = row_places(design_left), np.zeros(row_count(design_left), bool)
     rows[places["reading"]] = np.repeat(out[design.plate_readings], design.dimension)
-    for one in rest.observations:
-        if not isinstance(one, Lengths):
-            rows[places[one.word]] = is_out[type(one)]
-    return rest, rows
+    for observation in design_left.observations:
+        if not isinstance(observation, Lengths):
+            rows[places[observation.word]] = is_out[type(observation)]
+    return design_left, rows
 
 
 @dataclass(frozen=True, eq=False)
@@ -142,35 +151,40 @@ class RestFit:
 @single_threaded
 def rest_of(design: Design, x: Array, group: LeftGroup) -> RestFit | None:
     """The estimate without a group; None where it does not converge."""
-    rest, is_out = without(design, group)
-    solution = estimate(rest, x)
+    design_left, is_out = without(design, group)
+    solution = estimate(design_left, x)
     if solution.status != "converged":
         return None
-    at = linearised_fit(rest, solution)
+    linearisation = linearised_fit(design_left, solution)
     rows = np.flatnonzero(is_out)
     place = np.full(len(is_out), -1)
     place[rows] = np.arange(len(rows))
-    d, balls = rest.dimension, len(rest.balls.names)
-    common, own = np.zeros((len(rows), at.balls.common.shape[2])), np.zeros((len(rows), balls * d))
-    for some in hat_rows(at, x):
+    d, balls = design_left.dimension, len(design_left.balls.names)
+    common, zero_parts = (
+        np.zeros((len(rows), linearisation.balls.common.shape[2])),
+        np.zeros((len(rows), balls * d)),
+    )
+    for some in hat_rows(linearisation, x):
         mine = np.flatnonzero(place[some.rows] >= 0)
         common[place[some.rows[mine]]] = some.common[mine]
         alone = mine[some.ball[mine] >= 0]
         columns = d * some.ball[alone][:, None] + np.arange(d)
-        own[place[some.rows[alone]][:, None], columns] = some.own[alone]
-    root = np.concatenate([common, own[:, own.any(axis=0)]], axis=1)
+        zero_parts[place[some.rows[alone]][:, None], columns] = some.own[alone]
+    root = np.concatenate([common, zero_parts[:, zero_parts.any(axis=0)]], axis=1)
     hat = root @ root.T
-    left = np.eye(len(rows)) - hat
-    variances = (left**2).sum(axis=1) + OUT**2 * np.einsum("ij,ji->i", hat, left)
-    errors = whitened_residuals(rest, at.state, x)[rows]
-    is_read = np.ones(row_count(rest), bool)
-    is_read[row_places(rest)["reading"]] = measured(
-        rest, rest.readings.select(rest.plate_readings)
+    residual_projector = np.eye(len(rows)) - hat
+    variances = (residual_projector**2).sum(axis=1) + OUT**2 * np.einsum(
+        "ij,ji->i", hat, residual_projector
+    )
+    errors = whitened_residuals(design_left, linearisation.state, x)[rows]
+    is_read = np.ones(row_count(design_left), bool)
+    is_read[row_places(design_left)["reading"]] = measured(
+        design_left, design_left.readings.select(design_left.plate_readings)
     ).ravel()
     absorbed = int(round(float(np.trace(hat))))
-    freedom = at.degrees_of_freedom
+    freedom = linearisation.degrees_of_freedom
     return RestFit(
-        at,
+        linearisation,
         solution.factor.sum_of_squares - float(errors @ errors),
         freedom - (int(is_read[rows].sum()) - absorbed),
         rows,
@@ -191,44 +205,46 @@ def validate(
 
     :raises ExperimentError: the estimate from all readings does not converge.
     """
-    given = (sigma or experiment.sigma) == "given"
-    campaigns = None if given else campaign_sigmas(experiment, observed)
+    is_given = (sigma or experiment.sigma) == "given"
+    campaigns = None if is_given else campaign_sigmas(experiment, observed)
     observed = observed if campaigns is None else campaigns.observed
     design = observed.design
     solution = estimate(design, observed.x)
     if solution.status != "converged":
         text = f"the estimate from all readings has {solution.status}; see ballplate fit"
         raise refused(experiment.source, text)
-    at = linearised_fit(design, solution)
-    freedom = at.degrees_of_freedom
+    linearisation = linearised_fit(design, solution)
+    freedom = linearisation.degrees_of_freedom
     groups = groups_to_leave(design)
-    found = []
+    left_groups = []
     for group in groups:
-        found.append(_left_out(at, freedom, observed, group, given))
-        report(ProgressStep(f"left out of {experiment.label}", len(found), len(groups)))
+        left_groups.append(_left_out(linearisation, freedom, observed, group, is_given))
+        report(ProgressStep(f"left out of {experiment.label}", len(left_groups), len(groups)))
     return Validation(
         experiment.label,
         experiment.title,
         observed,
-        tuple(found),
-        given,
+        tuple(left_groups),
+        is_given,
         2.0 if experiment.coverage_factor == 1.0 else experiment.coverage_factor,
     )
 
 
 def _left_out(
-    full: Linearisation, freedom: int, observed: ObservedReadings, group: LeftGroup, given: bool
+    full: Linearisation, freedom: int, observed: ObservedReadings, group: LeftGroup, is_given: bool
 ) -> PredictedGroup:
-    rest = rest_of(full.design, observed.x, group)
-    if rest is None:
+    fit_of_rest = rest_of(full.design, observed.x, group)
+    if fit_of_rest is None:
         return PredictedGroup(group.kind, group.name, 0, float("nan"), float("nan"), 1.0, False)
-    predicted = freedom - rest.degrees_of_freedom
-    square = max(full.factor.sum_of_squares - rest.sum_of_squares, 0.0)
+    predicted = freedom - fit_of_rest.degrees_of_freedom
+    square = max(full.factor.sum_of_squares - fit_of_rest.sum_of_squares, 0.0)
     scale = 1.0
-    if not given:
-        left = rest.sum_of_squares / max(rest.degrees_of_freedom, 1)
-        scale = float(np.sqrt(left)) if rest.degrees_of_freedom > 0 else float("nan")
-    chance = chance_of(square, predicted, rest.sum_of_squares, rest.degrees_of_freedom, given)
+    if not is_given:
+        variance = fit_of_rest.sum_of_squares / max(fit_of_rest.degrees_of_freedom, 1)
+        scale = float(np.sqrt(variance)) if fit_of_rest.degrees_of_freedom > 0 else float("nan")
+    chance = chance_of(
+        square, predicted, fit_of_rest.sum_of_squares, fit_of_rest.degrees_of_freedom, is_given
+    )
     return PredictedGroup(
         group.kind,
         group.name,
@@ -237,37 +253,41 @@ def _left_out(
         scale,
         chance,
         True,
-        _worst(rest, observed, scale),
-        _length_difference(full, rest, scale),
+        _worst(fit_of_rest, observed, scale),
+        _length_difference(full, fit_of_rest, scale),
     )
 
 
-def _worst(rest: RestFit, observed: ObservedReadings, scale: float) -> PredictedReading | None:
+def _worst(
+    fit_of_rest: RestFit, observed: ObservedReadings, scale: float
+) -> PredictedReading | None:
     """The reading that is predicted worst; None where none is predicted."""
-    design = rest.at.design
+    design = fit_of_rest.at.design
     readings = row_places(design)["reading"]
-    can = (rest.variances > NOT_PREDICTED) & (rest.rows < readings.stop)
+    can = (fit_of_rest.variances > NOT_PREDICTED) & (fit_of_rest.rows < readings.stop)
     if not can.any() or not scale > 0.0:
         return None
-    deviations = np.sqrt(np.where(can, rest.variances, 1.0))
-    standardised = np.where(can, rest.errors / deviations, 0.0) / scale
+    deviations = np.sqrt(np.where(can, fit_of_rest.variances, 1.0))
+    standardised = np.where(can, fit_of_rest.errors / deviations, 0.0) / scale
     worst = int(np.abs(standardised).argmax())
-    reading, axis = divmod(int(rest.rows[worst]), design.dimension)
+    reading, axis = divmod(int(fit_of_rest.rows[worst]), design.dimension)
     k = int(design.plate_readings[reading])
-    stated = reading_uncertainties(observed.design, observed.design.readings)[k, axis]
-    stated /= float(np.sqrt(design.readings.repeats[k]))
+    uncertainties = reading_uncertainties(observed.design, observed.design.readings)[k, axis]
+    uncertainties /= float(np.sqrt(design.readings.repeats[k]))
     return PredictedReading(
         design.positions.names[design.readings.position[k]],
         design.ball_label(int(design.readings.ball[k])),
         design.probes.names[design.readings.probe[k]],
         AXIS_NAMES[axis],
-        float(rest.errors[worst] * stated),
-        float(scale * deviations[worst] * stated),
+        float(fit_of_rest.errors[worst] * uncertainties),
+        float(scale * deviations[worst] * uncertainties),
         float(standardised[worst]),
     )
 
 
-def _length_difference(full: Linearisation, rest: RestFit, scale: float) -> LengthDifference | None:
+def _length_difference(
+    full: Linearisation, fit_of_rest: RestFit, scale: float
+) -> LengthDifference | None:
     """The largest difference that a group makes to lengths between evaluation points; None where
     the rest determines no length.
 
@@ -281,24 +301,28 @@ def _length_difference(full: Linearisation, rest: RestFit, scale: float) -> Leng
     names = ("",) * len(pairs)
     distances = Distances(places, pairs, names)
 
-    def of(at: Linearisation) -> tuple[Array, Array, Array]:
-        where = places.at(design, at.state)
+    def of(linearisation: Linearisation) -> tuple[Array, Array, Array]:
+        where = places.at(design, linearisation.state)
         lengths = np.linalg.norm(where[pairs[:, 0]] - where[pairs[:, 1]], axis=1)
-        functions = linear_functions(at, distances)
-        return lengths, at.uncertainty(functions), functions.shared @ at.shared
+        functions = linear_functions(linearisation, distances)
+        return (
+            lengths,
+            linearisation.uncertainty(functions),
+            functions.shared @ linearisation.shared,
+        )
 
-    (one, u_full, _), (other, u_rest, root) = of(full), of(rest.at)
-    from_left = ((root @ rest.common[:, : root.shape[1]].T) ** 2).sum(axis=1)
-    known = np.isfinite(u_full) & np.isfinite(u_rest) & (from_left < FROM_LEFT_OUT * u_rest**2)
-    if not known.any():
+    (length_of_full, u_full, _), (length_of_rest, u_rest, root) = of(full), of(fit_of_rest.at)
+    from_left = ((root @ fit_of_rest.common[:, : root.shape[1]].T) ** 2).sum(axis=1)
+    is_known = np.isfinite(u_full) & np.isfinite(u_rest) & (from_left < FROM_LEFT_OUT * u_rest**2)
+    if not is_known.any():
         return None
-    change = np.where(known, other - one, 0.0)
+    change = np.where(is_known, length_of_rest - length_of_full, 0.0)
     k = int(np.abs(change).argmax())
     variance = max(float(u_rest[k] ** 2 - u_full[k] ** 2), 0.0)
     return LengthDifference(
         float(change[k]),
         scale * float(np.sqrt(variance)),
         scale * float(u_full[k]),
-        int((~known).sum()),
+        int((~is_known).sum()),
         (f"point {pairs[k, 0] + 1}", f"point {pairs[k, 1] + 1}"),
     )

@@ -82,20 +82,24 @@ class Validation(FitResult):
     @property
     def failed(self) -> tuple[PredictedGroup, ...]:
         """What is predicted worse than chance explains, all tests together."""
-        tested = [one for one in self.left_out if one.predicted > 0]
-        return tuple(one for one in tested if one.chance * len(tested) < FAILED)
+        tested = [group for group in self.left_out if group.predicted > 0]
+        return tuple(group for group in tested if group.chance * len(tested) < FAILED)
 
     @property
     def complaint(self) -> str:
-        lost = [one for one in self.left_out if not one.converged]
-        told = [f"{one.kind} {one.name} is predicted wrongly by the others" for one in self.failed]
-        told += [f"without {one.kind} {one.name} the estimate does not converge" for one in lost]
-        if not any(one.predicted for one in self.left_out):
-            told.append("nothing was tested: the rest predicts nothing that can be left out")
-        return "; ".join(told)
+        lost = [group for group in self.left_out if not group.converged]
+        reasons = [
+            f"{group.kind} {group.name} is predicted wrongly by the others" for group in self.failed
+        ]
+        reasons += [
+            f"without {group.kind} {group.name} the estimate does not converge" for group in lost
+        ]
+        if not any(group.predicted for group in self.left_out):
+            reasons.append("nothing was tested: the rest predicts nothing that can be left out")
+        return "; ".join(reasons)
 
     def headline(self) -> str:
-        tested = sum(one.predicted > 0 for one in self.left_out)
+        tested = sum(group.predicted > 0 for group in self.left_out)
         if not tested:
             return "nothing that can be left out is predicted by the rest"
         return f"{tested} left out in turn, {len(self.failed)} predicted wrongly"
@@ -106,8 +110,10 @@ class Validation(FitResult):
         heads = ["left out", "", "predicted", "rms error / u", f"{test}: chance", "worst reading"]
         rows = [[*heads, "error / u", "length, µm", f"U (k = {k:g})", ""]]
         failed = self.failed
-        for one in self.left_out:
-            rows.append([one.kind, one.name, *_cells(one, k), "<- failed" * (one in failed)])
+        for group in self.left_out:
+            rows.append(
+                [group.kind, group.name, *_cells(group, k), "<- failed" * (group in failed)]
+            )
         lines = [
             self.heading,
             (
@@ -119,16 +125,14 @@ class Validation(FitResult):
             "",
             *aligned(rows, [False, False, True, True, True, False, True, True, True, False]),
         ]
-        tested = sum(one.predicted > 0 for one in self.left_out)
+        tested = sum(group.predicted > 0 for group in self.left_out)
         if not tested:
             return [*lines, self.headline()]
         if not failed:
-            told = (
-                f"no prediction fails: the least of {tested} chances is"
-                f" {chance_words(min(one.chance for one in self.left_out if one.predicted > 0))}"
-            )
-            return [*lines, told]
-        names = ", ".join(f"{one.kind} {one.name}" for one in failed)
+            least = min(group.chance for group in self.left_out if group.predicted > 0)
+            summary = f"no prediction fails: the least of {tested} chances is {chance_words(least)}"
+            return [*lines, summary]
+        names = ", ".join(f"{group.kind} {group.name}" for group in failed)
         return [
             *lines,
             (
@@ -141,8 +145,8 @@ class Validation(FitResult):
         return {
             **self.named,
             **picked(self, "sigma_is_given"),
-            "left_out": [_data(one) for one in self.left_out],
-            "failed": [f"{one.kind} {one.name}" for one in self.failed],
+            "left_out": [_data(group) for group in self.left_out],
+            "failed": [f"{group.kind} {group.name}" for group in self.failed],
             **self.notes_data(),
         }
 
@@ -165,18 +169,18 @@ COLUMNS = {
 }
 
 
-def _cells(one: PredictedGroup, k: float) -> list[str]:
-    if not one.converged:
+def _cells(group: PredictedGroup, k: float) -> list[str]:
+    if not group.converged:
         return ["", "", "", "not converged", "", "", ""]
-    if not one.predicted:
+    if not group.predicted:
         return ["nothing", "", "", "", "", "", ""]
-    worst, lengths = one.worst, one.lengths
-    error = (one.mean_square**0.5) / one.sigma if one.sigma > 0.0 else float("nan")
-    cells = [str(one.predicted), number(error, 3), chance_words(one.chance)]
+    worst, lengths = group.worst, group.lengths
+    error = (group.mean_square**0.5) / group.sigma if group.sigma > 0.0 else float("nan")
+    cells = [str(group.predicted), number(error, 3), chance_words(group.chance)]
     if worst is None:
         cells += ["", ""]
     else:
-        where = "" if one.kind == "position" else f"{worst.position}: "
+        where = "" if group.kind == "position" else f"{worst.position}: "
         cells += [f"{where}{worst.ball} {worst.probe} {worst.axis}", f"{worst.standardised:.2f}"]
     if lengths is None:
         return [*cells, "undetermined", ""]
@@ -184,11 +188,11 @@ def _cells(one: PredictedGroup, k: float) -> list[str]:
     return [*cells, number(1e6 * lengths.change, 3), number(1e6 * u, 3)]
 
 
-def _data(one: PredictedGroup) -> dict[str, Any]:
+def _data(group: PredictedGroup) -> dict[str, Any]:
     return {
-        **picked(one, "kind", "name", "converged", "predicted"),
-        "mean_square_error": one.mean_square,
-        **picked(one, "sigma", "chance"),
-        "worst_reading": one.worst and vars(one.worst),
-        "largest_length_difference": one.lengths and {**vars(one.lengths), "unit": "m"},
+        **picked(group, "kind", "name", "converged", "predicted"),
+        "mean_square_error": group.mean_square,
+        **picked(group, "sigma", "chance"),
+        "worst_reading": group.worst and vars(group.worst),
+        "largest_length_difference": group.lengths and {**vars(group.lengths), "unit": "m"},
     }

@@ -30,26 +30,26 @@ class NestedSums:
     target: Array
     base: float
 
-    def basis(self, kept: Flags) -> Array:
+    def basis(self, is_kept: Flags) -> Array:
         """Orthonormal directions (r, q) that some columns (n,) span."""
-        return span(self.columns[:, kept], float(np.abs(self.columns).max(initial=0.0)))
+        return span(self.columns[:, is_kept], float(np.abs(self.columns).max(initial=0.0)))
 
     def left(self, basis: Array) -> Array:
         """What an orthonormal basis (r, q) leaves of the target (r,)."""
         return np.asarray(self.target - basis @ (basis.T @ self.target))
 
-    def sum_of_squares(self, kept: Flags) -> float:
+    def sum_of_squares(self, is_kept: Flags) -> float:
         """S^2 of the model with some of the columns (n,)."""
-        left = self.left(self.basis(kept))
-        return self.base + float(left @ left)
+        remainder = self.left(self.basis(is_kept))
+        return self.base + float(remainder @ remainder)
 
-    def gain(self, basis: Array, left: Array, more: Integers) -> tuple[float, int]:
+    def gain(self, basis: Array, remainder: Array, more: Integers) -> tuple[float, int]:
         """How much further columns bring S^2 down beside a basis that leaves `left` (r,), and in
         how many dimensions.
         """
         added = self.columns[:, more]
         added = span(added - basis @ (basis.T @ added), float(np.abs(added).max(initial=0.0)))
-        return float(((added.T @ left) ** 2).sum()), added.shape[1]
+        return float(((added.T @ remainder) ** 2).sum()), added.shape[1]
 
 
 def span(columns: Array, size: float) -> Array:
@@ -61,20 +61,20 @@ def span(columns: Array, size: float) -> Array:
 
 
 @single_threaded
-def nested_sums(at: Linearisation) -> NestedSums:
+def nested_sums(linearisation: Linearisation) -> NestedSums:
     """Sums of squares of the models that the one of a fit contains, what the design leaves open
     held.
     """
-    layout, factor = at.layout, at.factor
-    scale = at.spectrum.scale
+    layout, factor = linearisation.layout, linearisation.factor
+    scale = linearisation.spectrum.scale
     root = in_order(factor) * scale
-    null = np.linalg.qr(at.shared_null / scale[:, None])[0]
+    null = np.linalg.qr(linearisation.shared_null / scale[:, None])[0]
     root -= (root @ null) @ null.T
     of_model = np.zeros(len(layout), bool)
     of_model[layout.model] = True
-    others = span(root[:, ~of_model], float(np.abs(root).max(initial=0.0)))
+    others_span = span(root[:, ~of_model], float(np.abs(root).max(initial=0.0)))
     machine = root[:, of_model]
-    target = factor.side - machine @ (at.state.a / scale[of_model])
-    machine, target = (one - others @ (others.T @ one) for one in (machine, target))
+    target = factor.side - machine @ (linearisation.state.a / scale[of_model])
+    machine, target = (rows - others_span @ (others_span.T @ rows) for rows in (machine, target))
     base = factor.sum_of_squares - float(factor.side @ factor.side)
     return NestedSums(machine, target, base)

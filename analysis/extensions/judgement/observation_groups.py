@@ -30,23 +30,23 @@ class ObservationGroup:
     rows: Integers
 
 
-def kinds_of_rows(design: Design, one: Observations) -> list[str]:
+def kinds_of_rows(design: Design, observations: Observations) -> list[str]:
     """The group of each row of observations, by their kind and artefact.
 
     Values that influence quantities have by the same statement are a group, as what is stated of
     them is the variance that these values have.
     """
-    if isinstance(one, Priors):
+    if isinstance(observations, Priors):
         parameters = design.influence_parameters
         return [
             "priors" if k < 0 else parameters[k].component or "influence quantities"
-            for k in one.of_influence.tolist()
+            for k in observations.of_influence.tolist()
         ]
-    count = one.count(design)
-    if isinstance(one, Lengths) or not one.balls.shape[1]:
-        return [f"{one.word}s"] * count
-    artefacts = design.balls.artefact[one.balls[:, 0]].tolist()
-    return [f"{one.word}s of {design.artefacts.names[k]}" for k in artefacts]
+    count = observations.count(design)
+    if isinstance(observations, Lengths) or not observations.balls.shape[1]:
+        return [f"{observations.word}s"] * count
+    artefacts = design.balls.artefact[observations.balls[:, 0]].tolist()
+    return [f"{observations.word}s of {design.artefacts.names[k]}" for k in artefacts]
 
 
 def groups_of(
@@ -79,15 +79,15 @@ def groups_of(
     }[by]
     # Holes are read in two co-ordinates.
     member = np.where(measured(design, readings).ravel(), member, -1)
-    found = [ObservationGroup(word, np.flatnonzero(member == k)) for k, word in enumerate(words)]
+    groups = [ObservationGroup(word, np.flatnonzero(member == k)) for k, word in enumerate(words)]
     places = row_places(design)
-    for one in design.observations:
-        start = places[one.word].start
-        names = names_of(design, one)
+    for observation in design.observations:
+        start = places[observation.word].start
+        names = names_of(design, observation)
         for name in dict.fromkeys(names):
-            rows = np.flatnonzero([own == name for own in names])
-            found.append(ObservationGroup(name, start + rows))
-    return tuple(group for group in found if len(group.rows))
+            rows = np.flatnonzero([row_name == name for row_name in names])
+            groups.append(ObservationGroup(name, start + rows))
+    return tuple(group for group in groups if len(group.rows))
 
 
 def reweighted(design: Design, groups: Sequence[ObservationGroup], ratios: Array) -> Design:
@@ -100,14 +100,16 @@ def reweighted(design: Design, groups: Sequence[ObservationGroup], ratios: Array
     uncertainty = reading_uncertainties(design, design.readings).copy()
     uncertainty[chosen] *= times[places["reading"]].reshape(-1, d)
     changed: list[Observations] = []
-    for one in design.observations:
-        own = times[places[one.word]]
-        if isinstance(one, Lengths):
+    for observation in design.observations:
+        times_of_rows = times[places[observation.word]]
+        if isinstance(observation, Lengths):
             # Lengths share the noise of readings, which are of standards only: all are one group.
-            own = np.full(len(one), own[0] if len(own) else 1.0)
-            others = np.setdiff1d(np.arange(len(design.readings)), chosen)
-            uncertainty[others] *= own[0] if len(own) else 1.0
-        changed.append(one.enlarged(own))
+            times_of_rows = np.full(
+                len(observation), times_of_rows[0] if len(times_of_rows) else 1.0
+            )
+            other_readings = np.setdiff1d(np.arange(len(design.readings)), chosen)
+            uncertainty[other_readings] *= times_of_rows[0] if len(times_of_rows) else 1.0
+        changed.append(observation.enlarged(times_of_rows))
     return replace(design, readings=replace(design.readings, uncertainty=uncertainty)).observed(
         *changed
     )

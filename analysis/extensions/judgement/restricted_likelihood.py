@@ -59,18 +59,22 @@ class AtRatios:
     deviance: float
 
 
-def group_sums(left: Leftover, groups: Sequence[ObservationGroup]) -> GroupSums:
+def group_sums(leftover: Leftover, groups: Sequence[ObservationGroup]) -> GroupSums:
     """Sums of groups of rows."""
     # Columns have length 1, or 0 where a ball is kept or a direction open.
-    used = np.asarray(left.own_columns.power(2).sum(axis=0)).ravel() > 0.5
-    shared = (left.common**2).sum(axis=0) > 0.5
+    used = np.asarray(leftover.own_columns.power(2).sum(axis=0)).ravel() > 0.5
+    shared = (leftover.common**2).sum(axis=0) > 0.5
     grams, sides, squares = [], [], []
     for group in groups:
-        common, residual = left.common[group.rows][:, shared], left.residual[group.rows]
-        own = left.own_columns[group.rows][:, np.flatnonzero(used)]
-        mixed = own.T @ common
-        grams.append(np.block([[common.T @ common, mixed.T], [mixed, (own.T @ own).toarray()]]))
-        sides.append(np.concatenate([common.T @ residual, own.T @ residual]))
+        common, residual = leftover.common[group.rows][:, shared], leftover.residual[group.rows]
+        own_columns = leftover.own_columns[group.rows][:, np.flatnonzero(used)]
+        mixed = own_columns.T @ common
+        grams.append(
+            np.block(
+                [[common.T @ common, mixed.T], [mixed, (own_columns.T @ own_columns).toarray()]]
+            )
+        )
+        sides.append(np.concatenate([common.T @ residual, own_columns.T @ residual]))
         squares.append(float(residual @ residual))
     counts = np.array([len(group.rows) for group in groups], float)
     return GroupSums(counts, np.array(squares), np.array(sides), np.array(grams))
@@ -140,9 +144,9 @@ def degrees_of_freedom(information: Array) -> Array:
     (Satterthwaite, Biometrics 2, 1946).
     """
     values, vectors = np.linalg.eigh(information)
-    kept = values > 1e-10 * max(float(values.max(initial=0.0)), 1e-300)
-    unknown = (vectors[:, ~kept] ** 2).sum(axis=1) > 1e-12
-    variance = (vectors[:, kept] ** 2 / values[kept]).sum(axis=1)
+    is_positive = values > 1e-10 * max(float(values.max(initial=0.0)), 1e-300)
+    unknown = (vectors[:, ~is_positive] ** 2).sum(axis=1) > 1e-12
+    variance = (vectors[:, is_positive] ** 2 / values[is_positive]).sum(axis=1)
     return np.where(unknown, 0.0, 1.0 / np.where(unknown, 1.0, variance))
 
 
@@ -178,9 +182,11 @@ class RatioTest:
         weight = np.ones(len(self.counts))
         weight[self.group] = times
         side = self.other_side + weight @ self.sides
-        at = side / scale
+        point = side / scale
         squares = weight * (
-            self.squares - 2.0 * self.sides @ at + np.einsum("i,gij,j->g", at, self.absorbed, at)
+            self.squares
+            - 2.0 * self.sides @ point
+            + np.einsum("i,gij,j->g", point, self.absorbed, point)
         )
         inner = self.absorbed / np.sqrt(scale[:, None] * scale)
         inner *= weight[:, None, None]
@@ -189,11 +195,11 @@ class RatioTest:
         information = flat @ flat.T + np.diag(self.counts - 2.0 * traces)
         redundancies = self.counts - traces
         slope = squares - redundancies
-        others = np.delete(np.arange(len(weight)), self.group)
-        mixed = information[self.group, others]
-        share = np.linalg.lstsq(information[np.ix_(others, others)], mixed)[0]
+        other_groups = np.delete(np.arange(len(weight)), self.group)
+        mixed = information[self.group, other_groups]
+        share = np.linalg.lstsq(information[np.ix_(other_groups, other_groups)], mixed)[0]
         freedom = float(information[self.group, self.group] - share @ mixed)
-        score = float(slope[self.group] - share @ slope[others])
+        score = float(slope[self.group] - share @ slope[other_groups])
         redundancy = float(redundancies[self.group])
         if not freedom > 0.0 or not redundancy > 0.0:
             return 1.0

@@ -72,38 +72,38 @@ class Comparison:
     given: bool
     observations: int
 
-    def criteria(self, one: FittedSum) -> Criteria:
+    def criteria(self, fitted: FittedSum) -> Criteria:
         """Akaike's and Schwarz's criteria of a normal likelihood with all parameters, sigma among
         them where it is estimated.
         """
         count = self.observations
-        parameters, misfit = count - one.degrees_of_freedom, one.sum_of_squares
+        parameters, misfit = count - fitted.degrees_of_freedom, fitted.sum_of_squares
         if not self.given:
             parameters += 1
             misfit = count * float(np.log(max(misfit / count, ROUNDING)))
         return Criteria(misfit + 2 * parameters, misfit + float(np.log(count)) * parameters)
 
-    def is_worse(self, one: FittedSum, others: list[FittedSum]) -> bool:
+    def is_worse(self, fitted: FittedSum, rivals: list[FittedSum]) -> bool:
         """Whether BIC clearly prefers one of others with more parameters."""
-        mine = self.criteria(one).bic
+        mine = self.criteria(fitted).bic
         return any(
-            self.criteria(other).bic < mine - CLEARLY_WORSE
-            for other in others
-            if other.model.count > one.model.count
+            self.criteria(rival).bic < mine - CLEARLY_WORSE
+            for rival in rivals
+            if rival.model.count > fitted.model.count
         )
 
     def chance(self, poor: FittedSum, rich: FittedSum) -> float:
         """Chance of what the richer model explains if the poorer one is right."""
         freedom = rich.degrees_of_freedom
-        left = max(rich.sum_of_squares, ROUNDING * freedom)
-        gain = max(poor.sum_of_squares, ROUNDING * freedom) - left
-        return chance_of(gain, poor.degrees_of_freedom - freedom, left, freedom, self.given)
+        sum_left = max(rich.sum_of_squares, ROUNDING * freedom)
+        gain = max(poor.sum_of_squares, ROUNDING * freedom) - sum_left
+        return chance_of(gain, poor.degrees_of_freedom - freedom, sum_left, freedom, self.given)
 
-    def beaten(self, poor: FittedSum, others: list[FittedSum]) -> Beaten:
+    def beaten(self, poor: FittedSum, rivals: list[FittedSum]) -> Beaten:
         """The richer model that explains most, by chance."""
-        found = [(self.chance(poor, one), one.model.words) for one in others]
-        least, by = min(found, default=(1.0, ""))
-        return Beaten(least, len(found), by)
+        chances = [(self.chance(poor, rival), rival.model.words) for rival in rivals]
+        least, by = min(chances, default=(1.0, ""))
+        return Beaten(least, len(chances), by)
 
 
 @dataclass(frozen=True, eq=False)
@@ -121,25 +121,27 @@ class PolynomialGrid:
     def functions(self) -> tuple[ErrorFunction, ...]:
         """The error functions that are polynomials; squareness is a single number."""
         every = chain_of(self.richest.model.model).functions
-        return tuple(one for one in every if hasattr(one.basis, "coefficients"))
+        return tuple(rung for rung in every if hasattr(rung.basis, "coefficients"))
 
     def kept(self, model: LadderModel) -> Flags:
         """Which of the richest model's parameters a poorer one has."""
         chain = chain_of(self.richest.model.model)
         kept = np.ones(len(chain.parameters), bool)
-        for one in self.functions:
-            first = chain.slices[one.name].start + self._size(model, one)
-            kept[first : chain.slices[one.name].stop] = False
+        for function in self.functions:
+            first = chain.slices[function.name].start + self._size(model, function)
+            kept[first : chain.slices[function.name].stop] = False
         return kept
 
-    def _size(self, model: LadderModel, one: ErrorFunction) -> int:
-        return free_coefficients(one.basis, model.coefficients(one.name, one.rotation))
+    def _size(self, model: LadderModel, function: ErrorFunction) -> int:
+        return free_coefficients(
+            function.basis, model.coefficients(function.name, function.rotation)
+        )
 
     def fitted(self, model: LadderModel) -> FittedSum:
         """A model within the richest, with its S^2."""
-        kept = self.kept(model)
-        freedom = self.richest.degrees_of_freedom + int((~kept).sum())
-        return FittedSum(model, self.sums.sum_of_squares(kept), freedom)
+        is_kept = self.kept(model)
+        freedom = self.richest.degrees_of_freedom + int((~is_kept).sum())
+        return FittedSum(model, self.sums.sum_of_squares(is_kept), freedom)
 
     def every(self) -> list[FittedSum]:
         """All with the same number for all positional, and for all rotational errors."""
@@ -148,53 +150,58 @@ class PolynomialGrid:
         pairs = [
             (n, m) for n in range(POOREST[0], most[0] + 1) for m in range(POOREST[1], most[1] + 1)
         ]
-        return [self.fitted(one) for one in (self.make(n, m, {}) for n, m in pairs) if one.count]
+        return [
+            self.fitted(model) for model in (self.make(n, m, {}) for n, m in pairs) if model.count
+        ]
 
     def with_functions(self, start: FittedSum, test: Comparison) -> FittedSum:
         """The model with more coefficients for the single functions that call for them."""
-        found = start
+        best = start
         for _ in range(MOST_FUNCTIONS):
-            better = self._one_more(found, test)
+            better = self._one_more(best, test)
             if better is None:
                 break
-            found = better
-        return found
+            best = better
+        return best
 
     def _one_more(self, start: FittedSum, test: Comparison) -> FittedSum | None:
         """The model with more coefficients for the single function that calls for them most."""
         model = start.model
         assert model.numbers is not None
         basis = self.sums.basis(self.kept(model))
-        left = self.sums.left(basis)
+        remainder = self.sums.left(basis)
         first = {
-            one.name: chain_of(self.richest.model.model).slices[one.name] for one in self.functions
+            function.name: chain_of(self.richest.model.model).slices[function.name]
+            for function in self.functions
         }
 
-        def with_more(one: ErrorFunction, size: int) -> FittedSum:
-            more = first[one.name].start + np.arange(self._size(model, one), size)
-            gain, dimensions = self.sums.gain(basis, left, more)
+        def with_more(function: ErrorFunction, size: int) -> FittedSum:
+            more = first[function.name].start + np.arange(self._size(model, function), size)
+            gain, dimensions = self.sums.gain(basis, remainder, more)
             return FittedSum(
                 model, start.sum_of_squares - gain, start.degrees_of_freedom - dimensions
             )
 
         offers = [
-            (test.chance(start, with_more(one, size)), place, size)
-            for place, one in enumerate(self.functions)
-            for size in range(self._size(model, one) + 1, one.basis.size + 1)
+            (test.chance(start, with_more(function, size)), place, size)
+            for place, function in enumerate(self.functions)
+            for size in range(self._size(model, function) + 1, function.basis.size + 1)
         ]
         if not offers or min(offers)[0] >= FALSE_FUNCTION / len(offers):
             return None
         _, place, size = min(offers)
-        one = self.functions[place]
-        rich = with_more(one, size)
+        function = self.functions[place]
+        rich = with_more(function, size)
         # Of its coefficients the last ones that explain nothing are left out again.
-        while size - 1 > self._size(model, one):
-            poor = with_more(one, size - 1)
+        while size - 1 > self._size(model, function):
+            poor = with_more(function, size - 1)
             if test.chance(poor, rich) < LAST_COEFFICIENT:
                 break
             size, rich = size - 1, poor
-        count = size + 1 + int(one.basis.zero_at_one)
-        return replace(rich, model=self.make(*model.numbers, {**dict(model.own), one.name: count}))
+        count = size + 1 + int(function.basis.zero_at_one)
+        return replace(
+            rich, model=self.make(*model.numbers, {**dict(model.own), function.name: count})
+        )
 
 
 def limits_reached(
@@ -204,38 +211,38 @@ def limits_reached(
     so that nothing shows that these are enough; 0 stands for those of an empirical model.
     """
     if model.numbers is None:
-        largest = max(one.model.count for one in every if one.model.numbers is None)
+        largest = max(pair.model.count for pair in every if pair.model.numbers is None)
         return (0,) if model.count == largest else ()
     most, poorest = grid.richest.model, dict(zip((False, True), POOREST, strict=True))
-    both = (
-        (model.coefficients(*one), most.coefficients(*one), poorest[one[1]])
-        for one in ((function.name, function.rotation) for function in grid.functions)
+    counts = (
+        (model.coefficients(*pair), most.coefficients(*pair), poorest[pair[1]])
+        for pair in ((function.name, function.rotation) for function in grid.functions)
     )
-    return tuple(sorted({mine for mine, limit, least in both if mine == limit > least}))
+    return tuple(sorted({mine for mine, limit, least in counts if mine == limit > least}))
 
 
 def richer(model: FittedSum, every: list[FittedSum]) -> list[FittedSum]:
     """The models that can do all that one can, and more."""
-    return [one for one in every if contains(one.model, model.model)]
+    return [rung for rung in every if contains(rung.model, model.model)]
 
 
 def path(every: list[FittedSum], test: Comparison) -> list[FittedSum]:
     """A way from the poorest to the richest polynomials, one coefficient more at each step: from
     the richest down by what is missed least.
     """
-    by_numbers = {one.model.numbers: one for one in every}
-    at = max(every, key=lambda one: one.model.numbers or POOREST)
-    found = [at]
+    by_numbers = {fit.model.numbers: fit for fit in every}
+    here_now = max(every, key=lambda fit: fit.model.numbers or POOREST)
+    steps = [here_now]
     while True:
-        assert at.model.numbers is not None
-        n, m = at.model.numbers
-        fewer = [by_numbers.get(one) for one in ((n - 1, m), (n, m - 1))]
-        offers = [one for one in fewer if one is not None]
+        assert here_now.model.numbers is not None
+        n, m = here_now.model.numbers
+        fewer = [by_numbers.get(fit) for fit in ((n - 1, m), (n, m - 1))]
+        offers = [fit for fit in fewer if fit is not None]
         if not offers:
-            return found[::-1]
-        here = at
-        at = max(offers, key=lambda one: (test.chance(one, here), one.degrees_of_freedom))
-        found.append(at)
+            return steps[::-1]
+        here = here_now
+        here_now = max(offers, key=lambda fit: (test.chance(fit, here), fit.degrees_of_freedom))
+        steps.append(here_now)
 
 
 def first_adequate(
@@ -247,10 +254,10 @@ def first_adequate(
     the polynomials has more coefficients for the single functions that call for them. If every
     model is beaten, it is the richest of all.
     """
-    for one in sorted(every, key=lambda one: one.model.count):
-        offer = one if one.model.numbers is None else grid.with_functions(one, test)
+    for fit in sorted(every, key=lambda fit: fit.model.count):
+        offer = fit if fit.model.numbers is None else grid.with_functions(fit, test)
         beaten = test.beaten(offer, richer(offer, every))
         if beaten.chance >= FALSE_STEP and not test.is_worse(offer, every):
             return offer, beaten
-    richest = max(every, key=lambda one: one.model.count)
+    richest = max(every, key=lambda fit: fit.model.count)
     return richest, Beaten(1.0, 0, "")

@@ -86,26 +86,29 @@ def refuse_priors(experiment: Experiment, design: Design) -> None:
 
 
 def kinematic_rung(
-    experiment: Experiment, position: int, rotation: int, own: Mapping[str, int] | None = None
+    experiment: Experiment,
+    position: int,
+    rotation: int,
+    own_degrees: Mapping[str, int] | None = None,
 ) -> LadderModel:
     """A kinematic model with polynomials of so many coefficients, those of single functions `own`;
     arranged as the file says if its model is kinematic.
     """
-    given = experiment.error_model
-    if not isinstance(given, KinematicSettings):
-        given = KinematicSettings(kind="kinematic")
+    kinematic = experiment.error_model
+    if not isinstance(kinematic, KinematicSettings):
+        kinematic = KinematicSettings(kind="kinematic")
     basis: Literal["monomial", "chebyshev"] = (
-        "monomial" if given.basis == "monomial" else "chebyshev"
+        "monomial" if kinematic.basis == "monomial" else "chebyshev"
     )
-    single = {} if own is None else dict(own)
+    single = {} if own_degrees is None else dict(own_degrees)
     settings = KinematicSettings(
         kind="kinematic",
-        arrangement=given.arrangement,
-        rotations=given.rotations,
+        arrangement=kinematic.arrangement,
+        rotations=kinematic.rotations,
         position_coefficients=position,
         rotation_coefficients=rotation,
         basis=basis,
-        squareness=given.squareness,
+        squareness=kinematic.squareness,
         **({"functions": FunctionsSettings(**single)} if single else {}),
     )
     words = f"kinematic, {position} and {rotation} coefficients"
@@ -151,11 +154,11 @@ def contains(outer: LadderModel, inner: LadderModel) -> bool:
         )
     chain = chain_of(inner.model).functions
     if outer.numbers is None:
-        most = max(inner.coefficients(one.name, one.rotation) for one in chain)
+        most = max(inner.coefficients(link.name, link.rotation) for link in chain)
         return most <= outer.within
     return all(
-        outer.coefficients(one.name, one.rotation) >= inner.coefficients(one.name, one.rotation)
-        for one in chain
+        outer.coefficients(link.name, link.rotation) >= inner.coefficients(link.name, link.rotation)
+        for link in chain
     )
 
 

@@ -50,7 +50,7 @@ class SourceSums:
         """Contributions (k, m) to the variances of functions with derivatives `roots` (m, r) by
         the standard normal variables of the shared parameters.
         """
-        return np.stack([((roots @ one) * roots).sum(axis=1) for one in self.sums])
+        return np.stack([((roots @ source_sum) * roots).sum(axis=1) for source_sum in self.sums])
 
     def of_sum(self, squares: Array) -> Array:
         """Contributions (k,) to the sum of the variances of functions, whose roots g have the sum
@@ -61,7 +61,7 @@ class SourceSums:
 
 @single_threaded
 def source_sums(
-    at: Linearisation, x: Array | None, sources: Sequence[ObservationGroup]
+    linearisation: Linearisation, x: Array | None, sources: Sequence[ObservationGroup]
 ) -> SourceSums:
     """The sums of all sources of a linearisation with scale readings `x` (readings, d), or
     error-free ones.
@@ -69,41 +69,41 @@ def source_sums(
     Rows of length standards become the readings' noise and the certificates, whatever sources they
     are of.
     """
-    rank, member = at.rank, np.full(row_count(at.design), -1)
-    for k, one in enumerate(sources):
-        member[one.rows] = k
-    lengths = row_places(at.design).get(Lengths.word, slice(0, 0))
+    rank, member = linearisation.rank, np.full(row_count(linearisation.design), -1)
+    for k, source in enumerate(sources):
+        member[source.rows] = k
+    lengths = row_places(linearisation.design).get(Lengths.word, slice(0, 0))
     of_lengths = np.zeros((lengths.stop - lengths.start, rank))
     sums = np.zeros((len(sources), rank, rank))
-    for some in hat_rows(at, x):
-        common, own = some.common[:, :rank], member[some.rows]
-        for k in np.unique(own[own >= 0]):
-            sums[k] += common[own == k].T @ common[own == k]
+    for some in hat_rows(linearisation, x):
+        common, common_rows = some.common[:, :rank], member[some.rows]
+        for k in np.unique(common_rows[common_rows >= 0]):
+            sums[k] += common[common_rows == k].T @ common[common_rows == k]
         is_length = (some.rows >= lengths.start) & (some.rows < lengths.stop)
         of_lengths[some.rows[is_length] - lengths.start] = common[is_length]
-    names = [one.name for one in sources]
+    names = [source.name for source in sources]
     if len(of_lengths):
-        certified = _of_certificates(at.design, of_lengths)
+        certified = _of_certificates(linearisation.design, of_lengths)
         k = int(member[lengths.start])
         names[k] = READ_STANDARDS
         sums[k] -= sum(certified.values())
         names += certified
-        sums = np.concatenate([sums, *(one[None] for one in certified.values())])
+        sums = np.concatenate([sums, *(source[None] for source in certified.values())])
     return SourceSums(tuple(names), sums)
 
 
 def _of_certificates(design: Design, rows: Array) -> dict[str, Array]:
     """Sums (r, r) of the certificates of each length standard, from the rows (m, r) of lengths."""
-    given = design.of(Lengths)
-    pulled = given.uncertainty[:, None] * design.once(length_whitening).pulled(rows)
-    standard = design.balls.artefact[design.readings.ball[given.first]]
-    found = {}
-    for k in np.unique(standard[given.uncertainty > 0.0]):
-        own = standard == k
-        errors = np.zeros((int(given.certificate.max()) + 1, rows.shape[1]))
-        np.add.at(errors, given.certificate[own], pulled[own])
-        found[f"certificate of {design.artefacts.names[k]}"] = errors.T @ errors
-    return found
+    lengths = design.of(Lengths)
+    pulled = lengths.uncertainty[:, None] * design.once(length_whitening).pulled(rows)
+    standard = design.balls.artefact[design.readings.ball[lengths.first]]
+    rows_by_certificate = {}
+    for k in np.unique(standard[lengths.uncertainty > 0.0]):
+        is_of_certificate = standard == k
+        errors = np.zeros((int(lengths.certificate.max()) + 1, rows.shape[1]))
+        np.add.at(errors, lengths.certificate[is_of_certificate], pulled[is_of_certificate])
+        rows_by_certificate[f"certificate of {design.artefacts.names[k]}"] = errors.T @ errors
+    return rows_by_certificate
 
 
 def sources_of(
@@ -113,36 +113,38 @@ def sources_of(
     group them, every item of calibration, stars, offsets of probes, priors by what they are about,
     and every influence quantity.
     """
-    return groups_of(design, by, lambda design, one: _names(design, one, experiment))
+    return groups_of(design, by, lambda design, source: _names(design, source, experiment))
 
 
-def _names(design: Design, one: Observations, experiment: Experiment) -> list[str]:
+def _names(design: Design, observations: Observations, experiment: Experiment) -> list[str]:
     """The source of each row of observations."""
-    if isinstance(one, Priors):
-        return _of_priors(design, one, experiment)
-    if isinstance(one, Stars):
-        return [f"stars[{k}]" for k in one.star.tolist()]
+    if isinstance(observations, Priors):
+        return _of_priors(design, observations, experiment)
+    if isinstance(observations, Stars):
+        return [f"stars[{k}]" for k in observations.star.tolist()]
     names: list[str] = []
     for k, item in enumerate(experiment.calibration):
         if not experiment.is_observed(item):
             continue
-        given = item.observed(0)
-        if isinstance(one, type(given) if item.root is None else JointValues):
-            names += [f"calibration[{k}]: {item.kind} of {item.subject}"] * len(given)
-    others = kinds_of_rows(design, one)[len(names) :]
-    if isinstance(one, CalibratedCoordinates):
+        observed = item.observed(0)
+        if isinstance(observations, type(observed) if item.root is None else JointValues):
+            names += [f"calibration[{k}]: {item.kind} of {item.subject}"] * len(observed)
+    other_kinds = kinds_of_rows(design, observations)[len(names) :]
+    if isinstance(observations, CalibratedCoordinates):
         # What no item states is how flat artefacts that are read in their plane are taken to be.
-        others = [f"flatness of {name.removeprefix('coordinates of ')}" for name in others]
-    return names + others
+        other_kinds = [
+            f"flatness of {name.removeprefix('coordinates of ')}" for name in other_kinds
+        ]
+    return names + other_kinds
 
 
 def _of_priors(design: Design, priors: Priors, experiment: Experiment) -> list[str]:
     of_influences = [
         f"influences[{k}]: {vars(settings)['kind']}"
-        for k, (settings, one) in enumerate(
+        for k, (settings, influence) in enumerate(
             zip(experiment.influences, design.influences, strict=True)
         )
-        for parameter in one.parameters
+        for parameter in influence.parameters
         if parameter.uncertainty
     ]
     names = []

@@ -53,7 +53,7 @@ def chart_svg(chart: Chart) -> Html:
     """The chart as an element of a page."""
     horizontal, vertical = _limits(chart)
     scale = _Scale(horizontal, vertical, chart.height)
-    parts = [*_grid(chart, scale), *(_trace(one, scale) for one in chart.traces)]
+    parts = [*_grid(chart, scale), *(_trace(trace, scale) for trace in chart.traces)]
     return element(
         "svg",
         joined(parts),
@@ -81,9 +81,9 @@ class _Scale:
 
 
 def _limits(chart: Chart) -> tuple[tuple[float, float], tuple[float, float]]:
-    across = np.concatenate([one.x for one in chart.traces])
+    across = np.concatenate([trace.x for trace in chart.traces])
     up = np.concatenate(
-        [part for one in chart.traces for part in (one.y, one.upper) if part is not None]
+        [part for trace in chart.traces for part in (trace.y, trace.upper) if part is not None]
     )
     ends = _ends(up)
     low = min(ends[0], 0.0) if chart.from_zero else ends[0]
@@ -96,8 +96,8 @@ def _limits(chart: Chart) -> tuple[tuple[float, float], tuple[float, float]]:
 
 
 def _ends(values: Array) -> tuple[float, float]:
-    known = values[np.isfinite(values)]
-    return (float(known.min()), float(known.max())) if len(known) else (0.0, 1.0)
+    finite = values[np.isfinite(values)]
+    return (float(finite.min()), float(finite.max())) if len(finite) else (0.0, 1.0)
 
 
 def ticks(low: float, high: float, count: int = TICKS) -> list[float]:
@@ -138,7 +138,7 @@ def _grid(chart: Chart, scale: _Scale) -> list[Html]:
 
 def _shown_places(chart: Chart, scale: _Scale) -> list[tuple[float, str]]:
     """Names along the axis where there is room for them, otherwise some of their numbers."""
-    where = scale.x(np.array([at for at, _ in chart.places])).tolist()
+    where = scale.x(np.array([x for x, _ in chart.places])).tolist()
     room = (WIDTH - LEFT - RIGHT) / max(len(where), 1)
     longest = max(len(name) for _, name in chart.places)
     if 5.6 * min(longest, LETTERS) < room:
@@ -150,16 +150,16 @@ def _shown_places(chart: Chart, scale: _Scale) -> list[tuple[float, str]]:
     return [(x, str(k + 1)) for k, x in enumerate(where) if k % every == 0]
 
 
-def _trace(one: Trace, scale: _Scale) -> Html:
-    known = np.isfinite(one.x) & np.isfinite(one.y)
-    if one.upper is not None:
-        known &= np.isfinite(one.upper)
-    x, y = np.round(scale.x(one.x), 1).tolist(), np.round(scale.y(one.y), 1).tolist()
-    runs = _runs(known)
-    if one.kind == "dots":
+def _trace(trace: Trace, scale: _Scale) -> Html:
+    is_finite = np.isfinite(trace.x) & np.isfinite(trace.y)
+    if trace.upper is not None:
+        is_finite &= np.isfinite(trace.upper)
+    x, y = np.round(scale.x(trace.x), 1).tolist(), np.round(scale.y(trace.y), 1).tolist()
+    runs = _runs(is_finite)
+    if trace.kind == "dots":
         path = "".join(f"M{x[k]:g} {y[k]:g}h0" for run in runs for k in run)
-    elif one.kind == "band" and one.upper is not None:
-        top = np.round(scale.y(one.upper), 1).tolist()
+    elif trace.kind == "band" and trace.upper is not None:
+        top = np.round(scale.y(trace.upper), 1).tolist()
         path = "".join(
             _line([x[k] for k in run], [y[k] for k in run])
             + _line([x[k] for k in reversed(run)], [top[k] for k in reversed(run)]).replace(
@@ -170,12 +170,12 @@ def _trace(one: Trace, scale: _Scale) -> Html:
         )
     else:
         path = "".join(_line([x[k] for k in run], [y[k] for k in run]) for run in runs)
-    return _path(path, f"{one.kind} {one.style}")
+    return _path(path, f"{trace.kind} {trace.style}")
 
 
-def _runs(known: np.ndarray) -> list[list[int]]:
+def _runs(is_finite: np.ndarray) -> list[list[int]]:
     """Indices of neighbouring values that are known."""
-    index = np.flatnonzero(known)
+    index = np.flatnonzero(is_finite)
     return [
         run.tolist() for run in np.split(index, np.flatnonzero(np.diff(index) > 1) + 1) if len(run)
     ]

@@ -30,7 +30,7 @@ def page_of_design(
     suggested changes and of the map of lengths.
     """
     design = prediction.design
-    at = linearise(design)
+    linearisation = linearise(design)
     target = target_in_words(experiment)
     data: dict[str, Any] = {"run": prediction.to_dict()}
     settings = length_settings(experiment, target or NO_TARGET, GRID[design.dimension])
@@ -50,9 +50,9 @@ def page_of_design(
     contents = DesignContents(
         experiment.title,
         data,
-        at,
-        null_motions(at),
-        weak_motions(at, experiment.target_uncertainty),
+        linearisation,
+        null_motions(linearisation),
+        weak_motions(linearisation, experiment.target_uncertainty),
         target,
         reason,
         experiment.source.name if experiment.name is None else experiment.label,

@@ -60,9 +60,11 @@ def design_page(contents: DesignContents) -> str:
     quoted = {name: QuotedData(f"/{name}", data) for name, data in contents.data.items()}
     run = quoted["run"]
     factor = expansion(run.at("quantities"))
-    at = contents.at
-    ellipsoids = [point_view(at, factor)] if len(at.design.evaluation.points) else []
-    ellipsoids += list(ball_views(at, factor))
+    linearisation = contents.at
+    ellipsoids = (
+        [point_view(linearisation, factor)] if len(linearisation.design.evaluation.points) else []
+    )
+    ellipsoids += list(ball_views(linearisation, factor))
     sections = [
         PageSection("volume", "The experiment", _experiment(contents)),
         PageSection("rank", "What the readings determine", _rank(run, contents)),
@@ -98,9 +100,11 @@ def figures_wide(content: Iterable[Html]) -> Html:
 
 
 def _is_good(run: QuotedData) -> bool:
-    shares = [one.get("within_target") for one in run.data["quantities"].values()]
+    shares = [quantity.get("within_target") for quantity in run.data["quantities"].values()]
     missed = any(share is not None and share < 1.0 for share in shares)
-    missed |= any(one["within_target"] is False for one in run.data.get("tasks", {}).values())
+    missed |= any(
+        quantity["within_target"] is False for quantity in run.data.get("tasks", {}).values()
+    )
     return run.data["as_expected"] and not run.data["weakly_determined"] and not missed
 
 
@@ -151,7 +155,7 @@ def _throughout(run: QuotedData, lengths: QuotedData) -> list[str | Html]:
 
 def _rank(run: QuotedData, contents: DesignContents) -> Html:
     parts = []
-    given = (
+    groups = (
         (
             "undetermined",
             "Undetermined",
@@ -165,28 +169,30 @@ def _rank(run: QuotedData, contents: DesignContents) -> Html:
             "The observations hardly notice these; each is drawn one standard deviation long.",
         ),
     )
-    for key, title, motions, words in given:
+    for key, title, motions, words in groups:
         if not run.data[key]:
             continue
         pictures: list[Html] = []
-        rest: list[Html] = []
-        for k, (motion, one) in enumerate(zip(motions, run.at(key).each(), strict=True), start=1):
-            told = one.text() if key == "undetermined" else one.text("text")
+        items: list[Html] = []
+        for k, (motion, direction) in enumerate(
+            zip(motions, run.at(key).each(), strict=True), start=1
+        ):
+            text = direction.text() if key == "undetermined" else direction.text("text")
             drawn = None
             if len(pictures) < MOST_DRAWN:
                 name = f"{key.replace('_', '-')}-{k}"
-                drawn = motion_view(contents.at, motion, name, told, f"{title} {k}")
+                drawn = motion_view(contents.at, motion, name, text, f"{title} {k}")
             if drawn is None:
-                rest.append(element("li", told, value=k))
+                items.append(element("li", text, value=k))
             else:
                 pictures.append(figure_of(drawn))
         parts += [element("h3", title), note(words), figures_wide(pictures)]
-        if rest:
+        if items:
             summary = "Directions without a picture" if pictures else "Directions"
-            others = folded(summary, element("ol", *rest), is_open=len(rest) <= 20)
-            parts.append(others)
+            list_of_others = folded(summary, element("ol", *items), is_open=len(items) <= 20)
+            parts.append(list_of_others)
     if run.data["reasons"]:
-        reasons = (element("li", one.text()) for one in run.at("reasons").each())
+        reasons = (element("li", direction.text()) for direction in run.at("reasons").each())
         parts += [element("h3", "Reasons"), element("ul", *reasons)]
     if not parts:
         return sentence("Nothing is undetermined or weakly determined.")
@@ -207,11 +213,15 @@ def _suggestions(quoted: Mapping[str, QuotedData]) -> Html:
     )
     rows = []
     for key in ("complete", "partial"):
-        for number, one in enumerate(repairs.at(key).each(), start=1):
-            changes = joined((change.text("text") for change in one.at("changes").each()), "; ")
-            of = ", ".join(map(str, one.data["removes"]))
-            many = "s" if len(one.data["removes"]) > 1 else ""
-            name = f"repair {number}" if key == "complete" else f"of direction{many} {of} alone"
+        for number, suggestion in enumerate(repairs.at(key).each(), start=1):
+            changes = joined(
+                (change.text("text") for change in suggestion.at("changes").each()), "; "
+            )
+            removed = ", ".join(map(str, suggestion.data["removes"]))
+            many = "s" if len(suggestion.data["removes"]) > 1 else ""
+            name = (
+                f"repair {number}" if key == "complete" else f"of direction{many} {removed} alone"
+            )
             edits = joined(
                 element(
                     "li",
@@ -219,21 +229,21 @@ def _suggestions(quoted: Mapping[str, QuotedData]) -> Html:
                         "code", f"{edit['path']}: {json.dumps(edit['value'], ensure_ascii=False)}"
                     ),
                 )
-                for edit in one.data["edits"]
+                for edit in suggestion.data["edits"]
             )
             u6, loose = (
-                one.micro(symbol) if one.data[symbol] is not None else "-"
+                suggestion.micro(symbol) if suggestion.data[symbol] is not None else "-"
                 for symbol in ("average_U6", "average_U6_with_uncertain_offsets")
             )
             rows.append(
                 [
                     name,
                     changes,
-                    one.number("rank_deficiency"),
-                    one.number("weakly_determined"),
+                    suggestion.number("rank_deficiency"),
+                    suggestion.number("weakly_determined"),
                     u6,
                     loose,
-                    one.number("readings"),
+                    suggestion.number("readings"),
                     element("ul", edits, class_="edits"),
                 ]
             )
@@ -252,24 +262,26 @@ def _suggestions(quoted: Mapping[str, QuotedData]) -> Html:
     title = "Changes, by U6 with uncertain probe offsets, each verified"
     made_table = table("repairs", title, heads, rows, (0, 1, 7))
     whole, parts = len(repairs.data["complete"]), len(repairs.data["partial"])
-    told = "Each of these determines what is open."
+    introduction = "Each of these determines what is open."
     if not whole:
-        told = "None of these determines all that is open."
+        introduction = "None of these determines all that is open."
     elif parts:
-        told = "Each repair determines what is open; the other changes determine a part of it."
-    return joined([sentence(told, now), made_table])
+        introduction = (
+            "Each repair determines what is open; the other changes determine a part of it."
+        )
+    return joined([sentence(introduction, now), made_table])
 
 
 def _influences(run: QuotedData) -> Html:
     if not run.data.get("influences"):
         return Html()
     rows = []
-    for name, one in zip(run.data["influences"], run.at("influences").each(), strict=True):
-        u, unit = one.amount("standard_uncertainty", "unit")
-        stated = "unknown"
-        if one.data["stated_standard_uncertainty"] is not None:
-            stated, _ = one.amount("stated_standard_uncertainty", "unit")
-        rows.append([name, stated, u, unit])
+    for name, influence in zip(run.data["influences"], run.at("influences").each(), strict=True):
+        u, unit = influence.amount("standard_uncertainty", "unit")
+        stated_text = "unknown"
+        if influence.data["stated_standard_uncertainty"] is not None:
+            stated_text, _ = influence.amount("stated_standard_uncertainty", "unit")
+        rows.append([name, stated_text, u, unit])
     heads = ["influence quantity", "u stated", "u after the readings", "unit"]
     return table("influences", "Influence quantities", heads, rows, (0, 3))
 

@@ -45,10 +45,10 @@ def volume_layers(design: Design) -> list[Layer]:
             place[k] = lower[k] + share * (upper[k] - lower[k])
             ends.append(place)
             names.append(f"{'xyz'[k]}, mm" if text is None else f"{1e3 * text + 0.0:.6g}")
-    seen, unseen = edges[~hidden].reshape(-1, d), edges[hidden].reshape(-1, d)
+    visible_and_hidden, unseen = edges[~hidden].reshape(-1, d), edges[hidden].reshape(-1, d)
     return [
         Layer("lines", "faint thin dotted", unseen, (2,) * int(hidden.sum())),
-        Layer("lines", "faint thin", seen, (2,) * int((~hidden).sum())),
+        Layer("lines", "faint thin", visible_and_hidden, (2,) * int((~hidden).sum())),
         Layer("labels", "axes", np.array(ends), names=tuple(names)),
     ]
 
@@ -58,10 +58,12 @@ def volume_view(design: Design, most: int = MOST_BALLS) -> SpatialPicture:
     where = locations(design, nominal_state(design), design.readings)
     layers = volume_layers(design)
     labels, names, styli = [], [], []
-    read = [k for k in range(len(design.positions.names)) if (design.readings.position == k).any()]
-    position_names = [design.positions.names[k] for k in read]
+    positions_read = [
+        k for k in range(len(design.positions.names)) if (design.readings.position == k).any()
+    ]
+    position_names = [design.positions.names[k] for k in positions_read]
     is_named = names_fit(position_names)
-    for number, k in enumerate(read):
+    for number, k in enumerate(positions_read):
         mine = np.flatnonzero(design.readings.position == k)
         balls = where[mine]
         outline = _outline(balls)
@@ -82,9 +84,9 @@ def volume_view(design: Design, most: int = MOST_BALLS) -> SpatialPicture:
         names.append(position_names[number] if is_named else str(number + 1))
     if styli:
         layers.append(Layer("lines", "ink fine", np.concatenate(styli), (2,) * len(styli)))
-        layers.append(Layer("dots", "ink", np.stack([one[1] for one in styli])))
+        layers.append(Layer("dots", "ink", np.stack([stylus[1] for stylus in styli])))
     layers.append(Layer("labels", "names", np.array(labels), names=tuple(names)))
-    words = f"{len(read)} positions in the volume, which the run sheet lists"
+    words = f"{len(positions_read)} positions in the volume, which the run sheet lists"
     caption = (
         "Positions in the volume: balls that are read, and from one ball of each position the styli"
         " to the machine's reference point."
@@ -105,33 +107,41 @@ def turning_words(design: Design) -> Html:
     return element("span", words, class_="turning")
 
 
-def point_view(at: Linearisation, factor: float, sigma: float = 1.0) -> SpatialPicture:
+def point_view(linearisation: Linearisation, factor: float, sigma: float = 1.0) -> SpatialPicture:
     """Ellipsoids of the corrected evaluation points, enlarged, with their expanded uncertainties
     as half axes.
     """
-    design, given = at.design, at.design.evaluation
-    probes = np.full(len(given.points), given.probe)
-    rows = correction_rows(design, at.layout, at.state, given.points, probes)
-    open_ = np.isnan(at.of_shared(rows.reshape(-1, rows.shape[2]))).reshape(rows.shape[:2])
-    known = ~open_.any(axis=1)
+    design, design_and_points = linearisation.design, linearisation.design.evaluation
+    probes = np.full(len(design_and_points.points), design_and_points.probe)
+    rows = correction_rows(
+        design, linearisation.layout, linearisation.state, design_and_points.points, probes
+    )
+    open_ = np.isnan(linearisation.of_shared(rows.reshape(-1, rows.shape[2]))).reshape(
+        rows.shape[:2]
+    )
+    is_determined = ~open_.any(axis=1)
     layers = volume_layers(design)
-    points = given.points[known]
-    spread = factor * sigma * (rows[known] @ at.shared)
+    points = design_and_points.points[is_determined]
+    spread = factor * sigma * (rows[is_determined] @ linearisation.shared)
     size = float(
         np.ptp(np.stack([design.machine.volume.lower, design.machine.volume.upper]), axis=0).max()
     )
-    told = "point-view", "points", "Corrected evaluation points"
-    return _ellipsoids(layers, points, spread, given.points[~known], size, told, factor)
+    names = "point-view", "points", "Corrected evaluation points"
+    return _ellipsoids(
+        layers, points, spread, design_and_points.points[~is_determined], size, names, factor
+    )
 
 
-def ball_views(at: Linearisation, factor: float, sigma: float = 1.0) -> Iterator[SpatialPicture]:
+def ball_views(
+    linearisation: Linearisation, factor: float, sigma: float = 1.0
+) -> Iterator[SpatialPicture]:
     """Ellipsoids of each plate's balls in the plate's frame, likewise."""
-    design = at.design
-    of_balls = at.of_balls()
-    spread = np.concatenate([at.balls.common, at.balls.own], axis=2)
+    design = linearisation.design
+    of_balls = linearisation.of_balls()
+    spread = np.concatenate([linearisation.balls.common, linearisation.balls.own], axis=2)
     for number, artefact in enumerate(design.artefacts.plates):
         members = np.asarray(design.balls.of(artefact))
-        known = members[~np.isnan(of_balls[members]).any(axis=1)]
+        determined = members[~np.isnan(of_balls[members]).any(axis=1)]
         places = design.balls.places
         size = float(np.ptp(places[members], axis=0).max(initial=0.0)) or 0.1
         outline = _outline(places[members])
@@ -141,11 +151,17 @@ def ball_views(at: Linearisation, factor: float, sigma: float = 1.0) -> Iterator
             )
         ]
         plate = design.artefacts.names[artefact]
-        what = f"Balls of {plate} in its own frame"
-        told = f"ball-view-{number}", f"balls of {plate}", what
-        open_ = places[np.setdiff1d(members, known)]
+        title = f"Balls of {plate} in its own frame"
+        names = f"ball-view-{number}", f"balls of {plate}", title
+        open_ = places[np.setdiff1d(members, determined)]
         yield _ellipsoids(
-            layers, places[known], factor * sigma * spread[known], open_, size, told, factor
+            layers,
+            places[determined],
+            factor * sigma * spread[determined],
+            open_,
+            size,
+            names,
+            factor,
         )
 
 
@@ -155,13 +171,13 @@ def _ellipsoids(
     spread: Array,
     undetermined: Array,
     size: float,
-    told: tuple[str, str, str],
+    names: tuple[str, str, str],
     factor: float,
 ) -> SpatialPicture:
     """Ellipsoids about points (m, d) with covariances of square roots `spread` (m, d, r), `told` by
     a name, in short, and in words.
     """
-    name, label, what = told
+    name, label, title = names
     variances, axes = np.linalg.eigh(spread @ spread.transpose(0, 2, 1))
     half = np.sqrt(np.maximum(variances, 0.0))
     longest = float(half.max(initial=0.0))
@@ -172,36 +188,43 @@ def _ellipsoids(
         Layer("dots", "alert", undetermined),
     ]
     caption = (
-        f"{what}: half axes are expanded uncertainties U, k = {factor:g}, enlarged"
+        f"{title}: half axes are expanded uncertainties U, k = {factor:g}, enlarged"
         f" {times:,.0f} times. They refer to the frame that the error model's constraints"
         " and the poses fix."
     )
     if not len(points):
-        caption = f"{what}: all {len(undetermined)} are undetermined, and have no ellipsoid."
+        caption = f"{title}: all {len(undetermined)} are undetermined, and have no ellipsoid."
     elif len(undetermined):
         caption += f" {len(undetermined)} are undetermined: dots without an ellipsoid."
-    return SpatialPicture(layers, name, label, what, caption)
+    return SpatialPicture(layers, name, label, title, caption)
 
 
 def motion_view(
-    at: Linearisation, motion: Motion, name: str, words: str, kind: str, most: int = MOST_MOVING
+    linearisation: Linearisation,
+    motion: Motion,
+    name: str,
+    words: str,
+    kind: str,
+    most: int = MOST_MOVING,
 ) -> SpatialPicture | None:
     """A direction as an enlarged, moving picture of the machine's grid and of the balls that are
     read, about `most` of them; None where it moves neither.
     """
-    design = at.design
+    design = linearisation.design
     grid, sizes = _grid(design)
     of_probes = [
-        moved_points(at, motion, grid, np.full(len(grid), probe))
+        moved_points(linearisation, motion, grid, np.full(len(grid), probe))
         for probe in range(len(design.probes.names))
     ]
     # The probe of the evaluation, unless the direction shows with others only.
     probe = design.evaluation.probe
     if not _largest(of_probes[probe]) > NO_MOTION:
-        probe = int(np.argmax([_largest(one) > NO_MOTION for one in of_probes]))
+        probe = int(
+            np.argmax([_largest(probe_position) > NO_MOTION for probe_position in of_probes])
+        )
     readings = design.readings.select(_moving_readings(design, most))
-    balls = locations(design, at.state, readings)
-    of_grid, of_balls = of_probes[probe], moved_balls(at, motion, readings)
+    balls = locations(design, linearisation.state, readings)
+    of_grid, of_balls = of_probes[probe], moved_balls(linearisation, motion, readings)
     largest = max(_largest(of_grid), _largest(of_balls))
     if not largest > NO_MOTION:
         return None
@@ -217,11 +240,13 @@ def motion_view(
         Layer("lines", "s1 thin", trails, (2,) * len(balls), times * ends),
         Layer("dots", "s1", balls, (), times * of_balls),
     ]
-    what = f"the grid of corrected points with the probe {design.probes.names[probe]} (blue)"
+    subject = f"the grid of corrected points with the probe {design.probes.names[probe]} (blue)"
     if len(balls):
-        what = f"{what} and the balls (orange)"
-    told = f". Enlarged {times:,.0f} times: {what}, as against where they are drawn (grey)."
-    caption = joined([element("strong", kind), ": ", words, told])
+        subject = f"{subject} and the balls (orange)"
+    explanation = (
+        f". Enlarged {times:,.0f} times: {subject}, as against where they are drawn (grey)."
+    )
+    caption = joined([element("strong", kind), ": ", words, explanation])
     return SpatialPicture(layers, name, kind.lower(), f"{kind} as a moving picture", caption)
 
 
@@ -236,12 +261,12 @@ def _grid(design: Design) -> tuple[Array, tuple[int, ...]]:
     levels, along = np.linspace(0.0, 1.0, 3), np.linspace(0.0, 1.0, ALONG)
     lines = []
     for axis in range(d):
-        others = [k for k in range(d) if k != axis]
+        other_axes = [k for k in range(d) if k != axis]
         for place in np.array(np.meshgrid(*[levels] * (d - 1), indexing="ij")).reshape(d - 1, -1).T:
             if d == 3 and (place == 0.5).all():
                 continue
             line = np.zeros((ALONG, d))
-            line[:, axis], line[:, others] = along, place
+            line[:, axis], line[:, other_axes] = along, place
             lines.append(line)
     points = np.concatenate(lines)
     return lower + points * (upper - lower), (ALONG,) * len(lines)

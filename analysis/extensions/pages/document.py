@@ -50,8 +50,10 @@ def style() -> Html:
 
 def written(page: Page) -> str:
     """The page as a file that needs no other and asks no network for anything."""
-    sections = [one for one in page.sections if one.body]
-    links = joined(element("li", element("a", one.title, href=f"#{one.name}")) for one in sections)
+    sections = [section for section in page.sections if section.body]
+    links = joined(
+        element("li", element("a", section.title, href=f"#{section.name}")) for section in sections
+    )
     kind = "verdict" if page.is_good else "verdict bad"
     top = element(
         "header",
@@ -62,9 +64,12 @@ def written(page: Page) -> str:
     )
     body = joined(
         element(
-            "section", element("h2", one.title, id=one.name), one.body, aria_labelledby=one.name
+            "section",
+            element("h2", section.title, id=section.name),
+            section.body,
+            aria_labelledby=section.name,
         )
-        for one in sections
+        for section in sections
     )
     script = shipped("view.js")
     parts = [

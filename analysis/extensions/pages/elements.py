@@ -75,19 +75,19 @@ def table(
     """
     texts = set(words)
     head = joined(
-        element("th", one, scope="col", class_="words" if k in texts else None)
-        for k, one in enumerate(heads)
+        element("th", cell, scope="col", class_="words" if k in texts else None)
+        for k, cell in enumerate(heads)
     )
     body = joined(
         element(
             "tr",
             *(
-                element("th", one, scope="row", class_=_width(one) or None)
+                element("th", cell, scope="row", class_=_width(cell) or None)
                 if k == 0
                 else element(
-                    "td", one, class_=f"words {_width(one)}".strip() if k in texts else None
+                    "td", cell, class_=f"words {_width(cell)}".strip() if k in texts else None
                 )
-                for k, one in enumerate(row)
+                for k, cell in enumerate(row)
             ),
         )
         for row in rows

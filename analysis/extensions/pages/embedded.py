@@ -54,7 +54,7 @@ class View:
         write_file(path, text.encode("utf-8", "replace"))
 
     def __repr__(self) -> str:
-        return f"<View of {self.label}: {', '.join(one.label for one in self.pictures)}>"
+        return f"<View of {self.label}: {', '.join(picture.label for picture in self.pictures)}>"
 
     def _repr_html_(self) -> str:
         data = base64.b64encode(self._still().encode("utf-8", "replace")).decode()
@@ -77,25 +77,29 @@ class View:
 
     def _page(self) -> str:
         shown: list[tuple[str, Html]] = []
-        left, size = [], 0
-        for one in self.pictures:
-            figure = figure_of(one)
+        omitted, size = [], 0
+        for picture in self.pictures:
+            figure = figure_of(picture)
             if shown and size + len(figure) > MOST_BYTES:
-                left.append(one.label)
+                omitted.append(picture.label)
                 continue
             size += len(figure)
-            shown.append((one.label, figure))
+            shown.append((picture.label, figure))
         buttons = (
             element("button", label, type="button", aria_pressed="false") for label, _ in shown
         )
         choice = element("div", *buttons, class_="controls choice", hidden=True)
-        told = f"Not shown here, since there is too much of it: {', '.join(left)}." if left else ""
+        omission = (
+            f"Not shown here, since there is too much of it: {', '.join(omitted)}."
+            if omitted
+            else ""
+        )
         script = shipped("view.js") + shipped("embedded.js")
         body = element(
             "body",
             choice if len(shown) > 1 else "",
             *(figure for _, figure in shown),
-            note(told) if told else "",
+            note(omission) if omission else "",
             Html(f"<script>{script}</script>"),
             class_="embedded",
         )

@@ -50,7 +50,7 @@ def fit_contents(
     return FitContents(
         experiment.title,
         data,
-        {name: one.kind for name, one in zip(labels(estimates), estimates, strict=True)},
+        {name: estimate.kind for name, estimate in zip(labels(estimates), estimates, strict=True)},
         judged,
         reason,
         untested or ("" if data["degrees_of_freedom"] > 0 else "there is no redundancy"),

@@ -91,15 +91,21 @@ def fit_page(contents: FitContents) -> str:
 
 def _results(fit: QuotedData, contents: FitContents) -> list[PageSection]:
     """The sections of a fit that has converged."""
-    found = contents.residuals
+    residuals = contents.residuals
     of_residuals = Html()
-    if len(found.places):
+    if len(residuals.places):
         of_residuals = joined(
             [
                 residual_charts(
-                    found.standardised, found.position, found.probe, found.positions, found.probes
+                    residuals.standardised,
+                    residuals.position,
+                    residuals.probe,
+                    residuals.positions,
+                    residuals.probes,
                 ),
-                figure_of(residual_view(found.places, np.nan_to_num(found.values), contents.edges)),
+                figure_of(
+                    residual_view(residuals.places, np.nan_to_num(residuals.values), contents.edges)
+                ),
                 residual_tables(fit),
             ]
         )
@@ -128,7 +134,7 @@ def _results(fit: QuotedData, contents: FitContents) -> list[PageSection]:
 
 def _is_good(data: Mapping[str, Any]) -> bool:
     """Whether nothing on the page asks for a person's attention."""
-    shares = [one.get("within_target") for one in data["quantities"].values()]
+    shares = [quantity.get("within_target") for quantity in data["quantities"].values()]
     wrong = (
         data["degrees_of_freedom"] <= 0
         or data["complaint"]
@@ -138,7 +144,7 @@ def _is_good(data: Mapping[str, Any]) -> bool:
         or data["warnings"]
     )
     missed = any(share is not None and share < 1.0 for share in shares)
-    missed |= any(one["within_target"] is False for one in data.get("tasks", {}).values())
+    missed |= any(quantity["within_target"] is False for quantity in data.get("tasks", {}).values())
     return not wrong and not missed
 
 
@@ -173,7 +179,7 @@ def _verdict(fit: QuotedData, contents: FitContents) -> Html:
         ".",
     )
     second = sentence(lengths_words(fit, contents.target, contents.caveat))
-    warnings = [sentence("Warning: ", one.text()) for one in fit.at("warnings").each()]
+    warnings = [sentence("Warning: ", warning.text()) for warning in fit.at("warnings").each()]
     return joined([first, second, *warnings])
 
 
@@ -195,8 +201,8 @@ def _rank(fit: QuotedData) -> Html:
     ):
         if data[key]:
             words = (
-                element("li", one.text() if key == "undetermined" else one.text("text"))
-                for one in fit.at(key).each()
+                element("li", direction.text() if key == "undetermined" else direction.text("text"))
+                for direction in fit.at(key).each()
             )
             parts += [element("h3", title), element("ol", *words)]
     for key, title in (
@@ -205,7 +211,7 @@ def _rank(fit: QuotedData) -> Html:
         ("reasons", "Reasons"),
     ):
         if data[key]:
-            words = (element("li", one.text()) for one in fit.at(key).each())
+            words = (element("li", direction.text()) for direction in fit.at(key).each())
             parts += [element("h3", title), element("ul", *words)]
     return joined(parts)
 
@@ -215,10 +221,10 @@ def _course(fit: QuotedData) -> PageSection:
     rows = [
         [
             str(k),
-            "" if k == 0 else one.number("step", digits=2),
-            one.number("sum_of_squares", digits=6),
+            "" if k == 0 else iteration.number("step", digits=2),
+            iteration.number("sum_of_squares", digits=6),
         ]
-        for k, one in enumerate(fit.at("iterations").each())
+        for k, iteration in enumerate(fit.at("iterations").each())
     ]
     heads = ["iteration", "step, m and rad", "S²"]
     made_table = table("iterations", "Iterations", heads, rows)
@@ -229,13 +235,18 @@ def _adjustments(fit: QuotedData) -> Html:
     if "adjustments" not in fit:
         return Html()
     rows = []
-    for one in fit.at("adjustments").each():
-        is_angle = one.data["unit"] == "rad"
+    for adjustment in fit.at("adjustments").each():
+        is_angle = adjustment.data["unit"] == "rad"
         factor = 180.0 * 3600.0 / np.pi if is_angle else 1e6
         names = ("value", "standard_uncertainty", "expanded_uncertainty")
-        figures = [one.number(name, factor=factor) for name in names]
+        figures = [adjustment.number(name, factor=factor) for name in names]
         rows.append(
-            [one.text("what"), *figures, "arcsec" if is_angle else "µm/m", one.text("words")]
+            [
+                adjustment.text("what"),
+                *figures,
+                "arcsec" if is_angle else "µm/m",
+                adjustment.text("words"),
+            ]
         )
     heads = ["adjustment", "is off by", "u", "U, 95 %", "unit", "what to do"]
     words = "Errors of scales: true length less reading; errors of angles: excess over 90°."
@@ -249,11 +260,12 @@ def _plate(fit: QuotedData, kinds: Mapping[str, str]) -> Html:
     for number, plate in enumerate(fit.at("plates").each() if "plates" in fit else ()):
         name = list(fit.data["plates"])[number]
         rows = []
-        for ball, one in zip(plate.data["balls"], plate.at("balls").each(), strict=True):
-            places = [one.at(axis).number("value", factor=1e3, digits=9) for axis in "xy"]
-            us = [one.at(axis).micro("standard_uncertainty", digits=3) for axis in "xy"]
+        for ball, ball_data in zip(plate.data["balls"], plate.at("balls").each(), strict=True):
+            places = [ball_data.at(axis).number("value", factor=1e3, digits=9) for axis in "xy"]
+            us = [ball_data.at(axis).micro("standard_uncertainty", digits=3) for axis in "xy"]
             expanded = [
-                one.at(axis).micro("standard_uncertainty", factor=k, digits=3) for axis in "xy"
+                ball_data.at(axis).micro("standard_uncertainty", factor=k, digits=3)
+                for axis in "xy"
             ]
             rows.append([ball, *places, *us, *expanded])
         heads = ["ball", "x, mm", "y, mm", "u of x, µm", "of y", f"U of x, k = {k:g}", "of y"]
@@ -279,6 +291,6 @@ def _estimates(fit: QuotedData, kinds: Mapping[str, str]) -> Html:
     }
     parts = []
     for kind, caption in titles.items():
-        names = [name for name, one in kinds.items() if one == kind]
+        names = [name for name, estimate in kinds.items() if estimate == kind]
         parts.append(estimates_table(fit, names, f"estimates-{kind}", caption))
     return joined(parts)

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from .embedded import View
 
 
-def view(given: Experiment | PathLike | Prediction | Fit) -> View:
+def view(subject: Experiment | PathLike | Prediction | Fit) -> View:
     """A design in space: positions of plates, balls and probes of an experiment; of a prediction or
     a fit also ellipsoids of uncertainty, residuals, and what undetermined directions move.
 
@@ -36,21 +36,21 @@ def view(given: Experiment | PathLike | Prediction | Fit) -> View:
 
     from .offered import design_view, fit_view
 
-    if isinstance(given, Fit):
-        return fit_view(given)
-    if isinstance(given, Prediction):
-        return design_view(given)
+    if isinstance(subject, Fit):
+        return fit_view(subject)
+    if isinstance(subject, Prediction):
+        return design_view(subject)
     from ballplate.simulator.experiment import lay_out
 
     from .embedded import View
     from .views import position_picture
 
-    chosen = experiment_of(given)
+    chosen = experiment_of(subject)
     return View(chosen.label, chosen.title, (position_picture(lay_out(chosen)),))
 
 
 def page(
-    given: Experiment | PathLike | Prediction | Fit | Any,
+    subject: Experiment | PathLike | Prediction | Fit | Any,
     path: PathLike | None = None,
     run_modules: bool = False,
     compare: PathLike | None = None,
@@ -80,20 +80,20 @@ def page(
     ensure_report(report)
     if path is not None:
         ensure_path("path", path)
-    of_sweep = getattr(given, "page_text", None)
+    of_sweep = getattr(subject, "page_text", None)
     if (run_modules or compare is not None) and of_sweep is None:
         raise ValueError("run_modules and compare go with sweeps only; leave them out")
-    if isinstance(given, Fit):
+    if isinstance(subject, Fit):
         from .offered import fit_page_text
 
-        text = fit_page_text(given)
+        text = fit_page_text(subject)
     elif of_sweep is not None:
         text = of_sweep(run_modules, compare, report)
     else:
         from .design_contents import page_of_design
 
-        predicted = given if isinstance(given, Prediction) and given.quantities else None
-        chosen = given.experiment if isinstance(given, Prediction) else experiment_of(given)
+        predicted = subject if isinstance(subject, Prediction) and subject.quantities else None
+        chosen = subject.experiment if isinstance(subject, Prediction) else experiment_of(subject)
         if chosen is None:
             raise ValueError("the prediction does not know its experiment; predict it anew")
         text = page_of_design(chosen, predicted or predict(chosen, with_scale=True), report)

@@ -20,10 +20,10 @@ def lengths_section(lengths: QuotedData, target: str) -> Html:
     """
     data = lengths.data
     k = data["target_coverage_factor"] if target else data["coverage_factor"]
-    points = np.array([one["point"] for one in data["by_point"]])
+    points = np.array([point["point"] for point in data["by_point"]])
     levels = np.unique(points[:, 2]) if points.shape[1] == 3 else np.zeros(1)
     u = "u" if k == 1.0 else f"{k:g} u"
-    what = f"Largest ratio of {u} to the target" if target else f"Largest {k:g} u, µm,"
+    title = f"Largest ratio of {u} to the target" if target else f"Largest {k:g} u, µm,"
     maps = []
     for level in levels.tolist():
         chosen = (
@@ -31,8 +31,8 @@ def lengths_section(lengths: QuotedData, target: str) -> Html:
             if points.shape[1] == 3
             else np.arange(len(points))
         )
-        at = f", z = {1e3 * level:.6g} mm" if points.shape[1] == 3 else ""
-        words = f"{what} of the lengths from each point{at}"
+        level_words = f", z = {1e3 * level:.6g} mm" if points.shape[1] == 3 else ""
+        words = f"{title} of the lengths from each point{level_words}"
         maps.append(figure(f"{words}.", _map(lengths, chosen.tolist(), k, bool(target), words)))
     whole = lengths.at("all")
     is_open = whole.data["undetermined"] == whole.data["lengths"]
@@ -76,15 +76,15 @@ def lengths_section(lengths: QuotedData, target: str) -> Html:
 def _map(lengths: QuotedData, chosen: list[int], k: float, of_target: bool, words: str) -> Html:
     """Cells of a level, each with its figure."""
     name, factor = ("maximum_ratio", k) if of_target else ("maximum", 1e6 * k)
-    every = [one[name] for one in lengths.data["by_point"]]
-    known = [factor * one for one in every if one is not None]
-    low, high = (min(known), max(known)) if known else (0.0, 1.0)
+    every = [point[name] for point in lengths.data["by_point"]]
+    finite = [factor * point for point in every if point is not None]
+    low, high = (min(finite), max(finite)) if finite else (0.0, 1.0)
     places = np.array([lengths.data["by_point"][i]["point"][:2] for i in chosen])
     x, y = np.unique(places[:, 0]), np.unique(places[:, 1])
     parts = []
     for i, place in zip(chosen, places, strict=True):
         column, row = np.searchsorted(x, place[0]), len(y) - 1 - np.searchsorted(y, place[1])
-        left, top = LEFT + CELL * column, ABOVE + ROW * row
+        corner, top = LEFT + CELL * column, ABOVE + ROW * row
         # What is known of some of its lengths would hide that others are unknown.
         value = None if lengths.data["by_point"][i]["undetermined"] else every[i]
         kind = "open"
@@ -92,7 +92,8 @@ def _map(lengths: QuotedData, chosen: list[int], k: float, of_target: bool, word
             kind = _shade(factor * value, low, high, 1.0 if of_target else np.inf)
         parts.append(
             Html(
-                f'<rect class="{kind}" x="{left:g}" y="{top:g}" width="{CELL:g}" height="{ROW:g}"/>'
+                f'<rect class="{kind}" x="{corner:g}" y="{top:g}" width="{CELL:g}"'
+                f' height="{ROW:g}"/>'
             )
         )
         shown = "–" if value is None else number(factor * value, 3)
@@ -101,7 +102,7 @@ def _map(lengths: QuotedData, chosen: list[int], k: float, of_target: bool, word
                 "text",
                 shown,
                 class_="place" if value is not None else None,
-                x=f"{left + CELL / 2:g}",
+                x=f"{corner + CELL / 2:g}",
                 y=f"{top + ROW / 2 + 3.5:g}",
                 text_anchor="middle",
                 data_path=None if value is None else lengths.at("by_point", i, name).path,
@@ -148,10 +149,11 @@ def _by_length(lengths: QuotedData, target: str) -> Html:
     """Uncertainties over the length, with the target."""
     data = lengths.data
     k = data["target_coverage_factor"] if target else data["coverage_factor"]
-    groups = [one for one in data["by_length"] if one["lengths"]]
-    middle = np.array([500.0 * (one["from"] + one["to"]) for one in groups])
+    groups = [group for group in data["by_length"] if group["lengths"]]
+    middle = np.array([500.0 * (group["from"] + group["to"]) for group in groups])
     most, average = (
-        1e6 * k * np.array([one[name] for one in groups], float) for name in ("maximum", "average")
+        1e6 * k * np.array([group[name] for group in groups], float)
+        for name in ("maximum", "average")
     )
     u = "u" if k == 1.0 else f"{k:g} u"
     traces = [Trace("line", "s0", middle, most), Trace("dots", "s0", middle, most)]
@@ -175,13 +177,21 @@ def _by_length(lengths: QuotedData, target: str) -> Html:
 def _by_direction(lengths: QuotedData, of_target: bool) -> Html:
     k = lengths.data["coverage_factor"]
     rows = []
-    for one in lengths.at("by_direction").each():
-        if not one.data["lengths"]:
+    for direction in lengths.at("by_direction").each():
+        if not direction.data["lengths"]:
             continue
-        row: list[str] = [one.text("direction"), one.number("lengths"), one.number("undetermined")]
-        row += [one.micro("average"), one.micro("maximum"), one.micro("maximum", factor=k)]
+        row: list[str] = [
+            direction.text("direction"),
+            direction.number("lengths"),
+            direction.number("undetermined"),
+        ]
+        row += [
+            direction.micro("average"),
+            direction.micro("maximum"),
+            direction.micro("maximum", factor=k),
+        ]
         if of_target:
-            row += [one.share("share_within"), one.share("share_expanded_within")]
+            row += [direction.share("share_within"), direction.share("share_expanded_within")]
         rows.append(row)
     heads = ["direction", "lengths", "undetermined", "u average, µm", "u maximum"]
     heads += [f"U maximum, k = {k:g}"]

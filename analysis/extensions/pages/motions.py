@@ -25,40 +25,46 @@ class Motion:
 
 
 @single_threaded
-def null_motions(at: Linearisation) -> tuple[Motion, ...]:
+def null_motions(linearisation: Linearisation) -> tuple[Motion, ...]:
     """The undetermined directions, in the order of the rank report."""
-    return tuple(Motion(*one) for one in null_changes(at))
+    return tuple(Motion(*change) for change in null_changes(linearisation))
 
 
 @single_threaded
-def weak_motions(at: Linearisation, target: Target | None) -> tuple[Motion, ...]:
+def weak_motions(linearisation: Linearisation, target: Target | None) -> tuple[Motion, ...]:
     """The weakly determined directions, one standard deviation long, weakest first; balls go with
     them as the observations make them.
     """
-    found = []
-    for shared in weak_changes(at, target):
+    motions = []
+    for shared in weak_changes(linearisation, target):
         # By the same standard normal variables that make this of the shared parameters.
-        made, *_ = np.linalg.lstsq(at.shared, shared, rcond=None)
-        found.append(Motion(shared, at.balls.common[:, :, : at.rank] @ made))
-    return tuple(found)
+        made, *_ = np.linalg.lstsq(linearisation.shared, shared, rcond=None)
+        motions.append(
+            Motion(shared, linearisation.balls.common[:, :, : linearisation.rank] @ made)
+        )
+    return tuple(motions)
 
 
-def moved_points(at: Linearisation, motion: Motion, points: Array, probes: Integers) -> Array:
+def moved_points(
+    linearisation: Linearisation, motion: Motion, points: Array, probes: Integers
+) -> Array:
     """By how much (m, d) corrected points for scale readings `points` (m, d) with probes of indices
     (m,) change, in metres.
     """
-    rows = correction_rows(at.design, at.layout, at.state, points, probes)
+    rows = correction_rows(
+        linearisation.design, linearisation.layout, linearisation.state, points, probes
+    )
     return np.asarray(rows @ motion.shared)
 
 
-def moved_balls(at: Linearisation, motion: Motion, readings: Readings) -> Array:
+def moved_balls(linearisation: Linearisation, motion: Motion, readings: Readings) -> Array:
     """By how much (m, d) the places of balls of plates that are read change, in metres.
 
     With T(y) = R y + t, and R turned by a small rotation w about the machine's axes, it is
     dt + w x R y + R dy.
     """
-    state, d = at.state, at.design.dimension
-    columns = at.layout.pose_columns[readings.position]
+    state, d = linearisation.state, linearisation.design.dimension
+    columns = linearisation.layout.pose_columns[readings.position]
     poses = np.where(columns >= 0, motion.shared[np.maximum(columns, 0)], 0.0)
     rotation = state.rotations[readings.position]
     arms = np.einsum("mij,mj->mi", rotation, state.balls[readings.ball])
@@ -67,5 +73,5 @@ def moved_balls(at: Linearisation, motion: Motion, readings: Readings) -> Array:
         if d == 3
         else poses[:, 2:] * np.stack([-arms[:, 1], arms[:, 0]], axis=1)
     )
-    own = np.einsum("mij,mj->mi", rotation, motion.balls[readings.ball])
-    return np.asarray(poses[:, :d] + turned + own)
+    displacements = np.einsum("mij,mj->mi", rotation, motion.balls[readings.ball])
+    return np.asarray(poses[:, :d] + turned + displacements)

@@ -16,8 +16,8 @@ if TYPE_CHECKING:
 
 def design_view(prediction: Prediction) -> View:
     """A design in space, with what its prediction knows."""
-    stated = prediction.experiment
-    target = None if stated is None else stated.target_uncertainty
+    experiment = prediction.experiment
+    target = None if experiment is None else experiment.target_uncertainty
     pictures = judged_pictures(linearise(prediction.design), prediction.verdict, target)
     return View(prediction.label, prediction.title, pictures)
 
@@ -29,8 +29,8 @@ def fit_view(fit: Fit) -> View:
     target = None if fit.experiment is None else fit.experiment.target_uncertainty
     # Without scatter residuals are mere rounding.
     residuals = () if fit.without_scatter else residual_pictures(fit.observed, fit.solution)
-    at = fit.estimated.at
-    pictures = judged_pictures(at, fit.verdict, target, fit.sigma, residuals)
+    linearisation = fit.estimated.at
+    pictures = judged_pictures(linearisation, fit.verdict, target, fit.sigma, residuals)
     return View(fit.label, fit.title, pictures)
 
 

@@ -27,7 +27,7 @@ def assumptions(experiment: Experiment, parameters: int) -> list[tuple[str, str]
     volume = " x ".join(f"{1e3 * (high - low):.6g}" for low, high in sides)
     repeatability = [f"{1e6 * u:.4g}" for u in experiment.machine.repeatability.tolist()]
     model = experiment.error_model
-    known = {
+    facts = {
         "File": str(experiment.source),
         "Variant": experiment.name or "",
         "Description": " ".join(experiment.description.split()),
@@ -40,30 +40,36 @@ def assumptions(experiment: Experiment, parameters: int) -> list[tuple[str, str]
     }
     target = experiment.target_uncertainty
     if target is None:
-        known["Target"] = "none is stated"
+        facts["Target"] = "none is stated"
     else:
         by = uncertainty_words(target.coverage_factor)
-        known["Target"] = f"{target_in_words(experiment)}, compared with the {by}"
-    return [(name, words) for name, words in known.items() if words]
+        facts["Target"] = f"{target_in_words(experiment)}, compared with the {by}"
+    return [(name, words) for name, words in facts.items() if words]
 
 
 def _certificates(experiment: Experiment) -> str:
-    told = [f"{one.kind} of {one.subject} ({one.size})" for one in experiment.calibration]
-    told += [f"prior of {one.name}" for one in experiment.priors]
-    return listing(told) or "none: nothing is known of artefacts but what the readings say"
+    descriptions = [
+        f"{certificate.kind} of {certificate.subject} ({certificate.size})"
+        for certificate in experiment.calibration
+    ]
+    descriptions += [f"prior of {certificate.name}" for certificate in experiment.priors]
+    return listing(descriptions) or "none: nothing is known of artefacts but what the readings say"
 
 
 def _offsets(experiment: Experiment) -> str:
-    estimated = [one.name for one in experiment.probes.values() if one.is_estimated]
-    exact = [one.name for one in experiment.probes.values() if not one.is_estimated]
+    estimated = [probe.name for probe in experiment.probes.values() if probe.is_estimated]
+    exact = [probe.name for probe in experiment.probes.values() if not probe.is_estimated]
     parts = [f"estimated: {listing(estimated)}"] if estimated else []
     return "; ".join([*parts, *([f"exact as stated: {listing(exact)}"] if exact else [])])
 
 
 def _influences(experiment: Experiment) -> str:
-    kinds = [str(getattr(one, "kind", type(one).__name__)) for one in experiment.influences]
-    left = [kind for kind in ("temperature", "drift") if kind not in kinds]
-    without = f"no effect of {' and '.join(left)} is assumed" if left else ""
+    kinds = [
+        str(getattr(influence, "kind", type(influence).__name__))
+        for influence in experiment.influences
+    ]
+    absent = [kind for kind in ("temperature", "drift") if kind not in kinds]
+    without = f"no effect of {' and '.join(absent)} is assumed" if absent else ""
     return "; ".join(filter(None, [listing(kinds), without]))
 
 

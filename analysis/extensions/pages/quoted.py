@@ -48,11 +48,15 @@ class QuotedData:
 
     def number(self, *steps: str | int, factor: float = 1.0, digits: int = 4) -> Html:
         """A number times a factor, with significant digits."""
-        one = self.at(*steps)
-        if one.data is None:
-            return one._shown(UNDETERMINED, factor)
-        shown = str(one.data) if isinstance(one.data, int) else number(factor * one.data, digits)
-        return one._shown(shown, factor)
+        quoted = self.at(*steps)
+        if quoted.data is None:
+            return quoted._shown(UNDETERMINED, factor)
+        shown = (
+            str(quoted.data)
+            if isinstance(quoted.data, int)
+            else number(factor * quoted.data, digits)
+        )
+        return quoted._shown(shown, factor)
 
     def micro(self, *steps: str | int, factor: float = 1.0, digits: int = 4) -> Html:
         """A small number in micrometres, microradians or parts per million."""
@@ -60,23 +64,23 @@ class QuotedData:
 
     def amount(self, value: str, unit: str, uncertainty: str | None = None) -> tuple[Html, str]:
         """A value with the unit it reads well in; to its uncertainty where that is named."""
-        one, stated = self.at(value), str(self.data[unit])
-        factor, shown = amount_of(1.0, stated)
+        quoted, unit_text = self.at(value), str(self.data[unit])
+        factor, shown = amount_of(1.0, unit_text)
         u = None if uncertainty is None else self.data[uncertainty]
-        if one.data is None or uncertainty is None:
-            return one.number(factor=factor), shown
-        text = to_uncertainty(factor * one.data, math.nan if u is None else factor * u)
-        return one._shown(text, factor), shown
+        if quoted.data is None or uncertainty is None:
+            return quoted.number(factor=factor), shown
+        text = to_uncertainty(factor * quoted.data, math.nan if u is None else factor * u)
+        return quoted._shown(text, factor), shown
 
     def share(self, *steps: str | int) -> Html:
         """A share in percent."""
-        one = self.at(*steps)
-        return one._shown(percent(one.data), 100.0)
+        quoted = self.at(*steps)
+        return quoted._shown(percent(quoted.data), 100.0)
 
     def text(self, *steps: str | int) -> Html:
         """A text of the data as it is."""
-        one = self.at(*steps)
-        return element("span", str(one.data), data_path=one.path)
+        quoted = self.at(*steps)
+        return element("span", str(quoted.data), data_path=quoted.path)
 
     def _shown(self, text: str, factor: float) -> Html:
         value = None if self.data is None else repr(self.data)

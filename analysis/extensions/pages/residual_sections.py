@@ -61,13 +61,13 @@ def residual_charts(
 ) -> Html:
     """Standardised residuals against position, order and direction."""
     axes = [("dots", f"s{k}", f"along {AXES[k]}") for k in range(values.shape[1])]
-    told = "Positions are numbered as in the table below." if len(positions) > 6 else ""
+    note = "Positions are numbered as in the table below." if len(positions) > 6 else ""
     return joined(
         [
             legend(*axes),
             figures(
                 figure(
-                    f"Residuals by position, in standard uncertainties. {told}",
+                    f"Residuals by position, in standard uncertainties. {note}",
                     dots_by_group(values, position, positions, "position"),
                 ),
                 figure(
@@ -108,12 +108,12 @@ def residual_tables(fit: QuotedData) -> Html:
         rows = [
             [
                 *([str(k)] if kind == "position" else []),
-                one.text("name"),
-                one.number("count"),
-                one.micro("root_mean_square"),
-                one.number("standardised"),
+                residual.text("name"),
+                residual.number("count"),
+                residual.micro("root_mean_square"),
+                residual.number("standardised"),
             ]
-            for k, one in enumerate(fit.at("residuals", f"by_{kind}").each(), start=1)
+            for k, residual in enumerate(fit.at("residuals", f"by_{kind}").each(), start=1)
         ]
         heads = ["number"] if kind == "position" else []
         heads += [words, "co-ordinates", "root mean square, µm", "in standard uncertainties"]
@@ -122,11 +122,11 @@ def residual_tables(fit: QuotedData) -> Html:
         parts.append(table(f"residuals-{kind}", caption, heads, rows, texts, len(rows) > 30))
     rows = [
         [
-            *(one.text(name) for name in ("position", "ball", "probe", "axis")),
-            one.micro("value"),
-            one.number("standard_uncertainties"),
+            *(residual.text(name) for name in ("position", "ball", "probe", "axis")),
+            residual.micro("value"),
+            residual.number("standard_uncertainties"),
         ]
-        for one in fit.at("largest_residuals").each()
+        for residual in fit.at("largest_residuals").each()
     ]
     heads = ["position", "ball", "probe", "along", "µm", "standard uncertainties"]
     parts.append(table("largest", "Largest residuals", heads, rows, (0, 1, 2, 3)))
@@ -139,7 +139,7 @@ def suspects_section(fit: QuotedData, untested: str) -> Html:
         return sentence(f"Not tested: {untested}.")
     if "suspected" not in fit:
         return sentence("None: no test of the residuals exceeds its limit.")
-    items = (element("li", one.text("words")) for one in fit.at("suspected").each())
+    items = (element("li", suspect.text("words")) for suspect in fit.at("suspected").each())
     return element("ol", *items)
 
 
@@ -147,19 +147,19 @@ def components_section(fit: QuotedData) -> Html:
     """Variance components, where these were asked for."""
     if fit.data.get("variance_components") is None:
         return Html()
-    found = fit.at("variance_components")
+    components = fit.at("variance_components")
     rows = [
         [
-            one.text("group"),
-            one.number("observations"),
-            one.number("redundancy"),
+            group.text("group"),
+            group.number("observations"),
+            group.number("redundancy"),
             *(
-                one.number(name, digits=3)
+                group.number(name, digits=3)
                 for name in ("ratio", "standard_uncertainty", "lower", "upper")
             ),
-            one.text("verdict"),
+            group.text("verdict"),
         ]
-        for one in found.at("groups").each()
+        for group in components.at("groups").each()
     ]
     heads = [
         "group",
@@ -171,7 +171,7 @@ def components_section(fit: QuotedData) -> Html:
         "to",
         "",
     ]
-    caption = f"Variances by {found.data['by']}, as ratios to what is stated"
+    caption = f"Variances by {components.data['by']}, as ratios to what is stated"
     made = table("components", caption, heads, rows, (0, 7))
     words = "All other figures are as if these estimates had been stated."
     return joined([made, note(words) if fit.data.get("reweighted") else Html()])
@@ -192,7 +192,7 @@ def reliability_section(reliability: QuotedData) -> Html:
         "; the change that it causes in lengths is the largest that goes unnoticed.",
     )
     parts = [words]
-    symbol = "U6" if any("U6" in one["effects"] for one in data["events"]) else "U5"
+    symbol = "U6" if any("U6" in event["effects"] for event in data["events"]) else "U5"
     for key, title in (("observations_by_name", "Observations"), ("events", "Events")):
         every = list(enumerate(data[key]))
         # What cannot be detected and does harm first, then by what it changes.
@@ -202,9 +202,9 @@ def reliability_section(reliability: QuotedData) -> Html:
             heads = ["bias", "MDB", "found by fit from", "unit", f"changes {symbol} by, µm", "at"]
             caption = f"{title} that matter most"
             parts.append(table(f"reliability-{key}", caption, heads, rows, (0, 3, 5)))
-            left = len(every) - len(rows)
-            told = f"{left} others are told by ballplate run --reliability --json."
-            parts.append(note(told) if left else Html())
+            count_left = len(every) - len(rows)
+            note_of_rest = f"{count_left} others are told by ballplate run --reliability --json."
+            parts.append(note(note_of_rest) if count_left else Html())
     return joined(parts)
 
 
@@ -216,16 +216,16 @@ def _harm(bias: Mapping[str, Any], symbol: str) -> float:
     return float(f"{bias['effects'].get(symbol, {}).get('change', 0.0):.6g}")
 
 
-def _bias(one: QuotedData, symbol: str) -> list[str]:
-    found = one.data["minimal_detectable"] is not None
-    effect = one.at("effects", symbol) if found and symbol in one.data["effects"] else None
-    harmless = "never; harmless" if one.data.get("harmless") else "never"
-    fit = one.micro("found_by_fit", digits=3) if one.data["found_by_fit"] is not None else "-"
+def _bias(event: QuotedData, symbol: str) -> list[str]:
+    has_bias = event.data["minimal_detectable"] is not None
+    effect = event.at("effects", symbol) if has_bias and symbol in event.data["effects"] else None
+    harmless = "never; harmless" if event.data.get("harmless") else "never"
+    fit = event.micro("found_by_fit", digits=3) if event.data["found_by_fit"] is not None else "-"
     return [
-        one.text("name"),
-        one.micro("minimal_detectable", digits=3) if found else harmless,
+        event.text("name"),
+        event.micro("minimal_detectable", digits=3) if has_bias else harmless,
         fit,
-        SHOWN[one.data["unit"]],
+        SHOWN[event.data["unit"]],
         effect.micro("change", digits=3) if effect is not None else "-",
         effect.text("at") if effect is not None else "",
     ]

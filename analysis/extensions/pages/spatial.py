@@ -67,17 +67,17 @@ class SpatialPicture:
 
 def figure_of(picture: SpatialPicture) -> Html:
     """The picture as a figure of a page, with its controls."""
-    layers = [one for one in picture.layers if len(one.points)]
+    layers = [layer for layer in picture.layers if len(layer.points)]
     eye = _eye(layers)
     d = len(eye.centre)
-    moving = any(one.moves is not None for one in layers)
+    moving = any(layer.moves is not None for layer in layers)
     svg = _svg(layers, eye, picture.words, tabindex="0" if d == 3 else None)
     data = {
         "centre": [round(1e3 * v, 3) for v in eye.centre.tolist()],
         "scale": eye.scale / 1e3,
         "turn": TURN,
         "rise": RISE,
-        "layers": [_data(one) for one in layers],
+        "layers": [_data(layer) for layer in layers],
     }
     # No text in the data may end the element.
     stored = json.dumps(data, separators=(",", ":")).replace("<", "\\u003c")
@@ -94,7 +94,7 @@ def figure_of(picture: SpatialPicture) -> Html:
 
 def still(picture: SpatialPicture) -> str:
     """The picture as an SVG file of its own."""
-    layers = [one for one in picture.layers if len(one.points)]
+    layers = [layer for layer in picture.layers if len(layer.points)]
     paper = element("rect", width="100%", height="100%", style="fill: var(--paper)")
     before = Html(f"<style>{shipped('marks.css')}</style>"), paper
     size = {"width": f"{WIDTH:g}", "height": f"{HEIGHT:g}", "class_": "view"}
@@ -112,7 +112,7 @@ def _svg(
     return element(
         "svg",
         *before,
-        joined(_drawn(one, k, eye) for k, one in enumerate(layers)),
+        joined(_drawn(layer, k, eye) for k, layer in enumerate(layers)),
         viewBox=f"0 0 {WIDTH:g} {HEIGHT:g}",
         role="img",
         aria_label=words,
@@ -121,7 +121,7 @@ def _svg(
 
 
 def _eye(layers: Sequence[Layer]) -> _Eye:
-    every = np.concatenate([one.points for one in layers])
+    every = np.concatenate([layer.points for layer in layers])
     lower, upper = every.min(axis=0), every.max(axis=0)
     centre = 0.5 * (lower + upper)
     flat, _ = projection(len(centre))
@@ -136,9 +136,13 @@ def _controls(dimension: int, moving: bool) -> Html:
     views = ("oblique", "above", "front", "right") if dimension == 3 else ()
     parts = [
         element(
-            "button", one, type="button", data_view=one, title=f"seen from {one}" if k else None
+            "button",
+            view_name,
+            type="button",
+            data_view=view_name,
+            title=f"seen from {view_name}" if k else None,
         )
-        for k, one in enumerate(views)
+        for k, view_name in enumerate(views)
     ]
     parts += [
         element("button", "+", type="button", data_zoom="1.25", aria_label="larger"),
@@ -151,53 +155,53 @@ def _controls(dimension: int, moving: bool) -> Html:
     return element("div", *parts, class_="controls", hidden=True)
 
 
-def _drawn(one: Layer, number: int, eye: _Eye) -> Html:
-    points = one.points if one.moves is None else one.points + one.moves
+def _drawn(layer: Layer, number: int, eye: _Eye) -> Html:
+    points = layer.points if layer.moves is None else layer.points + layer.moves
     paper = eye.paper(points).tolist()
-    if one.kind == "labels":
+    if layer.kind == "labels":
         texts = (
             element("text", name, x=f"{x:g}", y=f"{y:g}", text_anchor="middle")
-            for name, (x, y) in zip(one.names, paper, strict=True)
+            for name, (x, y) in zip(layer.names, paper, strict=True)
         )
-        return element("g", joined(texts), class_=f"labels {one.style}", data_layer=number)
-    if one.kind == "dots":
+        return element("g", joined(texts), class_=f"labels {layer.style}", data_layer=number)
+    if layer.kind == "dots":
         path = "".join(f"M{x:g} {y:g}h0" for x, y in paper)
-    elif one.kind == "ellipsoids" and one.shapes is not None:
+    elif layer.kind == "ellipsoids" and layer.shapes is not None:
         path = "".join(
-            _ellipse(at, shape)
-            for at, shape in zip(paper, eye.scale * (eye.view @ one.shapes), strict=True)
+            _ellipse(centre, shape)
+            for centre, shape in zip(paper, eye.scale * (eye.view @ layer.shapes), strict=True)
         )
     else:
-        end = "Z" if one.kind == "areas" else ""
-        ends = np.cumsum([0, *one.sizes])
+        end = "Z" if layer.kind == "areas" else ""
+        ends = np.cumsum([0, *layer.sizes])
         path = "".join(
             "M" + "L".join(f"{x:g} {y:g}" for x, y in paper[first:last]) + end
             for first, last in zip(ends, ends[1:], strict=False)
         )
-    return element("path", class_=f"{one.kind} {one.style}", d=path, data_layer=number)
+    return element("path", class_=f"{layer.kind} {layer.style}", d=path, data_layer=number)
 
 
-def _ellipse(at: Sequence[float], root: Array) -> str:
+def _ellipse(centre: Sequence[float], root: Array) -> str:
     """Outline of an ellipsoid on the paper, whose root there is (2, d)."""
     axes, sizes, _ = np.linalg.svd(root, full_matrices=False)
     x, y = (axes[:, 0] * sizes[0] * [1.0, -1.0]).tolist()
     angle = np.degrees(np.arctan2(y, x))
     arc = f"a{sizes[0]:.1f} {sizes[1]:.1f} {angle:.0f} 1 0"
     there, back = (f"{arc} {2 * way * x:.1f} {2 * way * y:.1f}" for way in (1, -1))
-    return f"M{at[0] - x:.1f} {at[1] - y:.1f}{there}{back}"
+    return f"M{centre[0] - x:.1f} {centre[1] - y:.1f}{there}{back}"
 
 
-def _data(one: Layer) -> dict[str, Any]:
-    found: dict[str, Any] = {"kind": one.kind, "points": _millimetres(one.points, 1)}
-    if one.sizes:
-        found["sizes"] = list(one.sizes)
-    if one.moves is not None:
-        found["moves"] = _millimetres(one.moves, 1)
-    if one.shapes is not None:
-        found["shapes"] = _millimetres(one.shapes, 2)
-    return found
+def _data(layer: Layer) -> dict[str, Any]:
+    layer_data: dict[str, Any] = {"kind": layer.kind, "points": _millimetres(layer.points, 1)}
+    if layer.sizes:
+        layer_data["sizes"] = list(layer.sizes)
+    if layer.moves is not None:
+        layer_data["moves"] = _millimetres(layer.moves, 1)
+    if layer.shapes is not None:
+        layer_data["shapes"] = _millimetres(layer.shapes, 2)
+    return layer_data
 
 
 def _millimetres(values: Array, digits: int) -> list[float]:
     flat = (np.round(1e3 * values, digits) + 0.0).ravel().tolist()
-    return [int(one) if one == int(one) else one for one in flat]
+    return [int(coordinate) if coordinate == int(coordinate) else coordinate for coordinate in flat]

@@ -10,8 +10,8 @@ from .quoted import UNDETERMINED, QuotedData
 
 def expansion(quantities: QuotedData) -> float:
     """The factor of expanded uncertainties on a page: that of the target, or 2."""
-    stated = [one.data.get("target_coverage_factor") for one in quantities.each()]
-    return next((one for one in stated if one is not None and one != 1.0), 2.0)
+    factors = [quantity.data.get("target_coverage_factor") for quantity in quantities.each()]
+    return next((quantity for quantity in factors if quantity is not None and quantity != 1.0), 2.0)
 
 
 def uncertainty_table(result: QuotedData, caveat: str = "") -> Html:
@@ -19,38 +19,40 @@ def uncertainty_table(result: QuotedData, caveat: str = "") -> Html:
     quantities = result.at("quantities")
     k = expansion(quantities)
     rows, notes = [], []
-    for one in quantities.each():
-        if ", " in one.data["unit"]:
+    for quantity in quantities.each():
+        if ", " in quantity.data["unit"]:
             # Lengths and angles have no common unit; each has a row of its own.
             continue
-        symbol = one.path.rpartition("/")[2].partition(" ")[0]
-        count: Html = one.number("count")
-        if one.data["undetermined"]:
-            count = joined([count, " (", one.number("undetermined"), f" {UNDETERMINED})"])
-        figures = [one.micro(name) for name in ("maximum", "average")]
-        expanded = [one.micro(name, factor=k) for name in ("maximum", "average")]
-        unit = shown_unit(one.data["unit"])
+        symbol = quantity.path.rpartition("/")[2].partition(" ")[0]
+        count: Html = quantity.number("count")
+        if quantity.data["undetermined"]:
+            count = joined([count, " (", quantity.number("undetermined"), f" {UNDETERMINED})"])
+        figures = [quantity.micro(name) for name in ("maximum", "average")]
+        expanded = [quantity.micro(name, factor=k) for name in ("maximum", "average")]
+        unit = shown_unit(quantity.data["unit"])
         rows.append(
             [
                 symbol,
-                one.text("description"),
+                quantity.text("description"),
                 *figures,
                 *expanded,
                 unit,
                 count,
-                one.text("largest_at"),
+                quantity.text("largest_at"),
             ]
         )
-        if one.data.get("within_target") is not None:
-            by = uncertainty_words(one.data["target_coverage_factor"])
-            within = one.share("within_target")
+        if quantity.data.get("within_target") is not None:
+            by = uncertainty_words(quantity.data["target_coverage_factor"])
+            within = quantity.share("within_target")
             notes.append(note(f"Within the target ({by}): ", within, f" of {symbol}{caveat}."))
-        if one.data.get("parameters"):
-            each = (
-                joined([f"{name} ", one.micro("parameters", name)])
-                for name in one.data["parameters"]
+        if quantity.data.get("parameters"):
+            values = (
+                joined([f"{name} ", quantity.micro("parameters", name)])
+                for name in quantity.data["parameters"]
             )
-            notes.append(note(f"{one.data['description']}, {unit}: ", joined(each, ", "), "."))
+            notes.append(
+                note(f"{quantity.data['description']}, {unit}: ", joined(values, ", "), ".")
+            )
     if not rows:
         return Html()
     heads = ["", "uncertainty of", "u maximum", "u average", f"U maximum, k = {k:g}"]
@@ -64,16 +66,16 @@ def task_table(result: QuotedData, caveat: str = "") -> Html:
     if "tasks" not in result:
         return Html()
     rows = []
-    for name, one in zip(result.data["tasks"], result.at("tasks").each(), strict=True):
-        judged = {True: "yes", False: "no", None: ""}[one.data["within_target"]]
-        target = "" if one.data["target"] is None else one.micro("target")
+    for name, task in zip(result.data["tasks"], result.at("tasks").each(), strict=True):
+        judged = {True: "yes", False: "no", None: ""}[task.data["within_target"]]
+        target = "" if task.data["target"] is None else task.micro("target")
         rows.append(
             [
                 name,
-                one.number("length", factor=1e3, digits=6),
-                one.micro("standard_uncertainty"),
-                one.micro("expanded_uncertainty"),
-                one.number("coverage_factor"),
+                task.number("length", factor=1e3, digits=6),
+                task.micro("standard_uncertainty"),
+                task.micro("expanded_uncertainty"),
+                task.number("coverage_factor"),
                 target,
                 judged,
             ]
@@ -114,11 +116,11 @@ def lengths_words(result: QuotedData, target: str, caveat: str = "") -> Html:
         return joined([open_, words, "; the file states no target."])
     by = uncertainty_words(u6["target_coverage_factor"])
     share = lengths.share("within_target")
-    told = (
+    sentence = (
         f" of the distances between corrected points are within the target {target} ({by}){caveat};"
         " u is "
     )
-    return joined([open_, share, told, amounts, "."])
+    return joined([open_, share, sentence, amounts, "."])
 
 
 def scale_section(result: QuotedData) -> Html:
@@ -127,18 +129,21 @@ def scale_section(result: QuotedData) -> Html:
         return sentence("Scale is not determined, or nothing carries it.")
     scale = result.at("scale")
     carriers = [
-        [one.text("text"), "" if one.data["without"] is None else one.micro("without", digits=3)]
-        for one in scale.at("carried_by").each()
+        [
+            carrier.text("text"),
+            "" if carrier.data["without"] is None else carrier.micro("without", digits=3),
+        ]
+        for carrier in scale.at("carried_by").each()
     ]
-    for row, one in zip(carriers, scale.data["carried_by"], strict=True):
-        row[1] = row[1] if one["without"] is not None else UNDETERMINED
-    known = sentence(
+    for row, carrier in zip(carriers, scale.data["carried_by"], strict=True):
+        row[1] = row[1] if carrier["without"] is not None else UNDETERMINED
+    scale_sentence = sentence(
         "Scale is known to ",
         scale.micro("standard_uncertainty", digits=3),
         " ppm (standard uncertainty).",
     )
     parts = [
-        known,
+        scale_sentence,
         table(
             "scale", "What carries scale", ["carried by", "u of scale without it, ppm"], carriers
         ),
@@ -171,11 +176,11 @@ def estimates_table(result: QuotedData, names: list[str], name: str, caption: st
     k = expansion(result.at("quantities"))
     rows = []
     for key in names:
-        one = result.at("estimates", key)
-        value, unit = one.amount("value", "unit", "standard_uncertainty")
+        estimate = result.at("estimates", key)
+        value, unit = estimate.amount("value", "unit", "standard_uncertainty")
         factor = 1e3 if unit == "mK" else 1e6
-        u = one.number("standard_uncertainty", factor=factor, digits=3)
-        expanded = one.number("standard_uncertainty", factor=k * factor, digits=3)
+        u = estimate.number("standard_uncertainty", factor=factor, digits=3)
+        expanded = estimate.number("standard_uncertainty", factor=k * factor, digits=3)
         rows.append([key, value, u, expanded, unit])
     heads = ["parameter", "value", "u", f"U, k = {k:g}", "unit"]
     made = table(name, caption, heads, rows, (0, 4), is_long=len(rows) > 40)

@@ -43,7 +43,7 @@ def residual_pictures(observed: ObservedReadings, solution: Solution) -> tuple[S
 
 @single_threaded
 def judged_pictures(
-    at: Linearisation,
+    linearisation: Linearisation,
     judged: Verdict,
     target: Target | None,
     sigma: float = 1.0,
@@ -53,25 +53,36 @@ def judged_pictures(
     one, positions, `residuals`, ellipsoids of points and balls with `sigma` times the stated
     uncertainties, further undetermined directions, and weak ones.
     """
-    stated = 1.0 if target is None else target.coverage_factor
-    factor = stated if stated != 1.0 else 2.0
-    undetermined = list(_moving(at, null_motions(at), judged.null, "Undetermined"))
-    weak = _moving(at, weak_motions(at, target), judged.weak, "Weakly determined")
-    points = [point_view(at, factor, sigma)] if len(at.design.evaluation.points) else []
-    balls = ball_views(at, factor, sigma)
-    first = [*undetermined[:1], position_picture(at.design), *residuals]
+    coverage_factor = 1.0 if target is None else target.coverage_factor
+    factor = coverage_factor if coverage_factor != 1.0 else 2.0
+    undetermined = list(
+        _moving(linearisation, null_motions(linearisation), judged.null, "Undetermined")
+    )
+    weak = _moving(
+        linearisation, weak_motions(linearisation, target), judged.weak, "Weakly determined"
+    )
+    points = (
+        [point_view(linearisation, factor, sigma)]
+        if len(linearisation.design.evaluation.points)
+        else []
+    )
+    balls = ball_views(linearisation, factor, sigma)
+    first = [*undetermined[:1], position_picture(linearisation.design), *residuals]
     return (*first, *points, *balls, *undetermined[1:], *weak)
 
 
 def _moving(
-    at: Linearisation, motions: Sequence[Motion], told: Sequence[Direction], kind: str
+    linearisation: Linearisation,
+    motions: Sequence[Motion],
+    directions: Sequence[Direction],
+    kind: str,
 ) -> Iterator[SpatialPicture]:
     """Directions that move something, the first few of them."""
-    of = f" of {len(told)}" if len(told) > 1 else ""
+    of_count = f" of {len(directions)}" if len(directions) > 1 else ""
     shown = 0
-    for k, (motion, direction) in enumerate(zip(motions, told, strict=True), start=1):
-        name, words = f"{kind.lower().replace(' ', '-')}-{k}", f"{kind} {k}{of}"
-        picture = motion_view(at, motion, name, str(direction), words, MOST_MOVING)
+    for k, (motion, direction) in enumerate(zip(motions, directions, strict=True), start=1):
+        name, words = f"{kind.lower().replace(' ', '-')}-{k}", f"{kind} {k}{of_count}"
+        picture = motion_view(linearisation, motion, name, str(direction), words, MOST_MOVING)
         if picture is not None:
             shown += 1
             yield picture

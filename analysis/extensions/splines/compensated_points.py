@@ -57,9 +57,13 @@ class CompensatedPoints:
         for k, name in enumerate(self.names):
             lengths = [*self.nominal[k], *self.compensated[k]]
             values = [self.errors[k], self.uncertainties[k], -self.errors[k]]
-            told = [fixed(1e3 * value, 6) for value in lengths]
-            told += ["" if np.isnan(value) else fixed(1e6 * value, 4) for value in values]
-            writer.writerow([name, *told, *(fixed(value, 9) for value in self.normals[k])])
+            lengths_written = [fixed(1e3 * value, 6) for value in lengths]
+            lengths_written += [
+                "" if np.isnan(value) else fixed(1e6 * value, 4) for value in values
+            ]
+            writer.writerow(
+                [name, *lengths_written, *(fixed(value, 9) for value in self.normals[k])]
+            )
         return text.getvalue()
 
 
@@ -89,7 +93,7 @@ def compensated_points(
     if profile is None or curve.points.y_column.kind != "length":
         text = "errors are compensated along a profile; give the columns nominal_x and nominal_z"
         raise SplineError([SplineProblem(text)])
-    problems, lengths, own = [], [], []
+    problems, lengths, columns = [], [], []
     for place in places:
         try:
             length, normal = profile.located(place)
@@ -98,19 +102,19 @@ def compensated_points(
             problems.append(SplineProblem(text, tuple(place.tolist())))
             continue
         lengths.append(length)
-        own.append(normal)
+        columns.append(normal)
     if problems:
         raise SplineError(problems)
     s = np.array(lengths)
-    found = CompensatedPoints(
+    points_found = CompensatedPoints(
         tuple(names),
         places,
-        np.array(own).reshape(-1, 2) if normals is None else normals,
+        np.array(columns).reshape(-1, 2) if normals is None else normals,
         curve.fit.values(s),
         curve.standard_uncertainty(s),
     )
     corners = [_corner(curve, corner, k) for k, corner in enumerate(curve.corners, start=1)]
-    return _together([found, *corners])
+    return _together([points_found, *corners])
 
 
 def _corner(curve: ErrorCurve, corner: float, number: int) -> CompensatedPoints:
@@ -118,7 +122,10 @@ def _corner(curve: ErrorCurve, corner: float, number: int) -> CompensatedPoints:
     its errors have there.
     """
     assert curve.profile is not None
-    at, index = np.array([corner]), int(np.argmin(np.abs(curve.profile.lengths - corner)))
+    corner_and_index, index = (
+        np.array([corner]),
+        int(np.argmin(np.abs(curve.profile.lengths - corner))),
+    )
     place = curve.profile.places[index]
     try:
         normals, tangents = curve.profile.beside(place)
@@ -129,7 +136,7 @@ def _corner(curve: ErrorCurve, corner: float, number: int) -> CompensatedPoints:
         text = "the features at {0} are nearly tangent; make it a boundary"
         raise SplineError([SplineProblem(text, (corner,))])
     errors, slopes = (
-        np.array([curve.fit.values(at, k, side)[0] for side in SIDES]) for k in (0, 1)
+        np.array([curve.fit.values(corner_and_index, k, side)[0] for side in SIDES]) for k in (0, 1)
     )
     ways = tangents - slopes[:, None] * normals
     starts = -errors[:, None] * normals
@@ -140,7 +147,7 @@ def _corner(curve: ErrorCurve, corner: float, number: int) -> CompensatedPoints:
     # Slopes as small as those of errors change nothing here.
     shares = np.linalg.solve(normals, np.eye(2)).T @ direction
     root = sum(
-        share * curve.fit.space.rows(at, 0, side) @ curve.fit.root
+        share * curve.fit.space.rows(corner_and_index, 0, side) @ curve.fit.root
         for share, side in zip(shares, SIDES, strict=True)
     )
     return CompensatedPoints(
@@ -154,7 +161,7 @@ def _corner(curve: ErrorCurve, corner: float, number: int) -> CompensatedPoints:
 
 def _together(parts: Sequence[CompensatedPoints]) -> CompensatedPoints:
     arrays = (
-        np.concatenate([getattr(one, name) for one in parts])
+        np.concatenate([getattr(part, name) for part in parts])
         for name in ("nominal", "normals", "errors", "uncertainties")
     )
-    return CompensatedPoints(tuple(name for one in parts for name in one.names), *arrays)
+    return CompensatedPoints(tuple(name for part in parts for name in part.names), *arrays)

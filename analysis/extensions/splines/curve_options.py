@@ -61,13 +61,13 @@ KINDS = {"every": int, "order": int, "periodic": bool}
 LISTS = ("boundary", "corner", "straight", "at")
 
 
-def ensure_asked(given: Mapping[str, object]) -> None:
+def ensure_asked(options: Mapping[str, object]) -> None:
     """Refuse what cannot be asked for of a curve.
 
     :raises TypeError: an unknown name, or another kind of value.
     """
-    names = [one.name for one in fields(Asked)]
-    for name, value in given.items():
+    names = [field.name for field in fields(Asked)]
+    for name, value in options.items():
         if name not in names:
             raise TypeError(f'"{name}" is unknown; {hint(name, names)}')
         kind = KINDS.get(name, str)
@@ -87,18 +87,20 @@ def curve_settings(options: Asked, points: CurvePoints) -> CurveSettings:
     x, y = points.x_column, points.y_column
     holds = []
     for end in ("start", "end"):
-        for derivative, what in enumerate(("value", "slope")):
-            text = getattr(options, f"{end}_{what}")
+        for derivative, quantity_name in enumerate(("value", "slope")):
+            text = getattr(options, f"{end}_{quantity_name}")
             if text is not None:
                 holds.append(
-                    Hold(end, derivative, _value(f"--{end}-{what}", text, derivative, x, y))
+                    Hold(
+                        end, derivative, _value(f"--{end}-{quantity_name}", text, derivative, x, y)
+                    )
                 )
-    for place, what, text in options.at:
-        if what not in ("value", "slope"):
+    for place, quantity_name, text in options.at:
+        if quantity_name not in ("value", "slope"):
             raise OptionError(
-                f'--at: "{what}" should be value or slope, as in --at "30 mm" slope 0'
+                f'--at: "{quantity_name}" should be value or slope, as in --at "30 mm" slope 0'
             )
-        derivative = ("value", "slope").index(what)
+        derivative = ("value", "slope").index(quantity_name)
         holds.append(
             Hold(_place("--at", place, x), derivative, _value("--at", text, derivative, x, y))
         )
@@ -152,10 +154,10 @@ def _quantity(option: str, text: str, kind: str) -> float:
 
 
 def positive(text: str, column: Column, option: str = "--uncertainty") -> float:
-    found = _quantity(option, text, column.kind)
-    if found <= 0:
+    value = _quantity(option, text, column.kind)
+    if value <= 0:
         raise OptionError(f'{option}: "{text}" must be above zero')
-    return found
+    return value
 
 
 def listed(option: str, text: str, column: Column) -> list[float]:
@@ -187,11 +189,11 @@ def _value(option: str, text: str, derivative: int, x: Column, y: Column) -> flo
         raise OptionError(
             f'{option}: "{text}" has a decimal comma; write for example "{text.replace(",", ".")}"'
         )
-    found = re.fullmatch(r"([+-]?[0-9.]+(?:[eE][+-]?[0-9]+)?)\s*([a-z]+)\s*/\s*([a-z]+)", plain)
+    match = re.fullmatch(r"([+-]?[0-9.]+(?:[eE][+-]?[0-9]+)?)\s*([a-z]+)\s*/\s*([a-z]+)", plain)
     units: Any = UNITS
     with suppress(QuantityError):
-        if found and found[2] in units[y.kind] and found[3] in units[x.kind]:
-            return metres_or_radians(found[1], units[y.kind][found[2]] / units[x.kind][found[3]])
+        if match and match[2] in units[y.kind] and match[3] in units[x.kind]:
+            return metres_or_radians(match[1], units[y.kind][match[2]] / units[x.kind][match[3]])
         if x.kind == y.kind == "length":
             return parse_ratio(plain)
     raise OptionError(

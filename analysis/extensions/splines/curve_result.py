@@ -62,8 +62,8 @@ class FittedCurve(Result):
         points = self.curve.points
         units = {"x unit": _unit(points.x_column.kind), "y unit": _unit(points.y_column.kind)}
         return [
-            {name.replace("_", " "): value for name, value in one.items()} | units
-            for one in self.to_dict()["points"]
+            {name.replace("_", " "): value for name, value in point.items()} | units
+            for point in self.to_dict()["points"]
         ]
 
     def values(self, x: Array, derivative: int = 0) -> Array:
@@ -156,11 +156,13 @@ def error_curve(
         None if asked.uncertainty is None else positive(asked.uncertainty, chosen.y_column)
     )
     column = chosen.x_column
-    at = np.array(listed("--evaluate", asked.evaluate, column) if asked.evaluate else [], float)
+    evaluated = np.array(
+        listed("--evaluate", asked.evaluate, column) if asked.evaluate else [], float
+    )
     check(chosen)
     try:
         curve = fit_curve(chosen, settings, uncertainty, sigma)
-        curve.fit.values(at)
+        curve.fit.values(evaluated)
     except SplineError as error:
         raise _told(error, file, column) from None
-    return FittedCurve(file, curve, everything, at, powers)
+    return FittedCurve(file, curve, everything, evaluated, powers)

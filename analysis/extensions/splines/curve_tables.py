@@ -58,11 +58,11 @@ def constraint_words(curve: ErrorCurve, constraint: Constraint) -> str:
     words = constraint.words.format(*(shown(place, x) for place in constraint.places))
     name, _, place = words.partition(" at ")
     value = in_unit(curve, constraint.value, constraint.derivative)
-    told = "0" if value == 0 else f"{value:.6g} {derivative_unit(curve, constraint.derivative)}"
-    return f"{name} {told} at {place}"
+    amount = "0" if value == 0 else f"{value:.6g} {derivative_unit(curve, constraint.derivative)}"
+    return f"{name} {amount} at {place}"
 
 
-def curve_lines(curve: ErrorCurve, file: str, powers: Powers, at: np.ndarray) -> list[str]:
+def curve_lines(curve: ErrorCurve, file: str, powers: Powers, places: np.ndarray) -> list[str]:
     """The curve as lines of text, with its values at places (m,)."""
     fitted, points = curve.fit, curve.points
     x, y, space = points.x_column, points.y_column, fitted.space
@@ -74,19 +74,19 @@ def curve_lines(curve: ErrorCurve, file: str, powers: Powers, at: np.ndarray) ->
     listed = ", ".join(f"{knot / x.factor:.6g}" for knot in knots[:MOST_LISTED])
     more = f" and {len(knots) - MOST_LISTED} more" if len(knots) > MOST_LISTED else ""
     where = f" at {listed} {micro(x.unit)}{more}" if knots else ""
-    what = ORDERS.get(space.order, f"spline of order {space.order}")
+    title = ORDERS.get(space.order, f"spline of order {space.order}")
     lines.append(
-        f"{what}, {_number_of(len(knots), 'knot')}{where}; "
+        f"{title}, {_number_of(len(knots), 'knot')}{where}; "
         f"{_number_of(fitted.free, 'free coefficient')}, "
         f"{_number_of(fitted.degrees_of_freedom, 'degree')} of freedom"
     )
     for boundary in curve.boundaries:
         on = [points.names[k] for k in np.flatnonzero(fitted.x == boundary)]
-        both = f"; point {', '.join(on)} there belongs to both" if on else ""
-        lines.append(f"features share value and slope at {shown(boundary, x)}{both}")
+        shared = f"; point {', '.join(on)} there belongs to both" if on else ""
+        lines.append(f"features share value and slope at {shown(boundary, x)}{shared}")
     for corner in curve.corners:
         sides = [float(fitted.values(np.array([corner]), 0, side)[0]) for side in SIDES]
-        errors = " and ".join(shown(one, y, 4) for one in sides)
+        errors = " and ".join(shown(side_text, y, 4) for side_text in sides)
         lines.append(f"features meet at a corner at {shown(corner, x)}, with errors {errors}")
     if len(set(points.features)) > 1 and not curve.boundaries and not curve.corners:
         names = listing(dict.fromkeys(points.features))
@@ -104,18 +104,18 @@ def curve_lines(curve: ErrorCurve, file: str, powers: Powers, at: np.ndarray) ->
     worst = np.argsort(-comparable(np.abs(fitted.residuals / fitted.uncertainties)), kind="stable")[
         :3
     ]
-    told = ", ".join(
+    worst_residuals = ", ".join(
         f"{shown(fitted.residuals[k], y, 3)} at point {points.names[k]}" for k in worst
     )
-    lines += [f"largest residuals: {told}", "", *_piece_lines(curve, powers)]
-    if len(at):
-        lines += ["", *_value_lines(curve, at)]
+    lines += [f"largest residuals: {worst_residuals}", "", *_piece_lines(curve, powers)]
+    if len(places):
+        lines += ["", *_value_lines(curve, places)]
     return lines
 
 
-def _number_of(count: int, thing: str) -> str:
+def _number_of(count: int, noun: str) -> str:
     """A number of things, as in 1 knot, 2 knots."""
-    return f"{count} {thing}{'' if count == 1 else 's'}"
+    return f"{count} {noun}{'' if count == 1 else 's'}"
 
 
 def _sigma_lines(curve: ErrorCurve) -> list[str]:
@@ -125,7 +125,7 @@ def _sigma_lines(curve: ErrorCurve) -> list[str]:
         return [
             "no degrees of freedom are left to estimate sigma from; state the points' uncertainty"
         ]
-    what = number(curve.sigma, 4) if curve.has_uncertainties else shown(curve.sigma, y, 4)
+    sigma_text = number(curve.sigma, 4) if curve.has_uncertainties else shown(curve.sigma, y, 4)
     source = "estimated from the residuals" if curve.sigma_is_estimated else "given"
     beside = ""
     if not curve.sigma_is_estimated and not math.isnan(estimated):
@@ -134,7 +134,7 @@ def _sigma_lines(curve: ErrorCurve) -> list[str]:
     spread = curve.standard_uncertainty(places)
     worst = int(np.argmax(comparable(spread)))
     return [
-        f"sigma {what}, {source}{beside}",
+        f"sigma {sigma_text}, {source}{beside}",
         (
             f"standard uncertainty of the curve: median {shown(float(np.median(spread)), y, 3)},"
             f" largest {shown(spread[worst], y, 3)} at"
@@ -146,9 +146,11 @@ def _sigma_lines(curve: ErrorCurve) -> list[str]:
 
 def _coefficients(curve: ErrorCurve, powers: Powers) -> tuple[Pieces, np.ndarray]:
     """Pieces in metres and radians, and their coefficients in the units of the columns."""
-    found = pieces(curve.fit, powers)
+    pieces_found = pieces(curve.fit, powers)
     x, y = curve.points.x_column, curve.points.y_column
-    return found, found.coefficients / y.factor * x.factor ** np.arange(found.coefficients.shape[1])
+    return pieces_found, pieces_found.coefficients / y.factor * x.factor ** np.arange(
+        pieces_found.coefficients.shape[1]
+    )
 
 
 def _variable(curve: ErrorCurve, powers: Powers) -> str:
@@ -157,28 +159,30 @@ def _variable(curve: ErrorCurve, powers: Powers) -> str:
 
 
 def _piece_lines(curve: ErrorCurve, powers: Powers) -> list[str]:
-    found, coefficients = _coefficients(curve, powers)
+    piece_coefficients, coefficients = _coefficients(curve, powers)
     x = curve.points.x_column
     head = ["from", "to", *(f"u^{k}" if k else "1" for k in range(coefficients.shape[1]))]
     unit = micro(x.unit)
     units = [unit, unit, *(derivative_unit(curve, k) for k in range(coefficients.shape[1]))]
     rows = [head, units]
-    for start, end, row in zip(found.breaks, found.breaks[1:], coefficients, strict=False):
+    for start, end, row in zip(
+        piece_coefficients.breaks, piece_coefficients.breaks[1:], coefficients, strict=False
+    ):
         # What adds less to the curve than rounding does is told as zero.
         size = NOTHING * float(np.abs(curve.fit.coefficients).max()) / curve.points.y_column.factor
         lengths = (
             (end - start if powers == "local" else max(abs(start), abs(end))) / x.factor
         ) ** np.arange(len(row))
-        told = [
+        numbers = [
             "0" if abs(value) * length < size else f"{value:.7g}"
             for value, length in zip(row, lengths, strict=True)
         ]
-        rows.append([f"{start / x.factor:.6g}", f"{end / x.factor:.6g}", *told])
+        rows.append([f"{start / x.factor:.6g}", f"{end / x.factor:.6g}", *numbers])
     note = []
     if powers == "global":
         note = [
-            f"terms are up to {found.cancellation():.2g} times the curve, and rounding as much"
-            " larger"
+            f"terms are up to {piece_coefficients.cancellation():.2g} times the curve, and rounding"
+            " as much larger"
         ]
     return [
         f"polynomials of u, the {_variable(curve, powers)}, in {unit}; their coefficients of",
@@ -187,15 +191,15 @@ def _piece_lines(curve: ErrorCurve, powers: Powers) -> list[str]:
     ]
 
 
-def _value_lines(curve: ErrorCurve, at: np.ndarray) -> list[str]:
+def _value_lines(curve: ErrorCurve, places: np.ndarray) -> list[str]:
     x, y = curve.points.x_column, curve.points.y_column
-    values, slopes = curve.fit.values(at), curve.fit.values(at, 1)
+    values, slopes = curve.fit.values(places), curve.fit.values(places, 1)
     slopes[
         np.abs(slopes) * curve.fit.space.length < NOTHING * np.abs(curve.fit.coefficients).max()
     ] = 0.0
-    spread = curve.standard_uncertainty(at)
+    spread = curve.standard_uncertainty(places)
     columns = {
-        f"{x.words}, {micro(x.unit)}": (at / x.factor, "{:.7g}".format),
+        f"{x.words}, {micro(x.unit)}": (places / x.factor, "{:.7g}".format),
         f"curve, {micro(y.unit)}": (values / y.factor, "{:.5g}".format),
         "standard uncertainty": (spread / y.factor, 3),
         "expanded": (curve.coverage_factor * spread / y.factor, 3),
@@ -208,10 +212,10 @@ def _value_lines(curve: ErrorCurve, at: np.ndarray) -> list[str]:
 
 
 # In one piece: one mapping, in the form in which the JSON has it.
-def curve_data(curve: ErrorCurve, file: str, powers: Powers, at: np.ndarray) -> dict[str, Any]:
+def curve_data(curve: ErrorCurve, file: str, powers: Powers, places: np.ndarray) -> dict[str, Any]:
     """The curve as plain data in metres and radians; what is not known is None."""
     fitted, points, space = curve.fit, curve.points, curve.fit.space
-    found = pieces(fitted, powers)
+    pieces_found = pieces(fitted, powers)
     units = {"length": "m", "angle": "rad"}
     return {
         "file": file,
@@ -233,7 +237,9 @@ def curve_data(curve: ErrorCurve, file: str, powers: Powers, at: np.ndarray) -> 
         "free_coefficients": fitted.free,
         "powers": powers,
         "pieces": records(
-            start=found.breaks[:-1], end=found.breaks[1:], coefficients=found.coefficients
+            start=pieces_found.breaks[:-1],
+            end=pieces_found.breaks[1:],
+            coefficients=pieces_found.coefficients,
         ),
         "points": records(
             point=points.names,
@@ -244,17 +250,17 @@ def curve_data(curve: ErrorCurve, file: str, powers: Powers, at: np.ndarray) -> 
             standard_uncertainty=curve.standard_uncertainty(fitted.x),
         ),
         "values": records(
-            x=at,
-            curve=fitted.values(at),
-            slope=fitted.values(at, 1),
-            standard_uncertainty=curve.standard_uncertainty(at),
+            x=places,
+            curve=fitted.values(places),
+            slope=fitted.values(places, 1),
+            standard_uncertainty=curve.standard_uncertainty(places),
         ),
     }
 
 
 def coefficients_csv(curve: ErrorCurve, powers: Powers) -> str:
     """The polynomials of all pieces as CSV at full precision, in the units of the data."""
-    found, coefficients = _coefficients(curve, powers)
+    piece_coefficients, coefficients = _coefficients(curve, powers)
     x, y = curve.points.x_column, curve.points.y_column
     text = io.StringIO()
     count = coefficients.shape[1]
@@ -266,7 +272,7 @@ def coefficients_csv(curve: ErrorCurve, powers: Powers) -> str:
         for k in range(count)
     ]
     writer.writerow([f"start_{x.unit}", f"end_{x.unit}", *names])
-    breaks = (found.breaks / x.factor).tolist()
+    breaks = (piece_coefficients.breaks / x.factor).tolist()
     for start, end, row in zip(breaks, breaks[1:], coefficients.tolist(), strict=False):
         writer.writerow([repr(start), repr(end), *map(repr, row)])
     return text.getvalue()

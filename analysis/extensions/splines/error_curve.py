@@ -154,14 +154,14 @@ def fit_curve(
     constraints = (*holds, *(periodic(space) if settings.period is not None else ()))
     for start, end in lines:
         constraints += straight(space, start, end)
-    stated = points.uncertainties
-    if stated is None and uncertainty is not None:
-        stated = np.full(len(x), uncertainty)
-    if stated is None and sigma == "given":
+    uncertainties = points.uncertainties
+    if uncertainties is None and uncertainty is not None:
+        uncertainties = np.full(len(x), uncertainty)
+    if uncertainties is None and sigma == "given":
         text = "no uncertainties are stated; add a column such as u_um, or give --uncertainty"
         raise SplineError([SplineProblem(text)])
-    fitted = fit(space, x, points.y, stated, constraints)
-    is_estimated = (sigma or ("estimated" if stated is None else "given")) == "estimated"
+    fitted = fit(space, x, points.y, uncertainties, constraints)
+    is_estimated = (sigma or ("estimated" if uncertainties is None else "given")) == "estimated"
     factor = fitted.sigma if is_estimated else 1.0
     return ErrorCurve(
         points,
@@ -171,7 +171,7 @@ def fit_curve(
         holds,
         factor,
         is_estimated,
-        stated is not None,
+        uncertainties is not None,
         on_profile,
         corners,
         profile,
@@ -193,9 +193,9 @@ def _space(
     """
     knots = settings.knots
     if knots is None:
-        found = at_every(x, settings.every, *ends, sorted({*boundaries, *corners}))
+        knots_found = at_every(x, settings.every, *ends, sorted({*boundaries, *corners}))
         knots = tuple(
-            knot for knot in found if not any(start <= knot <= end for start, end in lines)
+            knot for knot in knots_found if not any(start <= knot <= end for start, end in lines)
         )
     every = with_boundaries(knots, boundaries, settings.order, corners)
     space = SplineSpace(settings.order, *ends, every)
@@ -285,8 +285,8 @@ def whole_profile(
     """
     assert points.places is not None
     _refuse_coincident(points.places)
-    profile, own, _ = along(points.places, points.features, boundaries, corners=corners)
-    return profile, own
+    profile, whole, _ = along(points.places, points.features, boundaries, corners=corners)
+    return profile, whole
 
 
 def _located(
@@ -306,9 +306,9 @@ def _located(
     shared = [*settings.boundaries, *settings.corners]
     wanted = [*(hold.at for hold in settings.holds), *settings.boundaries]
     corners_at = [place for place in settings.corners if isinstance(place, tuple)]
-    others = [place for place in dict.fromkeys(wanted) if place not in corners_at]
+    places_between = [place for place in dict.fromkeys(wanted) if place not in corners_at]
     nominal = [
-        *(place for place in others if isinstance(place, tuple)),
+        *(place for place in places_between if isinstance(place, tuple)),
         *dict.fromkeys(corners_at),
     ]
     ends = [settings.start, settings.end]
@@ -375,7 +375,7 @@ def _on_profile(
     _refuse_coincident(points.places)
     _refuse_distant(points.places, start, end)
     try:
-        profile, own, at = along(
+        profile, profile_points, breaks = along(
             points.places,
             points.features,
             np.array(nominal).reshape(-1, 2),
@@ -390,11 +390,11 @@ def _on_profile(
         )
         raise SplineError([SplineProblem(text, nominal[error.args[0]])]) from None
     lengths = profile.lengths
-    where: dict[Place, float] = dict(zip(nominal, lengths[at].tolist(), strict=True))
+    where: dict[Place, float] = dict(zip(nominal, lengths[breaks].tolist(), strict=True))
     for place in (settings.start, settings.end):
         if isinstance(place, tuple):
             where[place] = float(lengths[(profile.places == place).all(axis=1)][0])
-    return lengths[own], where, profile
+    return lengths[profile_points], where, profile
 
 
 def _refuse_distant(places: Array, start: Array | None, end: Array | None) -> None:
@@ -407,11 +407,11 @@ def _refuse_distant(places: Array, start: Array | None, end: Array | None) -> No
         return
     farthest = CONTINUED * np.hypot(*np.diff(places, axis=0).T).max()
     problems = []
-    for place, own in ((start, 0), (end, len(places) - 1)):
+    for place, end_index in ((start, 0), (end, len(places) - 1)):
         if place is None:
             continue
         away = np.hypot(*(places - place).T)
-        if away[own] > min(float(away.min()), farthest):
+        if away[end_index] > min(float(away.min()), farthest):
             text = (
                 "the place ({0}, {1}) is not on the profile or just beyond it; correct it, or give"
                 " the arc length"
@@ -428,10 +428,10 @@ def _refuse_coincident(places: Array) -> None:
     """
     same = [
         SplineProblem(
-            "two neighbouring points are at ({0}, {1}); leave one of them out", tuple(one)
+            "two neighbouring points are at ({0}, {1}); leave one of them out", tuple(place)
         )
-        for one, two in pairwise(places.tolist())
-        if one == two
+        for place, two in pairwise(places.tolist())
+        if place == two
     ]
     if same:
         raise SplineError(same)

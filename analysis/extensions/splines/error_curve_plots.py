@@ -128,11 +128,11 @@ def draw_whiskers(
     :raises SplineError: neighbouring points that stand at the same place.
     :raises OSError: the file cannot be written.
     """
-    profile, own = whole_profile(points, curve.profile_boundaries, len(curve.settings.corners))
+    profile, whole = whole_profile(points, curve.profile_boundaries, len(curve.settings.corners))
     assert points.places is not None
     # Axial co-ordinate to the right, radius upwards, as a turning centre is looked at.
     line, start = profile.places[:, ::-1], points.places[:, ::-1]
-    normals = (profile.normals[own] if points.normals is None else points.normals)[:, ::-1]
+    normals = (profile.normals[whole] if points.normals is None else points.normals)[:, ::-1]
     factor = points.x_column.factor if points.x is None else 1e-3
     unit = points.x_column.unit if points.x is None else "mm"
     extent = np.ptp(line, axis=0)
@@ -179,9 +179,9 @@ def draw_whiskers(
         title = f"{points.y_column.words}, magnified {magnification:g} times"
         common_legend(figure, axes, loc="upper center", ncols=3, borderaxespad=0.3, title=title)
         worst = int(np.argmax(comparable(np.abs(points.y))))
-        told = f"{points.y_column.words} as bars normal to a profile of {len(points.y)} points"
+        heading = f"{points.y_column.words} as bars normal to a profile of {len(points.y)} points"
         largest_told = f"the largest is {shown(points.y[worst], points.y_column, 4)}"
-        return save(figure, path, f"{told}, magnified {magnification:g} times; {largest_told}")
+        return save(figure, path, f"{heading}, magnified {magnification:g} times; {largest_told}")
 
 
 def _outline(places: np.ndarray, features: tuple[tuple[int, int], ...]) -> np.ndarray:

@@ -102,15 +102,15 @@ class Profile:
         steps = np.abs(np.diff(self._points))
         detour = (before + after - steps) / steps
         k = int(np.argmin(detour)) if len(detour) else 0
-        ends = [one for one in self.features if one[0] <= k < one[1]]
+        ends = [feature for feature in self.features if feature[0] <= k < feature[1]]
         if not ends or detour[k] > DETOUR:
             raise NotOnProfileError
         first, last = ends[0]
         curvature = 0.0
         if last - first >= 2:
-            own = _curvatures(self._points[first : last + 1])
-            curvature = 0.5 * float(own[k - first] + own[k - first + 1])
-        parts = [_arc(float(one[k]), curvature) for one in (before, after)]
+            curvatures = _curvatures(self._points[first : last + 1])
+            curvature = 0.5 * float(curvatures[k - first] + curvatures[k - first + 1])
+        parts = [_arc(float(feature[k]), curvature) for feature in (before, after)]
         share = parts[0] / sum(parts)
         half = np.arcsin(np.clip(0.5 * curvature * steps[k], -1.0, 1.0))
         chord = (self._points[k + 1] - self._points[k]) / steps[k]
@@ -130,14 +130,14 @@ class Profile:
 
         :raises NotOnProfileError: no two features of several places share it.
         """
-        found = []
+        candidates = []
         for first, last in self.features:
-            for index, own in ((last, -1), (first, 0)):
+            for index, sign in ((last, -1), (first, 0)):
                 if last > first and (self.places[index] == place).all():
-                    found.append(self._tangents(first, last)[own])
-        if len(found) != 2:
+                    candidates.append(self._tangents(first, last)[sign])
+        if len(candidates) != 2:
             raise NotOnProfileError
-        tangents: Complex = np.array(found)
+        tangents: Complex = np.array(candidates)
         tangents /= np.abs(tangents)
         return _as_pairs(self._outward * 1j * tangents), _as_pairs(tangents)
 
@@ -174,8 +174,8 @@ def _curvatures(points: Complex) -> Array:
     """Signed curvature (m,) of the circle through each point and its neighbours; at the ends, that
     of the next.
     """
-    one, two = np.diff(points)[:-1], np.diff(points)[1:]
-    inner = 2.0 * (np.conj(one) * two).imag / (np.abs(one) * np.abs(two) * np.abs(one + two))
+    steps, two = np.diff(points)[:-1], np.diff(points)[1:]
+    inner = 2.0 * (np.conj(steps) * two).imag / (np.abs(steps) * np.abs(two) * np.abs(steps + two))
     return np.concatenate([inner[:1], inner, inner[-1:]])
 
 
@@ -198,43 +198,45 @@ def along(
     :raises NotOnProfileError: a boundary that is far from the way between neighbouring places; its
         argument is the boundary's index.
     """
-    found = [*places]
-    own = [*range(len(places))]
+    points_along = [*places]
+    indices = [*range(len(places))]
     marks = [*labels]
     where: list[int] = []
     for k, boundary in enumerate(boundaries):
-        same = np.flatnonzero((np.array(found) == boundary).all(axis=1))
+        same = np.flatnonzero((np.array(points_along) == boundary).all(axis=1))
         if len(same):
             where.append(int(same[0]))
             continue
         is_corner = k >= len(boundaries) - corners
-        at = _between(np.array(found), boundary, CORNER_DETOUR if is_corner else DETOUR)
-        if at is None:
+        insertion = _between(
+            np.array(points_along), boundary, CORNER_DETOUR if is_corner else DETOUR
+        )
+        if insertion is None:
             raise NotOnProfileError(k)
-        found.insert(at, boundary)
-        marks.insert(at, "")
-        own = [index + (index >= at) for index in own]
-        where = [index + (index >= at) for index in where] + [at]
+        points_along.insert(insertion, boundary)
+        marks.insert(insertion, "")
+        indices = [index + (index >= insertion) for index in indices]
+        where = [index + (index >= insertion) for index in where] + [insertion]
     if start is not None:
-        found.insert(0, start)
+        points_along.insert(0, start)
         marks.insert(0, marks[0])
-        own, where = [index + 1 for index in own], [index + 1 for index in where]
+        indices, where = [index + 1 for index in indices], [index + 1 for index in where]
     if end is not None:
-        found.append(end)
+        points_along.append(end)
         marks.append(marks[-1])
-    edges = set(where) - {0, len(found) - 1}
+    edges = set(where) - {0, len(points_along) - 1}
     features, first = [], 0
-    for k in range(1, len(found)):
+    for k in range(1, len(points_along)):
         if k in edges:
             features.append((first, k))
             first = k
         elif marks[k] != marks[k - 1] and k - 1 not in edges:
             features.append((first, k - 1))
             first = k
-    features.append((first, len(found) - 1))
+    features.append((first, len(points_along) - 1))
     return (
-        Profile(np.array(found), tuple(features)),
-        np.array(own, dtype=int),
+        Profile(np.array(points_along), tuple(features)),
+        np.array(indices, dtype=int),
         np.array(where, dtype=int),
     )
 

@@ -133,7 +133,7 @@ def read_points(path: Path, x: str | None = None, y: str | None = None) -> Curve
     names: list[str] = []
     features: list[str] = []
     normals: list[list[float]] = []
-    seen: dict[str, int] = {}
+    names_seen: dict[str, int] = {}
     for number, line in lines[1:]:
         if len(messages) >= MOST_MESSAGES or len(values) > MOST_POINTS:
             break
@@ -159,13 +159,14 @@ def read_points(path: Path, x: str | None = None, y: str | None = None) -> Curve
                     Mark(file, number, cells[header.texts[NORMALS[0]]][0]).message("", str(error))
                 )
         name = cells[header.texts[POINT]][1] if POINT in header.texts else str(len(names) + 1)
-        if name in seen:
+        if name in names_seen:
             messages.append(
                 mark.message(
-                    "", f'a second point "{shorten(name)}", as in line {seen[name]}; rename one'
+                    "",
+                    f'a second point "{shorten(name)}", as in line {names_seen[name]}; rename one',
                 )
             )
-        seen[name] = number
+        names_seen[name] = number
         names.append(name)
         features.append(cells[header.texts[FEATURE]][1] if FEATURE in header.texts else "")
     if len(messages) >= MOST_MESSAGES:
@@ -219,12 +220,12 @@ def choose_points(points: CurvePoints, text: str, file: str) -> list[int]:
     """
     by_name = {name: k for k, name in enumerate(points.names)}
     numbers = {int(name): k for name, k in by_name.items() if re.fullmatch("[0-9]{1,9}", name)}
-    found: set[int] = set()
+    indices: set[int] = set()
     messages = []
     for part in re.split(r"\s*,\s*", text.strip()):
         span = re.fullmatch(r"([0-9]{1,9})\s*-\s*([0-9]{1,9})", part)
         if part in by_name:
-            found.add(by_name[part])
+            indices.add(by_name[part])
         elif span and numbers and (int(span[1]) < min(numbers) or int(span[2]) > max(numbers)):
             text = (
                 f'"{shorten(part)}" goes beyond the points, {min(numbers)} to {max(numbers)}; leave'
@@ -232,15 +233,17 @@ def choose_points(points: CurvePoints, text: str, file: str) -> list[int]:
             )
             messages.append(Message(file, 0, 0, "", text))
         elif span and any(int(span[1]) <= number <= int(span[2]) for number in numbers):
-            found |= {k for number, k in numbers.items() if int(span[1]) <= number <= int(span[2])}
+            indices |= {
+                k for number, k in numbers.items() if int(span[1]) <= number <= int(span[2])
+            }
         else:
-            what = "no points" if span else "no point"
+            noun = "no points" if span else "no point"
             messages.append(
-                Message(file, 0, 0, "", f'{what} "{shorten(part)}"; {hint(part, points.names)}')
+                Message(file, 0, 0, "", f'{noun} "{shorten(part)}"; {hint(part, points.names)}')
             )
     if messages:
         raise ExperimentError(messages)
-    return sorted(found)
+    return sorted(indices)
 
 
 class _Header:
@@ -290,7 +293,7 @@ class _Header:
             if all(name in self.columns and self.columns[name].kind == "length" for name in names):
                 profile = tuple(self.columns[name] for name in names)
                 break
-        left = [
+        columns_left = [
             column
             for column in self.columns.values()
             if column not in profile and column.name != UNCERTAINTY
@@ -302,17 +305,18 @@ class _Header:
         elif x is not None and not profile:
             text = "the arc length needs a profile; add the columns nominal_x_mm and nominal_z_mm"
             messages.append(self.mark.message("", text))
-        elif not profile and len(left) > 1:
-            x_column = left[0]
-        left = [column for column in left if column is not x_column]
+        elif not profile and len(columns_left) > 1:
+            x_column = columns_left[0]
+        columns_left = [column for column in columns_left if column is not x_column]
         y_column = None
         if y is not None:
             y_column = self._named("y", y, messages)
-        elif len(left) == 1:
-            y_column = left[0]
-        elif left:
+        elif len(columns_left) == 1:
+            y_column = columns_left[0]
+        elif columns_left:
             text = (
-                f"several columns may be the error: {listing(c.name for c in left)}; choose one"
+                f"several columns may be the error: {listing(c.name for c in columns_left)};"
+                " choose one"
                 " with --y"
             )
             messages.append(self.mark.message("", text))
@@ -345,7 +349,7 @@ class _Header:
     def _named(self, option: str, name: str, messages: list[Message]) -> Column | None:
         plain = name if name in self.columns else name.rpartition("_")[0]
         if plain not in self.columns:
-            known = hint(name, self.columns)
+            advice = hint(name, self.columns)
             unit = (
                 f'the column "{shorten(name)}" has no unit of length or angle; add it, as in'
                 f" {shorten(name)}_um"
@@ -353,7 +357,7 @@ class _Header:
             text = (
                 unit
                 if name in self.order
-                else f'no column "{shorten(name)}" for --{option}; {known}'
+                else f'no column "{shorten(name)}" for --{option}; {advice}'
             )
             messages.append(self.mark.message("", text))
             return None

@@ -111,15 +111,15 @@ def add_options(parser: ArgumentParser) -> None:
     shape.add_argument(
         "--period", metavar="PERIOD", help='closed curve of another period, such as "10 mm"'
     )
-    held = parser.add_argument_group("prescribed")
+    prescribed = parser.add_argument_group("prescribed")
     for end in ("start", "end"):
-        held.add_argument(
+        prescribed.add_argument(
             f"--{end}-value", metavar="VALUE", help=f'error at the {end}, such as "3 um"'
         )
-        held.add_argument(
+        prescribed.add_argument(
             f"--{end}-slope", metavar="SLOPE", help=f'slope at the {end}, such as 0 or "2 um/mm"'
         )
-    held.add_argument(
+    prescribed.add_argument(
         "--at",
         nargs=3,
         metavar=("PLACE", "value|slope", "VALUE"),
@@ -182,9 +182,9 @@ def run(options: Namespace) -> int:
     from .curve_options import Asked, OptionError
     from .curve_result import error_curve
 
-    asked = Asked(**{one.name: getattr(options, one.name) for one in fields(Asked)})
+    asked = Asked(**{field.name: getattr(options, field.name) for field in fields(Asked)})
     try:
-        found = error_curve(
+        curve = error_curve(
             options.file,
             options.x,
             options.y,
@@ -196,20 +196,20 @@ def run(options: Namespace) -> int:
         )
     except OptionError as error:
         raise UsageError(error) from None
-    lines = [] if options.json else found.lines()
+    lines = [] if options.json else curve.lines()
     contents: dict[Path | None, Writer | str] = {
-        options.plot: found.plot,
-        options.whiskers: partial(found.plot_whiskers, magnification=options.magnification),
+        options.plot: curve.plot,
+        options.whiskers: partial(curve.plot_whiskers, magnification=options.magnification),
     }
     if options.compensated is not None:
-        contents[options.compensated] = found.compensated(options.nominal).csv()
-    polynomials = None if options.output is None else found.coefficients()
+        contents[options.compensated] = curve.compensated(options.nominal).csv()
+    polynomials = None if options.output is None else curve.coefficients()
     is_screen = str(options.output) == "-"
     if polynomials is not None and not is_screen:
         contents[options.output] = polynomials
     write(options, contents)
     if options.json:
-        print_json([found.to_dict()])
+        print_json([curve.to_dict()])
     elif polynomials is not None and is_screen:
         sys.stdout.write(polynomials)
     else:

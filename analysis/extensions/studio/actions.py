@@ -101,9 +101,9 @@ def _posed(
 ) -> str:
     experiment = experiment_of(document, planning=True)
     place = _position(experiment, name)
-    found = pose(experiment, place)
-    origin = np.round(found.origin / STEP) * STEP
-    new = with_pose(experiment, name, Pose(found.rotation, np.round(origin, 9) + 0.0))
+    position_pose = pose(experiment, place)
+    origin = np.round(position_pose.origin / STEP) * STEP
+    new = with_pose(experiment, name, Pose(position_pose.rotation, np.round(origin, 9) + 0.0))
     return with_experiment(document.text, document.path, experiment, new)
 
 
@@ -132,8 +132,8 @@ def _repaired(document: DesignDocument, action: Arguments) -> str:
     text = document.text
     experiment = experiment_of(document, planning=True)
     needed = [
-        Edit(_steps(one["path"]), _plain(one["value"]), bool(one["is_new"]))
-        for one in action["edits"]
+        Edit(_steps(edit["path"]), _plain(edit["value"]), bool(edit["is_new"]))
+        for edit in action["edits"]
     ]
     changes = changes_of(experiment, needed)
     return with_text_changes(text, document.path, document.variant, changes)
@@ -147,13 +147,13 @@ def _removed(document: DesignDocument, action: Arguments) -> str:
 
 def _read_with(document: DesignDocument, action: Arguments) -> str:
     """Everything of a position read with other probes."""
-    probes = tuple(str(one) for one in action["probes"])
+    probes = tuple(str(probe) for probe in action["probes"])
     return _with_groups(document, action, lambda group: replace(group, probes=probes))
 
 
 def _read_balls(document: DesignDocument, action: Arguments) -> str:
     """Other balls of a position read, all with the same probes."""
-    names = tuple(str(one) for one in action["balls"])
+    names = tuple(str(ball) for ball in action["balls"])
     experiment = experiment_of(document, planning=True)
     place = _position(experiment, str(action["position"]))
     every = experiment.layouts[place.artefact].names
@@ -183,13 +183,13 @@ def _with_groups(
 def _set(document: DesignDocument, action: Arguments) -> str:
     """A value at a path, as a file states it; nothing takes it away."""
     steps = _steps(action["path"])
-    said = str(action["value"])
-    if not said.strip():
+    text = str(action["value"])
+    if not text.strip():
         return _with(document, [TextChange(steps, kind="remove")])
-    return _with(document, [TextChange(steps, value_of(said))])
+    return _with(document, [TextChange(steps, value_of(text))])
 
 
-def value_of(said: str) -> Any:
+def value_of(text: str) -> Any:
     """A value as a person types it in a form, in one line, as a file would state it.
 
     :raises ActionError: it is no value.
@@ -198,9 +198,9 @@ def value_of(said: str) -> Any:
     (['1 m', 2], '0.2 um')
     """
     try:
-        return _plain(to_python(parse_tree(f"value: {said}\n", "value"))["value"])
+        return _plain(to_python(parse_tree(f"value: {text}\n", "value"))["value"])
     except (ExperimentError, TypeError, KeyError):
-        raise ActionError(f"{said} is no value of a file") from None
+        raise ActionError(f"{text} is no value of a file") from None
 
 
 def _written(document: DesignDocument, action: Arguments) -> str:
@@ -220,9 +220,9 @@ def _position(experiment: Experiment, name: str) -> Position:
 
 
 def _place_of(document: DesignDocument, name: str) -> Steps:
-    said = to_python(experiment_of(document, planning=True).tree)
-    for i, one in enumerate(said["positions"]):
-        if str(one["name"]) == name:
+    settings = to_python(experiment_of(document, planning=True).tree)
+    for i, entry in enumerate(settings["positions"]):
+        if str(entry["name"]) == name:
             return ("positions", i)
     raise ActionError(f'no position "{name}"')
 
@@ -238,18 +238,18 @@ def settings_of(document: DesignDocument, name: str) -> dict[str, Any]:
 
 def _vector(value: Any) -> Array:
     try:
-        found = np.array(value, float)
+        vector = np.array(value, float)
     except (TypeError, ValueError):
         raise ActionError(f"{value!r} is no vector") from None
-    if found.ndim != 1 or not np.isfinite(found).all():
+    if vector.ndim != 1 or not np.isfinite(vector).all():
         raise ActionError(f"{value!r} is no vector")
-    return found
+    return vector
 
 
 def _steps(value: Any) -> Steps:
     if not isinstance(value, list) or not value:
         raise ActionError("a path is a list of keys and indices")
-    return tuple(one if isinstance(one, int) else str(one) for one in value)
+    return tuple(step if isinstance(step, int) else str(step) for step in value)
 
 
 def _plain(value: Any) -> Any:

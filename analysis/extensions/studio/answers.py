@@ -41,10 +41,10 @@ def answer(experiment: Experiment) -> dict[str, Any]:
     """
     start = perf_counter()
     design, target = lay_out(experiment), experiment.target_uncertainty
-    at = linearise(design)
-    judged = verdict(at, experiment.expected_rank_deficiency, target)
-    quantities = uncertainties(at, target=target)
-    found_map = _map(at)
+    linearisation = linearise(design)
+    judged = verdict(linearisation, experiment.expected_rank_deficiency, target)
+    quantities = uncertainties(linearisation, target=target)
+    found_map = _map(linearisation)
     engine = perf_counter() - start
     lengths = quantities.get("U6")
     return {
@@ -55,11 +55,11 @@ def answer(experiment: Experiment) -> dict[str, Any]:
             **picked(judged, "deficiency", "expected", "parameters", "observations"),
             "reasons": list(judged.reasons),
         },
-        "quantities": [_row(one) for one in quantities.values()],
+        "quantities": [_row(quantity) for quantity in quantities.values()],
         "headline": length_headline(quantities),
         "target": [] if target is None else target_lines(lengths),
         "within": None if lengths is None else lengths.within_target,
-        "motions": _motions(at, judged, target),
+        "motions": _motions(linearisation, judged, target),
         "map": found_map,
         "doubts": list(experiment.doubts),
         "engine": engine,
@@ -91,8 +91,8 @@ def _scene(experiment: Experiment) -> dict[str, Any]:
         "dimension": experiment.dimension,
         "lower": volume.lower.tolist(),
         "upper": volume.upper.tolist(),
-        "probes": {name: one.offset.tolist() for name, one in experiment.probes.items()},
-        "artefacts": {name: list(one.names) for name, one in experiment.layouts.items()},
+        "probes": {name: entry.offset.tolist() for name, entry in experiment.probes.items()},
+        "artefacts": {name: list(entry.names) for name, entry in experiment.layouts.items()},
         "positions": [place_data(experiment, place) for place in experiment.positions],
     }
 
@@ -101,8 +101,8 @@ def place_data(experiment: Experiment, place: Position) -> dict[str, Any]:
     """Where a position stands, as plain data in metres."""
     layout = experiment.layouts[place.artefact]
     plane = plane_of(place.pose.rotation)
-    read = np.zeros(len(layout.names), bool)
-    read[place.balls] = True
+    is_read = np.zeros(len(layout.names), bool)
+    is_read[place.balls] = True
     return {
         **picked(place, "name", "artefact"),
         "probes": list(place.probes),
@@ -113,58 +113,71 @@ def place_data(experiment: Experiment, place: Position) -> dict[str, Any]:
         "origin": place.pose.origin.tolist(),
         "rotation": place.pose.rotation.tolist(),
         "balls": ball_coordinates(place.pose, layout).tolist(),
-        "read": read.tolist(),
+        "read": is_read.tolist(),
     }
 
 
-def _motions(at: Linearisation, judged: Verdict, target: Target | None) -> dict[str, Any]:
+def _motions(
+    linearisation: Linearisation, judged: Verdict, target: Target | None
+) -> dict[str, Any]:
     """How each undetermined and each weak direction moves a lattice through the volume, nodes of x
     running slowest, and the balls that are read, per unit of the largest displacement.
 
     Their common rigid motion, which no distance shows, is taken out.
     """
-    design = at.design
-    volume, read, offsets = design.machine.volume, design.readings, design.probes.offsets
+    design = linearisation.design
+    volume, volume_and_readings, offsets = (
+        design.machine.volume,
+        design.readings,
+        design.probes.offsets,
+    )
     nodes = even_grid(volume.lower, volume.upper, [NODES] * len(volume.lower))
     of_nodes = np.full(len(nodes), design.evaluation.probe)
-    of_plates = read.select(design.plate_readings)
-    places = np.concatenate([nodes + offsets[of_nodes], locations(design, at.state, of_plates)])
-    told = (*judged.null, *judged.weak)
-    found = []
-    for k, motion in enumerate((*null_motions(at), *weak_motions(at, target))):
-        by = [moved_points(at, motion, nodes, of_nodes), moved_balls(at, motion, of_plates)]
+    of_plates = volume_and_readings.select(design.plate_readings)
+    places = np.concatenate(
+        [nodes + offsets[of_nodes], locations(design, linearisation.state, of_plates)]
+    )
+    directions = (*judged.null, *judged.weak)
+    motions = []
+    for k, motion in enumerate(
+        (*null_motions(linearisation), *weak_motions(linearisation, target))
+    ):
+        by = [
+            moved_points(linearisation, motion, nodes, of_nodes),
+            moved_balls(linearisation, motion, of_plates),
+        ]
         moved = without_rigid_motion(places, np.concatenate(by)[:, :, None])[:, :, 0]
         largest = float(np.linalg.norm(moved, axis=1).max())
         rounded = np.round(moved / (largest or 1.0), 4).tolist()
-        found.append(
+        motions.append(
             {
-                "words": str(told[k]),
+                "words": str(directions[k]),
                 "weak": k >= len(judged.null),
                 "nodes": rounded[: len(nodes)],
                 "readings": rounded[len(nodes) :],
             }
         )
-    first = np.array([design.balls.of(int(one)).min() for one in design.balls.artefact])
+    first = np.array([design.balls.of(int(artefact)).min() for artefact in design.balls.artefact])
     numbers = np.arange(len(first)) - first
     return {
         "nodes": NODES,
         "position": of_plates.position.tolist(),
         "ball": numbers[of_plates.ball].tolist(),
-        "directions": found,
+        "directions": motions,
     }
 
 
-def _map(at: Linearisation) -> dict[str, Any]:
+def _map(linearisation: Linearisation) -> dict[str, Any]:
     """Standard uncertainty of corrected points through the volume, None where undetermined."""
-    found = point_map(at, MAP_NODES)
+    mapped = point_map(linearisation, MAP_NODES)
     return {
-        "x": found.x.tolist(),
-        "y": found.y.tolist(),
+        "x": mapped.x.tolist(),
+        "y": mapped.y.tolist(),
         "slices": [
             {
-                **picked(one, "name", "level"),
-                "values": [[finite(v) for v in row] for row in one.values.tolist()],
+                **picked(map_slice, "name", "level"),
+                "values": [[finite(v) for v in row] for row in map_slice.values.tolist()],
             }
-            for one in found.slices
+            for map_slice in mapped.slices
         ],
     }

@@ -50,8 +50,8 @@ class DesignDocument:
     @property
     def fingerprint(self) -> str:
         """What tells this design from others, and from itself after a change."""
-        said = f"{self.path}\0{self.variant}\0{self.text}"
-        return hashlib.blake2b(said.encode("utf-8", "surrogatepass"), digest_size=12).hexdigest()
+        state = f"{self.path}\0{self.variant}\0{self.text}"
+        return hashlib.blake2b(state.encode("utf-8", "surrogatepass"), digest_size=12).hexdigest()
 
     @property
     def is_saved(self) -> bool:
@@ -77,11 +77,11 @@ def experiment_of(document: DesignDocument, planning: bool = False) -> Experimen
 
     :raises ExperimentError: the text is wrong, or has no such variant.
     """
-    found = load(document.path, planning, document.trust, document.text)
-    for one in found:
-        if one.name == document.variant or len(found) == 1:
-            return one
-    names = ", ".join(str(one.name) for one in found)
+    experiments = load(document.path, planning, document.trust, document.text)
+    for experiment in experiments:
+        if experiment.name == document.variant or len(experiments) == 1:
+            return experiment
+    names = ", ".join(str(experiment.name) for experiment in experiments)
     raise refused(document.path, f"choose one of the variants: {names}", "variants")
 
 
@@ -96,10 +96,10 @@ def data_of(document: DesignDocument) -> Any:
 def variants_of(document: DesignDocument) -> tuple[str, ...]:
     """The names of the variants that the text has, none where it is wrong."""
     try:
-        found = load(document.path, True, document.trust, document.text)
+        experiments = load(document.path, True, document.trust, document.text)
     except ExperimentError:
         return ()
-    return tuple(one.name for one in found if one.name is not None)
+    return tuple(experiment.name for experiment in experiments if experiment.name is not None)
 
 
 def changed(document: DesignDocument, text: str) -> DesignDocument:
@@ -139,12 +139,12 @@ def ensure_as_read(document: DesignDocument) -> None:
     :raises ChangedOnDiskError: the file holds something else than what was read or written last.
     """
     try:
-        found: bytes | None = document.path.read_bytes()
+        content: bytes | None = document.path.read_bytes()
     except FileNotFoundError:
-        found = None
-    if found != document.content:
+        content = None
+    if content != document.content:
         name = document.path.name
-        how = "has been removed" if found is None else "has changed"
+        how = "has been removed" if content is None else "has changed"
         raise ChangedOnDiskError(
             f"{name} {how} on disk since it was opened here; nothing was written: save under"
             " another name, or open the file again"
@@ -153,8 +153,8 @@ def ensure_as_read(document: DesignDocument) -> None:
 
 def reopened(document: DesignDocument) -> DesignDocument:
     """The document as it is on disk now, with the present text a step back."""
-    found = opened(document.path, document.variant, document.trust)
-    return replace(changed(document, found.text), content=found.content)
+    reopened_document = opened(document.path, document.variant, document.trust)
+    return replace(changed(document, reopened_document.text), content=reopened_document.content)
 
 
 def saved(document: DesignDocument, path: Path | None = None) -> DesignDocument:

@@ -51,8 +51,8 @@ def _monte_carlo(document: DesignDocument, settings: Mapping[str, Any], report: 
     from ballplate.results import predict
 
     experiment = experiment_of(document)
-    found = trials(experiment, int(settings.get("trials", TRIALS)), report=report)
-    return {"lines": replace(predict(experiment), monte_carlo=found).lines()}
+    result = trials(experiment, int(settings.get("trials", TRIALS)), report=report)
+    return {"lines": replace(predict(experiment), monte_carlo=result).lines()}
 
 
 def _plan(document: DesignDocument, settings: Mapping[str, Any], report: Report) -> Any:
@@ -84,16 +84,16 @@ def _fit(document: DesignDocument, settings: Mapping[str, Any], report: Report) 
         file = Path(folder) / (Path(str(settings["name"])).name or "readings.csv")
         file.write_bytes(base64.b64decode(str(settings["content"])))
         observed = read_readings([file], lay_out(experiment), settings=experiment.readings)
-    found = fit(experiment, observed)
-    data: dict[str, Any] = {"lines": found.lines(), "notes": list(found.notes)}
-    if found.converged:
-        design = found.design
+    result = fit(experiment, observed)
+    data: dict[str, Any] = {"lines": result.lines(), "notes": list(result.notes)}
+    if result.converged:
+        design = result.design
         readings, residuals, standardised = reading_residuals(
-            design, found.solution, found.observed.x
+            design, result.solution, result.observed.x
         )
         data["residuals"] = {
             "position": [design.positions.names[k] for k in readings.position],
-            "place": found.observed.x[design.plate_readings].tolist(),
+            "place": result.observed.x[design.plate_readings].tolist(),
             "value": residuals.tolist(),
             "standardised": np.abs(standardised).max(axis=1).tolist(),
         }
@@ -136,13 +136,13 @@ class Job:
         """Take what the process has told since."""
         try:
             while self.state == "running" and self.connection.poll():
-                kind, said = self.connection.recv()
+                kind, message = self.connection.recv()
                 if kind == "step":
-                    self.step = said
+                    self.step = message
                 elif kind == "page":
-                    self.page = said
+                    self.page = message
                 else:
-                    self.state, self.result = kind, said
+                    self.state, self.result = kind, message
         except (EOFError, OSError):
             self.state, self.result = "failed", "the computation ended without a result"
 

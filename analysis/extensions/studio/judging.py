@@ -33,10 +33,10 @@ def judgement(document: DesignDocument) -> DesignJudgement:
     variants = variants_of(document) if document.variant else ()
     try:
         experiment = experiment_of(document)
-        found = answer(experiment)
+        data = answer(experiment)
     except ExperimentError as error:
         return DesignJudgement(None, error.messages, data_of(document), variants)
-    return DesignJudgement(found, (), to_python(experiment.tree), variants)
+    return DesignJudgement(data, (), to_python(experiment.tree), variants)
 
 
 def figures(document: DesignDocument) -> dict[str, Any]:
@@ -86,16 +86,16 @@ class Judge:
         if not self.is_busy or self._connection is None or not self._connection.poll():
             return None
         try:
-            found = self._connection.recv()
+            received = self._connection.recv()
         except (EOFError, OSError):
             self.stop()
-            found = "the computation ended without a result"
+            received = "the computation ended without a result"
         self.is_busy = False
-        if isinstance(found, ExperimentError):
-            raise found
-        if isinstance(found, str):
-            raise refused(self._document.path, f"no figures: {found}")
-        return found[0]
+        if isinstance(received, ExperimentError):
+            raise received
+        if isinstance(received, str):
+            raise refused(self._document.path, f"no figures: {received}")
+        return received[0]
 
     def stop(self) -> None:
         """Stop what is under way."""
@@ -112,11 +112,11 @@ class Judge:
         context: Any = multiprocessing.get_context("forkserver" if can_fork else "spawn")
         if can_fork:
             context.set_forkserver_preload(["__main__", f"{__package__}.prepared"])
-        self._connection, other = context.Pipe()
-        self._process = context.Process(target=_serve, args=(other,), daemon=True)
+        self._connection, child_end = context.Pipe()
+        self._process = context.Process(target=_serve, args=(child_end,), daemon=True)
         with interruptions_blocked():
             self._process.start()
-        other.close()
+        child_end.close()
 
 
 def _serve(connection: Connection) -> None:
@@ -125,12 +125,12 @@ def _serve(connection: Connection) -> None:
     with suppress(EOFError, OSError):
         while True:
             work, document = connection.recv()
-            found: Any
+            outcome: Any
             try:
-                found = (work(document),)
+                outcome = (work(document),)
             except ExperimentError as error:
-                found = error
+                outcome = error
             except Exception as error:
                 # Whatever it is, a person who waits is told of it.
-                found = f"{type(error).__name__}: {error}"
-            connection.send(found)
+                outcome = f"{type(error).__name__}: {error}"
+            connection.send(outcome)

@@ -35,9 +35,9 @@ def keep(document: DesignDocument, owner: str) -> Path | None:
         give_up(document, owner)
         return None
     try:
-        own = kept_in(document.path, owner)
-        is_free = not own.exists() and _owner(kept_in(document.path)) in (None, owner)
-        path = kept_in(document.path) if is_free else own
+        own_file = kept_in(document.path, owner)
+        is_free = not own_file.exists() and _owner(kept_in(document.path)) in (None, owner)
+        path = kept_in(document.path) if is_free else own_file
         _write(path, document, owner)
     except OSError:
         return None
@@ -59,19 +59,20 @@ def recovered(document: DesignDocument, owner: str) -> tuple[DesignDocument, str
     Where the file has changed since, saving is refused as if it had changed under the studio. A
     text with other models in Python than the file's is set aside, since nobody has opened it.
     """
-    found, note = _recovered(document, owner)
-    others = [one.name for one in _set_aside(document.path) if one.name not in note]
-    if others:
-        more = f"changes that were not saved are in {', '.join(others)}: look at them, and delete"
-        note = f"{note}; {more} them" if note else f"{more} them"
-    return found, note
+    document_found, note = _recovered(document, owner)
+    names_set_aside = [file.name for file in _set_aside(document.path) if file.name not in note]
+    if names_set_aside:
+        listed = ", ".join(names_set_aside)
+        more = f"changes that were not saved are in {listed}: look at them, and delete them"
+        note = f"{note}; {more}" if note else more
+    return document_found, note
 
 
 def _recovered(document: DesignDocument, owner: str) -> tuple[DesignDocument, str]:
     path = kept_in(document.path)
     try:
-        said = json.loads(path.read_bytes())
-        text, coded = str(said["text"]), said["content"]
+        saved = json.loads(path.read_bytes())
+        text, coded = str(saved["text"]), saved["content"]
         content = None if coded is None else base64.b64decode(coded, validate=True)
     except FileNotFoundError:
         return document, ""
@@ -82,23 +83,23 @@ def _recovered(document: DesignDocument, owner: str) -> tuple[DesignDocument, st
         with suppress(OSError):
             path.unlink()
         return document, ""
-    given, code = _code(document.text, document.path) or [], _code(text, document.path)
+    code_before, code = _code(document.text, document.path) or [], _code(text, document.path)
     if code is None:
-        is_known = not given and "python" not in text
+        is_known = not code_before and "python" not in text
     else:
-        is_known = all(one in given for one in code)
+        is_known = all(code_object in code_before for code_object in code)
     if not is_known:
         return document, (
             f"changes that were not saved are in {_put_aside(path).name} and not taken up: they"
             " have an error model in Python that the file has not; look at them, and delete them"
         )
     # What nobody has read must not come to run by a change of something else, either.
-    trust = document.trust if given else UNKNOWN
-    found = replace(changed(document, text), content=content, trust=trust)
+    trust = document.trust if code_before else UNKNOWN
+    recovered_document = replace(changed(document, text), content=content, trust=trust)
     with suppress(OSError):
-        _write(path, found, owner)
+        _write(path, recovered_document, owner)
     since = "" if content == document.content else "; the file has changed since"
-    return found, (
+    return recovered_document, (
         "changes that were not saved in an earlier session are here again; undo leads to the file"
         f" as it is{since}"
     )
@@ -110,12 +111,12 @@ def _write(path: Path, document: DesignDocument, owner: str) -> None:
     :raises OSError: it cannot be written.
     """
     content = document.content
-    said = {
+    saved = {
         "owner": owner,
         "content": None if content is None else base64.b64encode(content).decode(),
         "text": document.text,
     }
-    whole = json.dumps(said).encode()
+    whole = json.dumps(saved).encode()
     if not path.exists() or path.read_bytes() != whole:
 
         def write(place: Path) -> None:
@@ -148,7 +149,7 @@ def _set_aside(path: Path) -> list[Path]:
     """What is kept of a file under other names."""
     start = f"{kept_in(path).name}-"
     try:
-        return sorted(one for one in path.parent.iterdir() if one.name.startswith(start))
+        return sorted(file for file in path.parent.iterdir() if file.name.startswith(start))
     except OSError:
         return []
 
@@ -161,9 +162,9 @@ def _code(text: str, file: Path) -> list[object] | None:
         root, variants, _ = trees_of(text, file, [])
     except ExperimentError:
         return None
-    found: list[object] = []
+    objects: list[object] = []
     for tree in (root, *variants.values()):
         if runs_code(tree, file.parent):
             kinds = (to_python(node) for _, node in walk(tree) if isinstance(node, Mapping))
-            found += [one for one in kinds if one.get("kind") in ("python", "map")]
-    return found
+            objects += [kind for kind in kinds if kind.get("kind") in ("python", "map")]
+    return objects

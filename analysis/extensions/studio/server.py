@@ -108,10 +108,10 @@ class Guard:
             return "another page may not use the studio\n"
         if headers.get("sec-fetch-site", "same-origin") not in ("same-origin", "none"):
             return "another page may not use the studio\n"
-        given = request.cookies.get(self.cookie, "")
+        token = request.cookies.get(self.cookie, "")
         if request.url.path == "/" and "token" in request.query_params:
-            given = request.query_params["token"]
-        if not hmac.compare_digest(given.encode(), self.token.encode()):
+            token = request.query_params["token"]
+        if not hmac.compare_digest(token.encode(), self.token.encode()):
             return "open the address that the command has printed, with its token\n"
         return None
 
@@ -172,7 +172,8 @@ def _answering(
             return _json(await run_in_threadpool(work, request, body))
         except ExperimentError as error:
             text = "; ".join(
-                f"{one.path}: {one.text}" if one.path else one.text for one in error.messages
+                f"{message.path}: {message.text}" if message.path else message.text
+                for message in error.messages
             )
             return _error(text)
         except KeyError as error:

@@ -89,7 +89,7 @@ class Session:
         with self._lock:
             document, answer, judged = self._document, self._answer, self._judgement
             pending = self._judge.is_busy
-            there = {one["name"] for one in answer["scene"]["positions"]} if answer else set()
+            there = {file["name"] for file in answer["scene"]["positions"]} if answer else set()
             return {
                 "session": self.name,
                 "revision": self.revision,
@@ -102,12 +102,12 @@ class Session:
                 "saved": document.is_saved,
                 "back": len(document.back),
                 "forward": len(document.forward),
-                "messages": [] if pending else [_message_data(one) for one in judged.messages],
+                "messages": [] if pending else [_message_data(file) for file in judged.messages],
                 "pending": pending,
                 "design": answer,
                 "off": [name for name in self._off if name not in there],
                 "kept": self._kept,
-                "files": [one.name for one in self._files()],
+                "files": [file.name for file in self._files()],
                 "jobs": list(JOBS),
                 "recoverable": self.is_recoverable,
                 "note": self.note,
@@ -158,8 +158,8 @@ class Session:
         with self._lock:
             self._ensure_seen(action)
             document = self._document
-        found: dict[str, Any] = self._computed(figures, done(document, action))
-        return found
+        data: dict[str, Any] = self._computed(figures, done(document, action))
+        return data
 
     def scale(self) -> dict[str, Any]:
         """What carries the scale of the design, in words, and which design that is.
@@ -278,15 +278,15 @@ class Session:
     def _look(self) -> None:
         """Take the judgement if there is one now."""
         try:
-            found = self._judge.look()
+            result = self._judge.look()
         except ExperimentError as error:
             self._judgement = replace(
                 self._judgement, messages=error.messages, data=data_of(self._document)
             )
             return
-        if found is not None:
-            self._judgement = found
-            self._answer = found.answer or self._answer
+        if result is not None:
+            self._judgement = result
+            self._answer = result.answer or self._answer
 
     def _computed(self, work: Callable[[DesignDocument], Any], document: DesignDocument) -> Any:
         """What comes of work on a document that is not judged; further such work stops it.
@@ -301,9 +301,9 @@ class Session:
             with self._lock:
                 if self._asked != number:
                     raise RefusedError("something else was asked for meanwhile")
-                found = self._aside.look()
-                if found is not None:
-                    return found
+                result = self._aside.look()
+                if result is not None:
+                    return result
             time.sleep(INTERVAL)
 
     def _choose(self, action: Mapping[str, Any]) -> None:
@@ -381,9 +381,11 @@ class Session:
     def _files(self) -> list[Path]:
         try:
             return sorted(
-                one
-                for one in self._first.parent.iterdir()
-                if one.suffix.lower() in ENDINGS and not one.name.startswith(".") and one.is_file()
+                file
+                for file in self._first.parent.iterdir()
+                if file.suffix.lower() in ENDINGS
+                and not file.name.startswith(".")
+                and file.is_file()
             )
         except OSError:
             # The folder is gone, or may not be read any more.

@@ -32,10 +32,10 @@ def add_options(parser: ArgumentParser) -> None:
 
 
 def _port(text: str) -> int:
-    found = whole(text)
-    if not found < 2**16:
-        raise ArgumentTypeError(f"a port is at most 65535, not {found}")
-    return found
+    port = whole(text)
+    if not port < 2**16:
+        raise ArgumentTypeError(f"a port is at most 65535, not {port}")
+    return port
 
 
 def unsaved(session: Session) -> str:
@@ -44,13 +44,16 @@ def unsaved(session: Session) -> str:
 
     if session.is_saved:
         return "nothing is left to be saved"
-    kept = session.kept()
-    if kept == kept_in(session.path):
+    unsaved_files = session.kept()
+    if unsaved_files == kept_in(session.path):
         return (
-            f"changes are not saved, and are in {kept.name}: the same command takes them up again"
+            f"changes are not saved, and are in {unsaved_files.name}:"
+            " the same command takes them up again"
         )
-    if kept is not None:
-        return f"changes are not saved, and are in {kept.name}: another studio has the file"
+    if unsaved_files is not None:
+        return (
+            f"changes are not saved, and are in {unsaved_files.name}: another studio has the file"
+        )
     return "changes are not saved, and could not be kept in the folder of the file"
 
 

@@ -33,15 +33,15 @@ def suggested_repairs(
     :raises ExperimentError: the text is wrong.
     """
     experiment = experiment_of(document, planning=True)
-    found = repairs(experiment, report=report)
-    told = () if found is None else found.complete
-    return [_repair_data(experiment, one) for one in told]
+    repairs_found = repairs(experiment, report=report)
+    complete = () if repairs_found is None else repairs_found.complete
+    return [_repair_data(experiment, repair) for repair in complete]
 
 
 def _repair_data(experiment: Experiment, repair: Repair) -> dict[str, Any]:
     after = apply_all(repair.changes, experiment)
-    before = {one.name: one for one in experiment.positions}
-    places = [one for one in after.positions if before.get(one.name) is not one]
+    before = {position.name: position for position in experiment.positions}
+    places = [position for position in after.positions if before.get(position.name) is not position]
     lengths = None if repair.prediction is None else repair.prediction.lengths
     return {
         "words": changes_in_words(repair) + caveat(repair),
@@ -49,15 +49,15 @@ def _repair_data(experiment: Experiment, repair: Repair) -> dict[str, Any]:
         "weak": repair.weak,
         "average": None if lengths is None else lengths.average,
         "maximum": None if lengths is None else lengths.maximum,
-        "places": [place_data(after, one) for one in places],
-        "edits": [_edit_data(one) for one in (*repair.edits, *_expectation(experiment))],
+        "places": [place_data(after, position) for position in places],
+        "edits": [_edit_data(position) for position in (*repair.edits, *_expectation(experiment))],
     }
 
 
 def _expectation(experiment: Experiment) -> tuple[Edit, ...]:
     """That nothing is undetermined any more, where the file expects otherwise."""
-    stated = experiment.expected_rank_deficiency
-    return (Edit(("expected_rank_deficiency",), 0),) if stated else ()
+    expected_deficiency = experiment.expected_rank_deficiency
+    return (Edit(("expected_rank_deficiency",), 0),) if expected_deficiency else ()
 
 
 def _edit_data(edit: Edit) -> dict[str, Any]:
@@ -73,11 +73,11 @@ def next_positions(document: DesignDocument, report: Report = unreported) -> lis
     """
     experiment = experiment_of(document, planning=True)
     changes = [
-        one
+        candidate
         for kind in (ChangeKind.POOL, ChangeKind.ADD_POSITION)
-        for one in _offered(experiment, kind)
+        for candidate in _offered(experiment, kind)
     ]
-    found = []
+    candidates = []
     for change in counted(changes, "positions", len(changes), report):
         assert isinstance(change.adds, Position)
         try:
@@ -89,8 +89,8 @@ def next_positions(document: DesignDocument, report: Report = unreported) -> lis
             continue
         undetermined = lengths.average != lengths.average
         order = (planned.deficiency, undetermined, lengths.average if not undetermined else 0.0)
-        found.append((order, change, lengths))
-    found.sort(key=lambda one: one[0])
+        candidates.append((order, change, lengths))
+    candidates.sort(key=lambda candidate: candidate[0])
     return [
         {
             "words": change.words,
@@ -100,7 +100,7 @@ def next_positions(document: DesignDocument, report: Report = unreported) -> lis
             "place": place_data(experiment, change.adds),
             "settings": position_settings(experiment, change.adds),
         }
-        for order, change, lengths in found[:MOST_TOLD]
+        for order, change, lengths in candidates[:MOST_TOLD]
         if isinstance(change.adds, Position)
     ]
 

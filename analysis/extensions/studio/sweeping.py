@@ -51,7 +51,7 @@ class _Axis:
         return " ".join(self.paths)
 
 
-def swept(document: DesignDocument, said: Any, report: Report) -> dict[str, Any]:
+def swept(document: DesignDocument, axis_data: Any, report: Report) -> dict[str, Any]:
     """Compute a sweep over axes, each with `paths` and `values`: what is told of each cell, and
     the `page`, empty where what it needs is not installed.
 
@@ -59,27 +59,27 @@ def swept(document: DesignDocument, said: Any, report: Report) -> dict[str, Any]
     :raises ExperimentError: the text is wrong, a path leads nowhere, or a value would run a model
         in Python in a design that the user has not opened by name.
     """
-    axes = _axes(said)
+    axes = _axes(axis_data)
     tree = experiment_of(document).tree
     with tempfile.TemporaryDirectory() as folder:
         file = _written(document, tree, axes, Path(folder))
         with writable_store(file.with_suffix(".sqlite")) as store:
-            found = _computed(file, store, document.trust, report)
+            result = _computed(file, store, document.trust, report)
             page = _page(store, document.trust.modules)
     return {
-        "headline": found.headline(),
+        "headline": result.headline(),
         "axes": [list(axis.paths) for axis in axes],
         "cells": [
             _cell(row, values, f"{file.name}:")
             for row, values in zip(
-                found.rows(), product(*(one.values for one in axes)), strict=True
+                result.rows(), product(*(sweep_axis.values for sweep_axis in axes)), strict=True
             )
         ],
         "page": page,
     }
 
 
-def ensure_possible(document: DesignDocument, said: Any) -> None:
+def ensure_possible(document: DesignDocument, axis_data: Any) -> None:
     """Make sure that a sweep over axes may begin, and numbers may stand where there are texts.
 
     :raises ActionError: an axis is incomplete, there are too many cells, or a number lacks its
@@ -87,8 +87,8 @@ def ensure_possible(document: DesignDocument, said: Any) -> None:
     :raises ExperimentError: the text is wrong.
     """
     experiment = experiment_of(document)
-    for axis in _axes(said):
-        numbers = (one for one in map(value_of, axis.values) if type(one) in (int, float))
+    for axis in _axes(axis_data):
+        numbers = (value for value in map(value_of, axis.values) if type(value) in (int, float))
         number = next(numbers, None)
         for path in axis.paths:
             present = node_at(experiment.tree, path)
@@ -101,11 +101,13 @@ def ensure_possible(document: DesignDocument, said: Any) -> None:
                     raise ActionError(f"{path}: {error.messages[0].text}") from None
 
 
-def _axes(said: Any) -> list[_Axis]:
-    if not isinstance(said, list) or not all(isinstance(one, Mapping) for one in said):
+def _axes(axes_data: Any) -> list[_Axis]:
+    if not isinstance(axes_data, list) or not all(
+        isinstance(axis_entry, Mapping) for axis_entry in axes_data
+    ):
         raise ActionError("a sweep needs a list of axes, each with its paths and values")
-    axes = [_axis(one) for one in said]
-    cells = math.prod(len(one.values) for one in axes)
+    axes = [_axis(axis_entry) for axis_entry in axes_data]
+    cells = math.prod(len(axis_entry.values) for axis_entry in axes)
     if not axes or cells > MOST_CELLS:
         some = f"{cells} combinations; at most {MOST_CELLS} are possible here"
         raise ActionError(some if axes else "a sweep needs a key")
@@ -121,7 +123,7 @@ def _computed(file: Path, store: Store, trust: Trust, report: Report) -> SweepRe
         sweep = load_sweep(file, trust=trust)
     except ExperimentError as error:
         # Nobody has seen the file; its words begin with the axis' key.
-        raise ActionError("; ".join(one.text for one in error.messages)) from None
+        raise ActionError("; ".join(message.text for message in error.messages)) from None
     bundle = bundle_of(sweep)
     entered = enter(store, sweep, bundle, beside=False)
     runner = nullcontext(local_runner(sweep, bundle, workers=1))
@@ -154,11 +156,13 @@ def _cell(row: Mapping[str, Any], values: Sequence[str], file: str) -> dict[str,
     }
 
 
-def _axis(said: Mapping[str, Any]) -> _Axis:
-    lists = [said.get(key) for key in ("paths", "values")]
-    if not all(isinstance(one, list) for one in lists):
+def _axis(axis_data: Mapping[str, Any]) -> _Axis:
+    lists = [axis_data.get(key) for key in ("paths", "values")]
+    if not all(isinstance(value_list, list) for value_list in lists):
         raise ActionError("an axis needs its paths and values, each a list")
-    paths, values = (tuple(str(one).strip() for one in some) for some in lists if some is not None)
+    paths, values = (
+        tuple(str(value_list).strip() for value_list in some) for some in lists if some is not None
+    )
     if not all(paths) or not paths or not values:
         raise ActionError("an axis needs a key and its values")
     return _Axis(paths, values)
@@ -189,8 +193,11 @@ def _written(document: DesignDocument, tree: Node, axes: Sequence[_Axis], folder
         lines.append(f"variant: {flow(document.variant)}")
     lines.append("axes:")
     for axis in axes:
-        said = {"paths": list(axis.paths), "values": [value_of(one) for one in axis.values]}
-        lines.append(f"  {flow(axis.name)}: {flow(said)}")
+        data = {
+            "paths": list(axis.paths),
+            "values": [value_of(axis_value) for axis_value in axis.values],
+        }
+        lines.append(f"  {flow(axis.name)}: {flow(data)}")
     file = design.with_name(".ballplate-sweep.yaml")
     file.write_text("\n".join(lines) + "\n", encoding="utf-8")
     return file
