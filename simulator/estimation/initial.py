@@ -42,32 +42,26 @@ def initial_state(design: Design, x: Array) -> State:
     d = design.dimension
     balls = design.balls.places.copy()
     rotations, origins = design.positions.rotations.copy(), design.positions.origins.copy()
-    mean_locations = _mean_locations(design, x)
+    means = _mean_locations(design, x)
     for artefact in design.artefacts.plates:
         members = design.balls.of(artefact)
         places = [int(k) for k in np.flatnonzero(design.positions.artefact == artefact)]
         if len(members) == 1:
             # A single ball has a place in each position and no turn.
             arm = np.einsum("kij,j->ki", rotations[places], balls[members[0]])
-            there = mean_locations[places, members[0]]
+            there = means[places, members[0]]
             origins[places] = np.where(np.isnan(there), origins[places], there - arm)
-            held_positions = [k for k in places if design.positions.held[k, :d].all()]
-            if held_positions:
-                origins[held_positions] = design.positions.origins[held_positions]
-                first = rotations[held_positions[0]].T @ (
-                    mean_locations[held_positions[0], members[0]] - origins[held_positions[0]]
-                )
+            fixed = [k for k in places if design.positions.held[k, :d].all()]
+            if fixed:
+                origins[fixed] = design.positions.origins[fixed]
+                first = rotations[fixed[0]].T @ (means[fixed[0], members[0]] - origins[fixed[0]])
                 balls[members[0]] = np.where(np.isnan(first), balls[members[0]], first)
             continue
-        shape, poses = _assemble(
-            mean_locations[places][:, members], design.balls.places[members], d
-        )
+        shape, poses = _assemble(means[places][:, members], design.balls.places[members], d)
         turn, shift = _into_frame(design, shape, poses, places, members)
         if (
             _strength(
-                mean_locations[places[0], members][
-                    ~np.isnan(mean_locations[places[0], members, 0])
-                ],
+                means[places[0], members][~np.isnan(means[places[0], members, 0])],
                 d,
             )
             > 0.0
@@ -82,9 +76,7 @@ def initial_state(design: Design, x: Array) -> State:
     if design.positions.across is not None:
         for k, across in enumerate(design.positions.across.tolist()):
             if across >= 0:
-                rotations[k], there = _in_plane(
-                    design, k, across, mean_locations[k], balls, origins[k]
-                )
+                rotations[k], there = _in_plane(design, k, across, means[k], balls, origins[k])
                 is_held = design.positions.held[k, :d]
                 origins[k] = np.where(is_held, design.positions.origins[k], there)
     readings = design.readings
@@ -186,12 +178,12 @@ def _into_frame(
     members: Integers,
 ) -> tuple[Array, Array]:
     """Motion that takes the assembled shape into the artefact's own frame."""
-    held_positions = [k for k in places if design.positions.held[k].all()]
-    if held_positions:
-        rotation, origin = poses[places.index(held_positions[0])]
-        turn = design.positions.rotations[held_positions[0]].T @ rotation
-        return turn, design.positions.rotations[held_positions[0]].T @ (
-            origin - design.positions.origins[held_positions[0]]
+    fixed = [k for k in places if design.positions.held[k].all()]
+    if fixed:
+        rotation, origin = poses[places.index(fixed[0])]
+        turn = design.positions.rotations[fixed[0]].T @ rotation
+        return turn, design.positions.rotations[fixed[0]].T @ (
+            origin - design.positions.origins[fixed[0]]
         )
     target, certified, _ = _certified(design, members)
     is_known = ~np.isnan(shape[:, 0])
