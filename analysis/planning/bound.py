@@ -93,10 +93,10 @@ class _Tangent:
 def bound(
     problem: SelectionProblem, start: Collection[int] | None = None, steps: int = MOST_STEPS
 ) -> Bound | None:
-    """Bound of all selections within the limits.
+    """Return a lower bound of the criterion over all selections within the limits.
 
-    None where the criterion has no relaxation, or no mixture of selections determines what it is
-    about. `start` is a selection to begin with, a good one saves steps.
+    The bound is missing if the criterion has no relaxation, or if no mixture of selections
+    determines its functions. A good selection as `start` saves steps.
     """
     if not problem.criterion.is_bounded:
         return None
@@ -147,7 +147,7 @@ class _Mixture:
 
 
 def _first(problem: SelectionProblem, start: Collection[int] | None) -> _Mixture | None:
-    """A mixture of vertices that leaves nothing undetermined; None where none is found."""
+    """Return a mixture of vertices that determines every function, if the search finds one."""
     n = problem.constraints.count
     limits = problem.limits.linear()
     generator = np.random.default_rng(np.random.SeedSequence(0))
@@ -168,7 +168,7 @@ def _first(problem: SelectionProblem, start: Collection[int] | None) -> _Mixture
 
 
 def _tangent(problem: SelectionProblem, weights: Array, power: float) -> _Tangent | None:
-    """Tangent at some weights (n,); None where they leave something undetermined."""
+    """Return the tangent at weights (n,), if these determine every function."""
     information = problem.information
     root = full_root(information.weighted(weights))
     if root is None:
@@ -222,8 +222,8 @@ def _improved(problem: SelectionProblem, mixture: _Mixture, power: float) -> _Mi
 
 
 def _largest(limits: Limits, slope: Array, count: int) -> Array | None:
-    """The weights (count,) within the limits for which slope (count,) . weights is largest; None if
-    there are none.
+    """Return the weights (count,) within the limits that maximise slope (count,) . weights, if any
+    exist.
     """
     from scipy.optimize import linprog
 

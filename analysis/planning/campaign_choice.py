@@ -1,4 +1,4 @@
-"""Plan of a campaign: the choice from a pool, its distance from the bound, and the gain of each
+"""Plan of a campaign: selection from a pool, its distance from the bound, and the value of each
 candidate.
 """
 
@@ -62,8 +62,10 @@ CURVE_POINTS = 8
 
 @dataclass(frozen=True)
 class Request:
-    """What is asked of a plan; `curve` asks for smaller and larger budgets as well, and an `order`,
-    or sizes of a `drift`, for what a drift does in each order.
+    """Request for a plan.
+
+    `curve` adds smaller and larger limits of time; `order` and the sizes of a `drift` add the
+    effect of drift in each order.
     """
 
     criterion: CriterionName = "U6"
@@ -84,17 +86,15 @@ def campaign(
 ) -> Campaign:
     """Choose from the pool of an experiment.
 
-    `offered` is what may be chosen where some of it has been read already: that is kept and costs
-    nothing more, unless it is of a plate that was only begun and is worth less to go on with than
-    to leave out. `earlier` are the indices of an earlier choice, which the plan is compared with
-    and never worse than within the same budget; without it that is the experiment's own positions.
-    Without a budget the choice may cost what these do, less what is done. The result does not
-    depend on the number of `workers`; `report` is told which step is being done, and how much of it
-    is.
+    `offered` holds the candidates after earlier readings. These readings are kept at no further
+    cost, except on a plate that was only begun and is cheaper to leave out than to complete.
+    `earlier` are the indices of an earlier choice (by default the experiment's own positions);
+    within the same limit the plan is never worse. Without a limit the choice may cost as much as
+    these, less completed readings. The result does not depend on the number of `workers`; `report`
+    receives each step and its progress.
 
-    :raises ExperimentError: there is no pool or nothing to choose, or what has to be chosen breaks
-        the limits.
-    :raises InternalError: the choice is better than the bound of any choice.
+    :raises ExperimentError: there is no pool or no candidate, or required candidates break the
+        limits. :raises InternalError: the choice is better than the bound.
     """
     pool = experiment.pool
     if pool is None:
@@ -257,8 +257,8 @@ def _orders(
     offered: Offer,
     chosen: Sequence[Candidate],
 ) -> DriftInOrders | None:
-    """The order to read in, and what a drift does in each, where that is asked or a drift is
-    stated; None where nothing drifts, or nobody can tell.
+    """Return the reading order and the effect of drift in each order, if the request or the file
+    states a drift and its effect can be computed.
     """
     if request.order or request.drift:
         orders = service("DriftOrders")
@@ -277,9 +277,7 @@ def _impossible(experiment: Experiment, path: str, text: str) -> ExperimentError
 
 
 def _limits(experiment: Experiment, pool: Pool, offered: Offer) -> list[AtMost]:
-    """Limits on what is offered, and that of several certificates of the same length only one
-    counts.
-    """
+    """Limits on the offer; of several certificates of one length, only one counts."""
     at_most = list(offered.at_most)
     for name, artefact in experiment.artefacts.items():
         plate_calibrations = tuple(
@@ -295,9 +293,7 @@ def _limits(experiment: Experiment, pool: Pool, offered: Offer) -> list[AtMost]:
 def _refuse_unusable(
     experiment: Experiment, chosen: Sequence[Candidate], limits: Constraints
 ) -> None:
-    """Refuse a choice that is no experiment: without a position, or with balls that nobody
-    reads.
-    """
+    """Refuse a choice without positions, or with calibrated balls that no position reads."""
     positions = [position.item for position in chosen if isinstance(position.item, Position)]
     if not positions:
         every = range(limits.count)
@@ -361,7 +357,9 @@ def _out_of_reach(
     text: str,
     or_else: str = "",
 ) -> ExperimentError:
-    """That none of some positions can be read: for the limits on choosing them, or the budget."""
+    """Reason why the limits exclude every one of some positions: limits on the choice, or of
+    time.
+    """
     if limits.forbids(members):
         why = "as limits allow none of them; change at_most or never_together"
         return _impossible(experiment, "pool.limits", f"{text}, {why}{or_else}")
@@ -475,9 +473,7 @@ def _best_of_all(problem: SelectionProblem, report: Report) -> Found:
 
 
 def _is_just_enough(problem: SelectionProblem, best: Found) -> bool:
-    """Whether a selection leaves something undetermined without one or another of its
-    candidates.
-    """
+    """True if some candidate of the selection cannot be removed without a rank deficiency."""
     chosen = frozenset(best.chosen)
     return any(
         not np.isfinite(value(problem, chosen - {k})) for k in chosen - problem.constraints.must
@@ -501,8 +497,8 @@ def _task(
 def _gains(
     problem: SelectionProblem, best: Found, candidates: Sequence[Candidate], report: Report
 ) -> tuple[Gain, ...]:
-    """What each chosen candidate gains, those first that gain most, whether it has to be chosen or
-    not.
+    """Return the effect of each chosen candidate on the criterion, largest first, required ones
+    included.
     """
     free = replace(problem, constraints=replace(problem.constraints, at_least=()))
     new = [k for k in best.chosen if k not in problem.constraints.done]
@@ -516,7 +512,7 @@ def _gains(
 def _left_out(
     problem: SelectionProblem, best: Found, candidates: Sequence[Candidate]
 ) -> tuple[Gain, ...]:
-    """What candidates would gain on top of the selection, those first that would gain most."""
+    """Return the effect of each remaining candidate on the criterion, largest first."""
     ranked = ranked_additions(problem, best.chosen)
     return tuple(Gain(candidates[k], best.value, after) for k, after in ranked[:LEFT_OUT])
 
@@ -576,7 +572,7 @@ def _curve_point(problem: SelectionProblem, best: Found) -> tuple[Found, float] 
 
 
 def _budgets(problem: SelectionProblem) -> list[Budget]:
-    """Budgets from small to somewhat more than the one asked for."""
+    """Limits of time from small to somewhat above the requested one."""
     budget = problem.constraints.budget
     factors = np.linspace(0.25, 1.5, CURVE_POINTS)
     if budget.positions is not None and budget.seconds is None and budget.readings is None:

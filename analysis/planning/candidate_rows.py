@@ -1,9 +1,8 @@
-"""Whitened rows that candidates contribute to what all positions share: balls, machine errors,
+"""Whitened rows of candidates for the parameters that all positions share: balls, machine errors,
 offsets, lengths.
 
-The pose of a position belongs to it alone. Its columns are projected out of the position's rows, so
-that what is left concerns shared parameters only, and the information of several positions is the
-sum of theirs.
+A pose belongs to one position. Projecting its columns out of the position's rows leaves rows for
+shared parameters, so the information of several positions is the sum of theirs.
 """
 
 from __future__ import annotations
@@ -41,9 +40,9 @@ AT_ONCE = 10_000
 class CandidateRows:
     """Whitened rows of one candidate, columns in micrometres.
 
-    `by_ball` (m, k, d) are the derivatives by the `balls` (m, k) of each, none where k is 0;
-    `by_shared` (m, s) that by shared parameters; `by_pose` (m, q) that by the pose. With `frame`
-    they tell where balls are in the frame of their plate.
+    `by_ball` (m, k, d) are the derivatives by the `balls` (m, k) of each row (k may be 0),
+    `by_shared` (m, s) those by shared parameters, `by_pose` (m, q) those by the pose. With
+    `frame`, the rows fix balls in the frame of their plate.
     """
 
     balls: Integers
@@ -105,7 +104,7 @@ class PoolDesign:
 def draw(experiment: Experiment, positions: Sequence[Position]) -> PoolDesign:
     """Lay out an experiment with all `positions` that may be chosen, in their order.
 
-    :raises ExperimentError: a prior is about a pose; what it means depends on the position that
+    :raises ExperimentError: a prior concerns a pose; its meaning depends on the position that
         holds the frame.
     """
     messages = [
@@ -190,8 +189,8 @@ def position_rows(drawn: PoolDesign) -> Iterator[CandidateRows]:
 def _with_influences(
     drawn: PoolDesign, position: int, rows: CandidateRows, by_influence: Array
 ) -> CandidateRows:
-    """Rows of a position with its own influence quantities, which count with its pose, and what is
-    known of them.
+    """Add the position's own influence quantities, which are eliminated with its pose, and their
+    priors.
     """
     influences, uncertainty = drawn.influences_of(position)
     q, count = rows.by_pose.shape[1], len(influences)
@@ -239,8 +238,8 @@ def _of_shared(drawn: PoolDesign, shared: Array) -> CandidateRows:
 
 
 def always(drawn: PoolDesign) -> list[CandidateRows]:
-    """Rows of what is known in any case: calibrations and priors of the experiment, and errors of
-    certificates.
+    """Rows of information that every selection has: calibrations and priors of the experiment, and
+    errors of certificates.
     """
     unit = np.eye(drawn.shared)[drawn.shared - drawn.certificates :]
     return [*_of_observations(drawn, drawn.design.observations), _of_shared(drawn, unit)]

@@ -1,17 +1,16 @@
 """Order of positions with the least change-over of planes, artefacts and probes.
 
-Going on to another plane or artefact, here a place, takes `ChangeTimes.plane`; if the last probe of
-a position is not the first of the next, `ChangeTimes.probe` comes on top. The probes of a position
-are read one after the other in any order, and nothing is changed before the first position.
+A *place* is a plane of one artefact. Changing it takes `ChangeTimes.plane`; if the last probe of a
+position is not the first of the next, `ChangeTimes.probe` is added. The probes of a position are
+read in any order, and the first position needs no change.
 
-In one place, positions are edges of a graph of probes, from their first to their last probe, and a
-change of probe is an edge more: the fewest that make one route of all edges follow from the nodes
-of odd degree and the connected parts (Euler). Places in their turn are ordered by dynamic
-programming over sets (Held and Karp, J. SIAM 10 (1962) 196). That is exact for any number of
-positions where no place is worth coming back to: a second visit costs `plane` and saves two changes
-of probe at most. Where `plane` is shorter, sets of positions are gone through, up to
-`MOST_POSITIONS`; of more positions, as of more places than `MOST_PLACES`, the order is one that
-comes near, with a lower bound.
+Within a place, positions are edges of a graph of probes, from their first to their last probe, and
+a change of probe is a further edge: the fewest that complete one route follow from the nodes of
+odd degree and the connected components (Euler). Places are ordered by dynamic programming over
+sets (Held and Karp, J. SIAM 10 (1962) 196). This is exact for any number of positions unless
+returning to a place pays: a second visit costs `plane` and saves at most two changes of probe. If
+`plane` is shorter, sets of positions are enumerated up to `MOST_POSITIONS`; beyond, and beyond
+`MOST_PLACES`, the order is approximate, with a lower bound.
 """
 
 from __future__ import annotations
@@ -33,7 +32,7 @@ MOST_POSITIONS, MOST_PLACES, MOST_SETS = 12, 12, 500
 
 @dataclass(frozen=True)
 class Setup:
-    """What the change-over depends on."""
+    """Properties of a position that determine its change-over."""
 
     artefact: str
     plane: str
@@ -51,8 +50,8 @@ class Visit:
 
 @dataclass(frozen=True)
 class Order:
-    """The cheapest order of positions found, what it costs in `seconds`, the `bound` that no order
-    falls below, and the probe that is left from before, if any.
+    """The cheapest order found, its `seconds`, the lower `bound` of all orders, and an optional
+    probe left from an earlier position.
     """
 
     seconds: float
@@ -62,7 +61,7 @@ class Order:
 
 
 def kind_of(candidate: Candidate) -> Setup:
-    """The kind of a candidate that is a position.
+    """Return the change-over class of a candidate that is a position.
 
     :raises TypeError: it is an item of calibration.
     """
@@ -72,10 +71,10 @@ def kind_of(candidate: Candidate) -> Setup:
 
 
 def changeover(kinds: Collection[Setup], changes: ChangeTimes, first: Setup | None = None) -> float:
-    """Least total change-over, in seconds, of positions of these kinds; one listed twice stands for
-    two positions.
+    """Return the least total change-over, in seconds, of positions of these classes; an entry
+    listed twice is two positions.
 
-    A position of the kind `first` comes before all of them.
+    A position of class `first` precedes all others.
 
     >>> down, side = (Setup("plate", "z", frozenset({name})) for name in ("down", "side"))
     >>> changeover([down, side, down], ChangeTimes(probe=120.0, plane=1800.0))
@@ -94,16 +93,17 @@ def _least(kinds: frozenset[tuple[Setup, int]], changes: ChangeTimes, first: Set
 
 
 def _comes_back(changes: ChangeTimes) -> bool:
-    """Whether an order may come back to a place because that saves changes of probe."""
+    """True if returning to a place may save changes of probe."""
     return 0.0 < changes.plane <= 2.0 * changes.probe
 
 
 def _enough(probes: int, count: int, comes_back: bool) -> int:
-    """The number of positions of a kind that costs as much as `count`.
+    """Return the number of positions of a class beyond which the cost no longer depends on the
+    number.
 
-    Positions of one probe are read together. Of two probes, two positions in the same place lead
-    back to the first probe. Of more, so many can connect and pair all probes, and others lead back
-    or make a detour.
+    Positions of one probe are read together. Of two probes, two positions in one place return to
+    the first probe. Of more, a limited number connects and pairs all probes; others return or make
+    a detour.
     """
     if probes == 1:
         return 1
@@ -189,8 +189,8 @@ def _place(kind: Setup, changes: ChangeTimes) -> tuple[str, str]:
 
 @dataclass(frozen=True, eq=False)
 class _Task:
-    """Kinds of positions by place and by sets of probes, which are indices of `names`; what it
-    costs to `begin` with a probe, (probe,), and in a place, `entry` (place,).
+    """Classes of positions by place and by sets of probes (indices of `names`), with the cost to
+    `begin` with a probe (probe,) and of `entry` into a place (place,).
     """
 
     names: tuple[str, ...]
@@ -201,14 +201,14 @@ class _Task:
 
     @cached_property
     def contents(self) -> list[_Content]:
-        """What there is to read in each place."""
+        """Positions to read in each place."""
         return [
             tuple((some, len(kinds)) for some, kinds in member.items()) for member in self.members
         ]
 
     @cached_property
     def positions(self) -> list[tuple[int, tuple[int, ...]]]:
-        """Place and probes of each position, those of one probe that are read together once."""
+        """Place and probes of each position; those of one probe, read together, occur once."""
         return [
             (place, probes)
             for place, content in enumerate(self.contents)
@@ -218,7 +218,7 @@ class _Task:
 
     @cached_property
     def comes_back(self) -> bool:
-        """Whether an order that comes back to a place may be cheaper than all others."""
+        """True if an order that returns to a place may be the cheapest."""
         is_possible = len(self.contents) > 1 and _comes_back(self.changes)
         return is_possible and self.by_places > self.bound
 
@@ -228,12 +228,12 @@ class _Task:
 
     @property
     def is_exact(self) -> bool:
-        """Whether no order is cheaper than the best one found."""
+        """True if no order is cheaper than the best one found."""
         return self.is_small if self.comes_back else len(self.contents) <= MOST_PLACES
 
     @cached_property
     def bound(self) -> float:
-        """The seconds that no order falls below: of the changes of probe, all places are one."""
+        """Lower bound in seconds: for changes of probe, all places are one."""
         together: Counter[tuple[int, ...]] = Counter()
         for content in self.contents:
             together.update(dict(content))
@@ -244,7 +244,7 @@ class _Task:
 
     @property
     def seconds(self) -> float:
-        """What the best order costs."""
+        """Cost of the best order, in seconds."""
         if not self.contents:
             return 0.0
         is_single = self.comes_back and self.is_small
@@ -252,15 +252,15 @@ class _Task:
 
     @cached_property
     def within(self) -> list[Array]:
-        """By place what it costs from arriving with a probe to leaving with one, (probe, probe)."""
+        """Cost within each place by arriving and leaving probe, (probe, probe)."""
         size = len(self.names)
         every = [_probe_changes(content, size) for content in self.contents]
         return [np.asarray(self.changes.probe * changed, float) for changed in every]
 
     @cached_property
     def ahead(self) -> dict[int, Array]:
-        """By the set of places that are to come, as binary digits, the least cost after leaving
-        another place with each probe, where each place is visited once.
+        """Least remaining cost by the set of places to come (binary digits) after leaving another
+        place with each probe, if each place is visited once.
         """
         layer = costs = {0: np.zeros(len(self.names))}
         for _ in self.contents[1:]:
@@ -279,8 +279,8 @@ class _Task:
         return costs
 
     def next_place(self, remaining: int, begin: Array, entry: Array) -> tuple[float, int, int, int]:
-        """The least cost of the rest of the places, the next of them, and the probes with which it
-        is begun and left.
+        """Return the least cost of the remaining places, the next place, and its first and last
+        probes.
         """
         options = []
         for k, within in enumerate(self.within):
@@ -293,13 +293,13 @@ class _Task:
 
     @cached_property
     def by_places(self) -> float:
-        """The least cost where each place is visited once."""
+        """Least cost if each place is visited once."""
         return self.next_place((1 << len(self.contents)) - 1, self.begin, self.entry)[0]
 
     @cached_property
     def by_positions(self) -> tuple[Array, Array]:
-        """By the set of positions read: the least cost to end in a place with a probe, and to begin
-        there with what comes next, (sets, places x probes).
+        """Least cost by the set of positions read, to end in a place with a probe and begin there
+        with the next, (sets, places x probes).
         """
         size, count = len(self.names), len(self.positions)
         ended = np.full((1 << count, len(self.contents) * size), np.inf)
@@ -321,7 +321,7 @@ class _Task:
 
     @cached_property
     def between(self) -> Array:
-        """What it costs to go from a place and probe to others."""
+        """Cost from each place and probe to every other."""
         place, probe = np.divmod(np.arange(len(self.contents) * len(self.names)), len(self.names))
         return np.asarray(
             self.changes.plane * (place[:, None] != place)
@@ -343,7 +343,7 @@ class _Task:
                 yield Visit(kinds.pop(0), self.names[first], self.names[last])
 
     def followed(self) -> Iterator[_Step]:
-        """The best order that visits each place once."""
+        """Best order that visits each place once."""
         todo, begin, entry = (1 << len(self.contents)) - 1, self.begin, self.entry
         while todo:
             _, place, first, last = self.next_place(todo, begin, entry)
@@ -377,8 +377,8 @@ class _Task:
 def _route(
     content: _Content, probe: int, last: int, size: int
 ) -> Iterator[tuple[tuple[int, ...], int, int]]:
-    """Positions in one place, from arriving with a probe to leaving with another, with the fewest
-    changes; of equal orders, those that stay with a set of probes.
+    """Return positions in one place, between an arriving and a leaving probe, with the fewest
+    changes; among equal orders, those that keep a set of probes.
     """
     todo, before = dict(content), None
     while todo:
@@ -404,8 +404,8 @@ def _ends(probes: tuple[int, ...]) -> list[tuple[int, int]]:
 
 @lru_cache(maxsize=100_000)
 def _probe_changes(content: _Content, size: int) -> Integers:
-    """The fewest changes of probe from arriving in a place with a probe to leaving with another,
-    (size, size), where these positions are read in between.
+    """Return the fewest changes of probe between an arriving and a leaving probe (size, size)
+    while these positions are read.
     """
     graphs: set[_Graph] = {((-1,) * size, 0)}
     for probes, count in content:
@@ -432,8 +432,8 @@ def _joined(graph: _Graph, first: int, second: int) -> _Graph:
 
 
 def _missing(graph: _Graph) -> int:
-    """The fewest edges that make one closed route of all edges of a graph: all probes of odd degree
-    are paired, and no part is left alone.
+    """Return the fewest edges that complete one closed route through a graph: all probes of odd
+    degree paired, all components connected.
     """
     parts, odd = graph
     ends = Counter({part: 0 for part in parts if part >= 0})

@@ -27,7 +27,7 @@ WITH_MODULES = "leave --no-modules out if you trust the file"
 
 
 class SuggestedChanges(Protocol):
-    """What is suggested of a design, as lines of text and as plain data."""
+    """Suggestions for a design, as lines of text and as plain data."""
 
     def lines(self, judged: Verdict) -> list[str]: ...
 
@@ -36,12 +36,11 @@ class SuggestedChanges(Protocol):
 
 @dataclass(frozen=True)
 class CheckedDesign:
-    """The verdict on one design; `place` is where its file should change, None where nothing is to
-    be complained of, and `variant` its name in the file.
+    """Verdict on one design; `place` locates the line of the file to change, `variant` is its name
+    there.
 
-    `suggestions` are changes that would determine what is open, None where none were asked for.
-    `goals` tell how each goal that was asked for is met, and `missed` what fails of these and of
-    what is weak.
+    `suggestions` are changes that would determine all parameters, if requested. `goals` state how
+    each goal is met, and `missed` the goals not met and, with --fail-weak, weak directions.
     """
 
     prediction: Prediction
@@ -53,18 +52,18 @@ class CheckedDesign:
 
     @property
     def complaints(self) -> tuple[str, ...]:
-        """What is wrong: the rank, then goals and weak directions that were not to be."""
+        """Failures: the rank, then goals and weak directions."""
         complaint = self.prediction.verdict.complaint
         return (*([complaint] if complaint else []), *self.missed)
 
 
 @dataclass(frozen=True)
 class Wanted:
-    """What designs are checked for besides their rank: `goals`, and whether a weak direction fails.
+    """Checks requested beyond the rank: `goals`, and failure on a weak direction.
 
-    With `repairs` changes are looked for that would determine the rest. Without `with_modules` no
-    code that a file names is run, and no file read outside the current folder, or the file's own
-    where it is elsewhere.
+    `repairs` requests a search for changes that determine the rest. Without `with_modules` no code
+    named by a file runs, and files outside the current folder and the file's own folder are not
+    read.
     """
 
     goals: tuple[Any, ...] = ()
@@ -83,11 +82,9 @@ class Wanted:
 
 @dataclass(frozen=True)
 class CheckedFile:
-    """What came of a file: its designs, each variant one of its own, or the reasons why it cannot
-    be used.
+    """Result of a file: its designs, one per variant, or the reasons why it is unusable.
 
-    `doubts` are about what is possible, and unlikely to be meant, `notes` about what was found by
-    itself.
+    `doubts` are possible but improbable statements, `notes` are detected settings.
     """
 
     file: str
@@ -98,7 +95,7 @@ class CheckedFile:
 
     @property
     def as_expected(self) -> bool:
-        """Whether all designs have the rank that the file expects and meet what was asked for."""
+        """True if all designs have the expected rank and meet the requested goals."""
         return not any(design.complaints for design in self.designs)
 
 
@@ -108,10 +105,10 @@ def check_files(
     wanted: Wanted = Wanted(),
     report: Report = unreported,
 ) -> Iterator[CheckedFile]:
-    """Check all files, one after the other; with `variants` only designs of these names.
+    """Check files in sequence; with `variants`, only designs of these names.
 
-    A variant that no file has is told last, as the error of all files together. What is reported
-    are files, the designs of a single file, or the search for repairs of a single design.
+    An unknown variant is reported last, as an error of all files together. Progress counts files,
+    the designs of a single file, or the search for repairs of a single design.
     """
     names_seen: set[str | None] = set()
     complete = True
@@ -174,9 +171,7 @@ def checked_design(
 
 
 def advised(design: CheckedDesign) -> CheckedDesign:
-    """A design whose prediction tells what it was checked for besides the rank, and what is
-    suggested.
-    """
+    """Return a design with the goals its prediction meets, and suggestions."""
     prediction = design.prediction
     lines = [*design.goals]
     data: dict[str, Any] = {"goals": list(design.goals), "missed": list(design.missed)}

@@ -1,4 +1,4 @@
-"""Choice of positions and certificates, and the gain of each."""
+"""Selections of positions and certificates, with the effect of each candidate."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from .set_ups import REST
 
 
 class DriftInOrders(Protocol):
-    """What a drift does in each order of a campaign, and the order that was chosen."""
+    """Effect of drift in each order of a campaign, and the chosen order."""
 
     @property
     def chosen(self) -> ReadingOrder: ...
@@ -30,7 +30,7 @@ class DriftInOrders(Protocol):
 
 
 class OpenPool(Protocol):
-    """What all candidates together leave undetermined, and what would determine it, in words."""
+    """Parameters that all candidates together leave undetermined, and a cure as text."""
 
     @property
     def words(self) -> str: ...
@@ -45,9 +45,7 @@ class OpenPool(Protocol):
 
 @dataclass(frozen=True)
 class Gain:
-    """What a candidate gains: the criterion `without` it and `with_` it, infinite where something
-    is undetermined.
-    """
+    """Effect of a candidate: the criterion `without` it and `with_` it, infinite if deficient."""
 
     candidate: Candidate
     without: float
@@ -55,13 +53,13 @@ class Gain:
 
     @property
     def relative(self) -> float:
-        """How much larger the criterion is without it."""
+        """Relative increase of the criterion without the candidate."""
         return self.without / self.with_ - 1.0
 
 
 @dataclass(frozen=True)
 class CurvePoint:
-    """The best selection found for a budget; `bound` is NaN where there is none."""
+    """The best selection found for a limit of time; `bound` may be NaN (missing)."""
 
     budget: Budget
     spent: Spent
@@ -72,20 +70,18 @@ class CurvePoint:
 
 @dataclass(frozen=True, repr=False)
 class Selection:
-    """A selection and what is to be said of it; values in metres, those of `condition` ratios.
+    """A selection with its evaluation; values in metres, those of `condition` ratios.
 
-    `chosen` in the order of the pool, `done` those of them that have been read already, in part or
-    in full, in the order of reading. Of `chosen`, that which is `completed` has all its readings,
-    those done and those to come. `interrupted` are all that were read in part, and `left_open`
-    counts the directions of their own poses and lengths that stay undetermined where they are left
-    so; nothing else depends on these. What has been read and is `ignored` is no part of it. `value`
-    is infinite where the selection leaves something undetermined; `bound` is what no selection can
-    do better than, NaN where there is none. `drawn` is the criterion of the positions of the
-    experiment itself, or of an earlier choice, whether these keep to the limits or not, told as
-    `drawn_words`; None without any. `prediction` judges what is chosen in full, in this `order`.
-    `orders` tell what a drift does in each order, where that was asked. `names` are the short
-    names of positions whose names the pool composed. `gap` is what the whole pool leaves
-    undetermined, None where nothing.
+    `chosen` follows the order of the pool, `done` (read already, in part or in full) the order of
+    reading. `completed` has all its readings, past and future. `interrupted` positions were read
+    in part; `left_open` counts the directions of their own poses and lengths that remain
+    undetermined, on which no other parameter depends. `ignored` readings are excluded. `value` is
+    infinite if the selection is deficient; `bound` is the lower bound of all selections, NaN if
+    missing. `drawn` is the criterion of the experiment's own positions, or of an earlier choice,
+    within the limits or not, described by `drawn_words`. `prediction` evaluates the full choice in
+    this `order`. `orders` give the effect of drift in each order, if requested. `names` are short
+    names of composed positions. `gap` describes parameters that the whole pool leaves
+    undetermined.
     """
 
     experiment: Experiment
@@ -131,7 +127,7 @@ class Selection:
 
     @property
     def drawn_is_within(self) -> bool:
-        """Whether what it is compared with keeps to the budget; then the choice is never worse."""
+        """True if the reference selection is within the limit; then the choice is never worse."""
         spent, budget = self.drawn_spent, self.budget
         return spent is None or spent.is_within(budget)
 

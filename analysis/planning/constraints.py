@@ -22,9 +22,7 @@ SLACK = 1e-6
 
 @dataclass(frozen=True)
 class Budget:
-    """What may be spent: seconds of laboratory time, readings, positions; None where there is no
-    limit.
-    """
+    """Limits: seconds of laboratory time, readings, positions; each optional."""
 
     seconds: float | None = None
     readings: int | None = None
@@ -42,7 +40,7 @@ class Budget:
 
 @dataclass(frozen=True)
 class Spent:
-    """What a selection costs: seconds with changes between positions, readings and positions."""
+    """Cost of a selection: seconds with changes between positions, readings and positions."""
 
     seconds: float
     readings: int
@@ -54,7 +52,7 @@ class Spent:
         return Budget(self.seconds, self.readings, self.positions)
 
     def is_within(self, budget: Budget) -> bool:
-        """Whether a budget allows it."""
+        """True if a limit allows it."""
         return (
             (budget.seconds is None or self.seconds <= budget.seconds + SLACK)
             and (budget.readings is None or self.readings <= budget.readings)
@@ -66,11 +64,11 @@ class Spent:
 class Constraints:
     """Costs of candidates and limits on them.
 
-    `seconds`, `readings` and `positions` (n,) are each candidate's own, `kinds` what changes
-    between positions depend on, None of calibration items, `must` what has to be chosen. Candidates
-    that are `done` have taken their time already: they cost nothing any more, and the budget is for
-    the rest. Of each of `at_least` one member has to be chosen. The candidate `first` completes a
-    position whose artefact still stands: it comes before all others.
+    `seconds`, `readings` and `positions` (n,) are those of each candidate, `kinds` the change-over
+    classes (absent for calibration items), `must` the required candidates. `done` candidates cost
+    nothing more; the limit applies to the rest. One member of each set of `at_least` is required.
+    The candidate `first` completes a position whose artefact is still set up: it precedes all
+    others.
     """
 
     budget: Budget
@@ -90,7 +88,7 @@ class Constraints:
         return len(self.seconds)
 
     def spent(self, chosen: Collection[int]) -> Spent:
-        """Cost of a selection, less what is done."""
+        """Return the cost of a selection without completed readings."""
         added = sorted(set(chosen) - self.done)
         seconds = float(self.seconds[added].sum()) + changeover(
             self._kinds(added), self.changes, self._first(added)
@@ -104,8 +102,8 @@ class Constraints:
         return None if self.first is None or self.first not in members else self.kinds[self.first]
 
     def allows(self, chosen: Collection[int]) -> bool:
-        """Whether a selection keeps to all limits, or may be extended to one that has what is
-        missing of `at_least`.
+        """True if a selection, or an extension by missing members of `at_least`, is within all
+        limits.
         """
         members = set(chosen)
         return (
@@ -117,12 +115,14 @@ class Constraints:
         )
 
     def can_read(self, members: Collection[int]) -> bool:
-        """Whether any of some candidates is a position that may be read beside what has to be."""
+        """True if one of some candidates is a position that can be read in addition to required
+        ones.
+        """
         may_be = {*self.must, *self.additions(self.must).tolist()}
         return any(self.kinds[k] is not None for k in may_be.intersection(members))
 
     def forbids(self, members: Collection[int]) -> bool:
-        """Whether none of some positions could be read with any budget."""
+        """True if no limit of time would allow any of some positions."""
         return not replace(self, budget=Budget()).can_read(members)
 
     def additions(self, chosen: Collection[int]) -> NDArray[np.int64]:
@@ -219,8 +219,8 @@ def constraints(
     at_least: Sequence[tuple[int, ...]] = (),
     first: int | None = None,
 ) -> Constraints:
-    """Constraints of a pool's candidates; that to be read `first` completes a position, and counts
-    as none itself.
+    """Return constraints of a pool's candidates; `first` completes a position and is not counted
+    as a further one.
     """
     is_position = [
         isinstance(candidate.item, Position) and k != first

@@ -77,9 +77,7 @@ KEPT = 4_000_000
 
 
 class Functions(Protocol):
-    """Quantities whose uncertainties count, as functions of z; some of them at a time, always in
-    the same order.
-    """
+    """Quantities whose uncertainties count, as functions of z, in blocks of constant order."""
 
     @property
     def count(self) -> int: ...
@@ -95,8 +93,9 @@ class Functions(Protocol):
     def squares(
         self, uncertainties: Iterable[Array], weigh: Callable[[Array], Array]
     ) -> tuple[Array, Array]:
-        """Sums over all functions: (m,) of what `weigh` makes of their uncertainties (some,),
-        namely (m, some), and of their squares (z, z) with the first of these for weights."""
+        """Return sums over all functions: (m,) of `weigh` of their uncertainties (some,), namely
+        (m, some), and of their squares (z, z) weighted by the first.
+        """
         ...
 
 
@@ -104,13 +103,12 @@ class Functions(Protocol):
 class Criterion:
     """A criterion by its `name`: the mean of `functions`, or their largest if `largest`.
 
-    `about_balls` states whether it concerns all z, or only those of shared parameters. `excluded`
-    counts functions that the pool leaves open, whatever is chosen. `functions` are None of criteria
-    that are about eigenvalues; these are of the model's parameters, `scaled` (n, z), in metres.
-    `target` is the criterion at which the target uncertainty is met on average, None where
-    there is none. `needed` holds, for each artefact whose own distances count, its name and the
-    candidates that place it: without one of them the distances are undetermined, whatever
-    certificates say of them.
+    `about_balls` states if it concerns all z or only those of shared parameters. `excluded` counts
+    functions that the pool cannot determine. Criteria of eigenvalues have no `functions`; theirs
+    are of the model's parameters, `scaled` (n, z), in metres. `target` is the criterion at which
+    the target uncertainty is met on average, if there is a target. `needed` holds, by artefact
+    whose own distances count, the candidates that set it up: without one of these, the distances
+    are undetermined in spite of certificates.
     """
 
     name: CriterionName
@@ -131,7 +129,7 @@ class Criterion:
 
     @property
     def is_bounded(self) -> bool:
-        """Whether a convex relaxation bounds it."""
+        """True if a convex relaxation bounds it."""
         return self.name != "condition"
 
     def value(self, root: Array) -> float:
@@ -150,7 +148,7 @@ class Criterion:
 
     @property
     def is_sharp(self) -> bool:
-        """Whether it is a largest value, for which a mean of high power stands."""
+        """True if it is a largest value, represented by a mean of high power."""
         return self.largest or self.name == "E"
 
     def tangent(self, root: Array, power: float = SHARP) -> tuple[float, float, Array]:
@@ -212,16 +210,17 @@ def _largest_tangent(functions: Functions, root: Array, power: float) -> tuple[f
 
 
 def _halved(weights: Array, uncertainties: Array) -> Array:
-    """Half of `weights` for each uncertainty; what is known without any stays so."""
+    """Return half of `weights` for each uncertainty; exact functions stay exact."""
     is_positive = uncertainties > 0.0
     return np.where(is_positive, 0.5 * weights, 0.0) / np.where(is_positive, uncertainties, 1.0)
 
 
 @dataclass(frozen=True)
 class Linear:
-    """Functions with rows (count, z), in metres, of `sizes` (count,): the lengths that they are.
+    """Functions with rows (count, z), in metres, for lengths `sizes` (count,).
 
-    `excluded` counts others, which the pool leaves open. `targets` are their own, if they have any.
+    `excluded` counts functions that the pool cannot determine. `targets` are optional targets of
+    single functions.
     """
 
     rows: Array
@@ -249,11 +248,11 @@ class Linear:
 
 @dataclass(frozen=True)
 class PairBlock:
-    """Pairs of two runs of places, those of `first` (rows) and of `second` (columns).
+    """Pairs of two runs of points, `first` (rows) and `second` (columns).
 
-    `chosen` (rows, columns) states which pairs count, `length` (rows, columns) is their distance,
-    and `weights` have, for components i and j >= i, the products of these components of all
-    directions, those of i < j twice.
+    `chosen` (rows, columns) selects pairs, `length` (rows, columns) is their distance, and
+    `weights` have, for components i and j >= i, the products of these components of all
+    directions, those of i < j doubled.
     """
 
     first: slice
@@ -265,11 +264,11 @@ class PairBlock:
 
 @dataclass(frozen=True)
 class Pairs:
-    """Distances between all pairs of places that are apart, less those that the pool leaves open.
+    """Distances between all pairs of separate points, except those that the pool cannot determine.
 
-    `places` (n, d) in metres; `displacement` (n, d, z) of them, and `open_` (n, d, k) what the pool
-    leaves open of it, both without the motion of all places together. Pairs are worked through in
-    blocks of bounded size.
+    `places` (n, d) in metres; `displacement` (n, d, z) is theirs, `open_` (n, d, k) the part that
+    the pool leaves undetermined, both without the motion of all points together. Blocks of bounded
+    size limit memory.
     """
 
     places: Array
@@ -278,7 +277,7 @@ class Pairs:
 
     @cached_property
     def _counts(self) -> tuple[int, int]:
-        """How many pairs count, and how many the pool leaves open."""
+        """Numbers of counted pairs and of undetermined pairs."""
         chosen = apart = 0
         for block in self._blocks():
             chosen += int(block.chosen.sum())
@@ -291,7 +290,7 @@ class Pairs:
 
     @property
     def excluded(self) -> int:
-        """Pairs that are apart, and left open whatever is chosen."""
+        """Number of pairs of separate points that every selection leaves undetermined."""
         return self._counts[1]
 
     @cached_property
@@ -309,7 +308,7 @@ class Pairs:
                 yield self._block(first, second)
 
     def _apart(self, first: slice, second: slice) -> tuple[Array, NDArray[np.bool_]]:
-        """Vectors (rows, columns, d) between places, and which of them are distances, each of them
+        """Return vectors (rows, columns, d) between points, and a mask that selects each distance
         once.
         """
         vector = self.places[first, None] - self.places[None, second]
@@ -410,7 +409,7 @@ class Several:
 
 
 def is_about_balls(name: CriterionName) -> bool:
-    """Whether a criterion needs all balls, and not only what they tell of the machine."""
+    """True if a criterion needs all balls, beyond their information on the machine."""
     kind = QUANTITIES.get(name.removesuffix(MAXIMUM))
     return kind is not None and kind.about_balls
 
@@ -474,8 +473,8 @@ def criterion(information: Information, experiment: Experiment, name: CriterionN
 
 
 def _target(experiment: Experiment, name: CriterionName, functions: Several | None) -> float | None:
-    """The target uncertainty of the functions, their own or that of the file: its mean for an
-    average, for a largest value only where it is constant; None where not all of them have one.
+    """Return the target uncertainty of the functions (their own or the file's): its mean for an
+    average, and for a largest value only a constant one; absent unless all functions have one.
     """
     if functions is None:
         return None
@@ -509,7 +508,7 @@ def _of_shared(information: Information, rows: Array) -> Array:
 
 
 def _distances(information: Information, distances: Distances) -> Pairs | Linear:
-    """Distances that are determined, between all places or those pairs that have names."""
+    """Distances that the pool determines, between all points or named pairs."""
     point_places = distances.places
     places = point_places.at(information.drawn.design, information.drawn.state)
     moved = (
@@ -535,7 +534,7 @@ def _distances(information: Information, distances: Distances) -> Pairs | Linear
 
 
 def _of_balls(information: Information, places: BallPlaces) -> tuple[Array, Array]:
-    """Displacements of balls (n, d, z), and those that the pool leaves open, in metres."""
+    """Displacements of balls (n, d, z), and the undetermined part, in metres."""
     basis, n, d = information.basis, len(places.index), information.drawn.design.dimension
     amounts = basis.balls[places.index].reshape(n * d, -1)
     displacement = basis.rows(amounts, np.zeros((n * d, information.drawn.shared)))
@@ -544,9 +543,7 @@ def _of_balls(information: Information, places: BallPlaces) -> tuple[Array, Arra
 
 
 def _of_points(information: Information, places: MeasuredPoints) -> tuple[Array, Array]:
-    """Displacements of corrected points (n, d, z), and those that the pool leaves open, in
-    metres.
-    """
+    """Displacements of corrected points (n, d, z), and the undetermined part, in metres."""
     drawn, (n, d) = information.drawn, places.points.shape
     rows = np.zeros((n * d, drawn.shared))
     for some, matrix in point_rows(drawn.design, drawn.layout, drawn.state, places):

@@ -54,9 +54,7 @@ def in_time(
 
 
 def in_order_settings(experiment: Experiment) -> dict[int, dict[str, Any]]:
-    """What an experiment file says of the times of its drifts, by their places among the influence
-    quantities.
-    """
+    """Return an experiment file's times of its drifts, by index of the influence quantity."""
     settings_by_index: dict[int, dict[str, Any]] = {}
     for k, influence in enumerate(experiment.influences):
         if isinstance(influence, DriftSettings):

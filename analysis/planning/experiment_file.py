@@ -1,8 +1,7 @@
-"""The chosen design as an experiment file of its own, without a pool.
+"""Experiment file of the chosen design, without a pool.
 
-Sections that stay as they are keep their text and comments. What is composed is read again and
-compared with what it should say, so that a file of unusual form is written anew as a whole, rather
-than wrongly.
+Unchanged sections keep text and comments. The composed text is read again and compared with the
+intended content; a file of unusual form is then written as a whole instead of wrongly.
 """
 
 from __future__ import annotations
@@ -51,20 +50,19 @@ def experiment_text(
     of_influences: Mapping[int, dict[str, Any]] | None = None,
     with_times: bool = False,
 ) -> str:
-    """The text of an experiment file, to stand in a folder, with the chosen candidates, positions
-    in their order.
+    """Return the text of an experiment file for a folder, with the chosen candidates, positions in
+    their order.
 
-    `experiment` is the source, loaded for planning; of one with variants the overrides are applied.
-    `header` becomes comments at the top. Names of files lead from `folder` to the same files. A
-    stated rank deficiency is left out unless one is given, and so are artefacts that no chosen
-    position places, what is known of them, and priors about other positions. `names` are the short
-    names of chosen positions by those in the pool. `of_influences` are keys of influence quantities
-    that are others, by the places of these in their list. `with_times` a pool says how long the
-    positions take.
+    `experiment` is the source, loaded for planning; overrides of a variant are applied. `header`
+    becomes comments at the top. File names are relative to `folder`. A stated rank deficiency is
+    omitted unless one is given, as are artefacts without a chosen position, their certificates,
+    and priors of other positions. `names` are short names by names in the pool. `of_influences`
+    are changed keys of influence quantities by index. `with_times` adds a pool with the durations
+    of positions.
 
-    Of an experiment that was made or changed in Python nothing of a file is kept.
+    An experiment made or changed in Python keeps no text of a file.
 
-    :raises ExperimentError: the source cannot be read any more.
+    :raises ExperimentError: the source cannot be read again.
     """
     source = experiment.source
     text, root, tree = _source(experiment)
@@ -113,11 +111,10 @@ def experiment_text(
 
 
 def _source(experiment: Experiment) -> tuple[str, Node, Node]:
-    """The text that an experiment was loaded from, its tree, and that of the experiment, which
-    shares with it the nodes that no variant overrides; without a text the experiment's own, where
-    it is not what the text says.
+    """Return the text an experiment was loaded from, its tree, and the experiment's tree, which
+    shares all nodes that no variant overrides; or the experiment's own text if it differs.
 
-    :raises ExperimentError: the source cannot be read any more.
+    :raises ExperimentError: the source cannot be read again.
     """
     source = experiment.source
     if source.name == "experiment" and not source.is_file():
@@ -199,7 +196,7 @@ def _content(
 
 
 def _times(settings: Mapping[str, Any], pool: Pool, chosen: Sequence[Candidate]) -> dict[str, Any]:
-    """How long things take, and chosen positions where that is other for them, as a pool has it."""
+    """Durations, and chosen positions with durations of their own, in the form of a pool."""
     times = {
         key: entry
         for key, entry in settings.get("pool", {}).get("times", {}).items()
@@ -223,7 +220,7 @@ def _times(settings: Mapping[str, Any], pool: Pool, chosen: Sequence[Candidate])
 
 
 def _moved(content: Mapping[str, Any], source: Path, folder: Path) -> dict[str, Any]:
-    """The same with names of files, and places of modules, that lead there from another folder."""
+    """Return content with file names and modules relative to another folder."""
 
     def there(name: Any) -> Any:
         if not isinstance(name, str) or Path(name).is_absolute():
@@ -276,8 +273,8 @@ def _with(settings: Any, key: str, change: Callable[[Any], Any]) -> Any:
 
 
 def _chunks(text: str, root: MappingNode) -> dict[str, str]:
-    """The text of each section with the comments above it, none where the file is not one of plain
-    blocks.
+    """Return the text of each section with the comments above it, or an empty result unless the
+    file consists of plain blocks.
     """
     lines = text.lstrip("\ufeff").splitlines()
     starts = {mark.line - 1: key for key, mark in root.key_marks.items() if mark.column == 1}
@@ -340,7 +337,7 @@ _Dumper.add_representer(
 
 
 def _section(key: str, value: Any) -> str:
-    """A section written anew, each of its entries in one line where it fits."""
+    """Return a section written afresh, one line per entry if that fits."""
     if isinstance(value, dict):
         value = {name: _in_line(entry) for name, entry in value.items()}
     elif isinstance(value, list):
@@ -369,8 +366,8 @@ def _in_line(value: Any) -> Any:
 def _of_chosen(
     influence: dict[str, Any], unused: Collection[str], short: Mapping[str, str]
 ) -> dict[str, Any]:
-    """What is said of an influence quantity, less `others` among its positions; nothing where it is
-    of these alone.
+    """Return the settings of an influence quantity without positions in `others`; empty if it
+    concerns only these.
     """
     position_settings = influence.get("positions", {})
     settings = {key: setting for key, setting in influence.items() if key != "positions"}

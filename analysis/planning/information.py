@@ -1,11 +1,11 @@
-"""The information of every candidate on what all positions share, as one fixed matrix each.
+"""Information of every candidate on the shared parameters, as one fixed matrix each.
 
 Information adds: that of a selection is the sum of its candidates' matrices. Two changes of basis
-keep the matrices small and the sums accurate. The first leaves out combinations of balls that no
-position ties to machine errors: on a plate read as a whole some fifty combinations matter, however
-many balls there are. The second makes the information of the whole pool the identity, by a
-triangular factor obtained from orthogonal transformations, so that nothing is lost where products
-of rows are formed; what the pool does not determine at all is left out of it.
+keep matrices small and sums accurate. The first omits combinations of balls that no position links
+to machine errors: on a plate read as a whole about fifty combinations matter, for any number of
+balls. The second makes the information of the whole pool the identity, by a triangular factor from
+orthogonal transformations, so that products of rows lose no digits; directions that the pool
+leaves undetermined are omitted.
 """
 
 from __future__ import annotations
@@ -59,12 +59,12 @@ MOST_BYTES = 800_000_000
 
 @dataclass(frozen=True)
 class InformationBasis:
-    """Coordinates z in which a plan computes.
+    """Coordinates z of a plan.
 
-    `balls` (n, d, y) are the combinations of ball co-ordinates that count. In terms of their
-    amounts u (y,) and of shared columns s (c,): u = `ball_root` z - `ball_shared` s, where z starts
-    with those of the balls, and s = `shared_root` z for the rest of z. `ball_open` (y, open) are
-    combinations that nothing in the pool shows.
+    `balls` (n, d, y) are the relevant combinations of ball co-ordinates. In terms of their amounts
+    u (y,) and of shared columns s (c,): u = `ball_root` z - `ball_shared` s, with the ball part of
+    z first, and s = `shared_root` z for the rest of z. `ball_open` (y, open) are combinations that
+    the pool does not observe.
     """
 
     balls: Array
@@ -75,7 +75,7 @@ class InformationBasis:
 
     @property
     def of_balls(self) -> int:
-        """Number of z that stand for balls."""
+        """Number of z that represent balls."""
         return int(self.ball_root.shape[1])
 
     @property
@@ -94,12 +94,12 @@ class InformationBasis:
 class Information:
     """Matrices of candidates in the basis of a pool.
 
-    `base` (z, z) is what is known without any of the `candidates`, `matrices` (candidates, z, z)
-    what each adds. `deficiency` counts shared directions (c, deficiency), `open_` in micrometres,
-    that even all candidates together leave undetermined. `frames` (candidates that calibrate
-    co-ordinates) hold what each fixes of its plate's frame. `pose_ranks` states how many parameters
-    of its own pose each candidate determines, were all else known, `pose_open` how many it does
-    not, and `has_rows` whether it observes anything.
+    `base` (z, z) is the information without any of the `candidates`, `matrices` (candidates, z, z)
+    the addition of each. `deficiency` counts shared directions (c, deficiency), `open_` in
+    micrometres, that all candidates together leave undetermined. `frames` (candidates that
+    calibrate co-ordinates) hold the part of its plate's frame that each fixes. `pose_ranks` counts
+    the parameters of its own pose that each candidate determines, all others known, `pose_open`
+    the remaining ones, and `has_rows` is true if it observes anything.
     """
 
     drawn: PoolDesign
@@ -119,7 +119,9 @@ class Information:
 
     @property
     def balls_open(self) -> int:
-        """Number of combinations of balls that nothing shows, motions of whole plates aside."""
+        """Number of combinations of balls, other than motions of whole plates, that no candidate
+        observes.
+        """
         design, open_ = self.drawn.design, self.basis.balls @ self.basis.ball_open
         motions = _motions(design).reshape(design.balls.places.size, -1)
         open_ = open_.reshape(len(motions), -1)
@@ -136,8 +138,8 @@ class Information:
         return _placing(self.candidates, artefact)
 
     def of(self, chosen: Collection[int]) -> Array:
-        """Information (z, z) of a selection; a frame that nothing fixes is held, which changes no
-        distance.
+        """Return the information (z, z) of a selection; frames without a calibration are held,
+        which changes no distance.
         """
         members = sorted(chosen)
         return self.base + self.matrices[members].sum(axis=0) + self.frames.held(members)
@@ -151,14 +153,14 @@ class Information:
 
 @dataclass(frozen=True)
 class Frames:
-    """What calibrated co-ordinates fix of the plates' frames, in which distances do not depend on
-    the frame.
+    """Plate frames fixed by calibrated co-ordinates, for criteria of distances that do not depend
+    on the frame.
 
-    `fixed` holds, for each candidate that calibrates co-ordinates, how these change with the
-    motions of the plates (m, motions), `base` the same for the experiment's own certificates.
-    `rows` (motions, z) are the motions' rows. `artefacts` holds, for each artefact, which
-    candidates place it and the information (z, z) that holds its balls or its length; plates are
-    not among them where balls themselves count.
+    `fixed` holds, for each candidate that calibrates co-ordinates, their change with the motions
+    of the plates (m, motions), `base` the same for the experiment's own certificates. `rows`
+    (motions, z) are the motions' rows. `artefacts` holds, for each artefact, the candidates that
+    set it up and the information (z, z) that holds its balls or its length; plates are absent if
+    balls themselves count.
     """
 
     fixed: dict[int, Array]
@@ -167,8 +169,8 @@ class Frames:
     artefacts: tuple[tuple[frozenset[int], Array], ...] = ()
 
     def held(self, members: Sequence[int]) -> Array:
-        """Information (z, z) that holds the motions that no member fixes, and artefacts that no
-        member places.
+        """Return the information (z, z) that holds motions fixed by no member, and artefacts that
+        no member sets up.
         """
         total = self._held_motions(members)
         for placing, information in self.artefacts:
@@ -197,15 +199,14 @@ def pool_information(
     completed: Mapping[int, int] | None = None,
     report: Report = unreported,
 ) -> Information:
-    """Information of every candidate of a pool.
+    """Return the information of every candidate of a pool.
 
-    A candidate that completes another, of which it has the readings as well, is given under
-    `completed`: its information is what it adds to that of the other, in the same pose. With
-    `all_balls` no combination of balls is left out, for criteria that are about balls, and no plate
-    is held that a selection does not place.
+    A candidate that completes another, and includes its readings, is given under `completed`: its
+    information is the addition to that of the other, in the same pose. `all_balls`, for criteria
+    of balls, keeps all combinations of balls and holds no unused plate.
 
-    :raises ExperimentError: no candidate is a position, the matrices are too large, or what cannot
-        be planned is asked.
+    :raises ExperimentError: no candidate is a position, the matrices are too large, or the request
+        cannot     be planned.
     """
     positions = [candidate.item for candidate in candidates if isinstance(candidate.item, Position)]
     if not positions:
@@ -335,8 +336,8 @@ def _sizes(rows: CandidateRows) -> Array:
 
 
 def _differs(rows: CandidateRows, weight: float) -> bool:
-    """Whether any row's weight differs from `weight` by more than plain orthogonal transformations
-    keep apart.
+    """True if a row's weight differs from `weight` by more than plain orthogonal transformations
+    can separate.
     """
     sizes = _sizes(rows)
     return bool((sizes > ALIKE * weight).any() or (ALIKE * sizes[sizes > 0.0] < weight).any())
@@ -351,7 +352,7 @@ def _weighted(rows: CandidateRows, least: float, most: float) -> CandidateRows:
 
 
 def _range(columns: Array) -> Array:
-    """Orthonormal basis of what columns span."""
+    """Return an orthonormal basis of the span of columns."""
     size = np.linalg.norm(columns, axis=0)
     used = columns[:, size > 0] / size[size > 0]
     vectors, values, _ = np.linalg.svd(used, full_matrices=False)
@@ -359,7 +360,7 @@ def _range(columns: Array) -> Array:
 
 
 def _reduced(rows: Array) -> Array:
-    """Rows of the same information, no more of them than columns."""
+    """Return rows of the same information, at most as many as columns."""
     return rows if len(rows) <= rows.shape[1] else np.asarray(np.linalg.qr(rows, mode="r"))
 
 
@@ -379,12 +380,12 @@ def _motions(design: Design) -> Array:
 
 
 def _combinations(drawn: PoolDesign, certificates: list[CandidateRows], all_balls: bool) -> Array:
-    """Combinations (n, d, y) of ball co-ordinates that positions or certificates tie to anything
-    that is shared.
+    """Return combinations (n, d, y) of ball co-ordinates that positions or certificates link to
+    shared parameters.
 
-    They span a space that the information of no position leads out of, so that what is left out of
-    it has no bearing. Motions of a plate as a whole, which only calibrated co-ordinates show, are
-    part of it where there are any.
+    They span a space that the information of every position maps into itself, so that the omitted
+    rest has no effect. Motions of a whole plate, observed by calibrated co-ordinates alone, belong
+    to it if such calibrations exist.
     """
     n, d = drawn.design.balls.places.shape
     of_plates = np.repeat(np.isin(np.arange(n), drawn.design.plate_balls), d)
@@ -437,7 +438,7 @@ def _kind(rows: CandidateRows, n: int) -> Array:
 
 
 class _Span:
-    """An orthonormal basis that grows by what is new in the columns added to it."""
+    """An orthonormal basis, extended by the new part of columns added to it."""
 
     def __init__(self, motions: Array, keeps: bool) -> None:
         none = motions[:, :0]
@@ -447,7 +448,7 @@ class _Span:
 
     @property
     def rank(self) -> int:
-        """Dimension, with that of what is taken out."""
+        """Dimension, including the excluded space."""
         return int(self.vectors.shape[1] + self._without.shape[1])
 
     def add(self, columns: Array) -> None:
@@ -471,10 +472,10 @@ class _Span:
 def _basis(
     balls: Array, shared: int, every: list[Array], even: list[Array] | None = None
 ) -> tuple[InformationBasis, Array]:
-    """Basis in which the information of all rows together is the identity, and what is left out
-    (shared, open).
+    """Return a basis in which the information of all rows together is the identity, and the
+    omitted directions (shared, open).
 
-    `even` are the same rows with weights that are much alike, where those of `every` are not.
+    `even` are the same rows with similar weights, used if those of `every` differ too much.
     """
     y = balls.shape[2]
     triangle = np.zeros((0, y + shared))
@@ -551,8 +552,8 @@ def _unplaced(
     all_balls: bool,
     has_rows: Sequence[bool],
 ) -> tuple[tuple[frozenset[int], Array], ...]:
-    """For each artefact, which candidates place it, and what holds the parameters that are its
-    own.
+    """Return, for each artefact, the candidates that set it up, and the information that holds its
+    own parameters.
     """
     design, unplaced = drawn.design, []
     n, d = design.balls.places.shape
@@ -589,7 +590,7 @@ def _frames(
     items: dict[int, list[CandidateRows]],
     basis: InformationBasis,
 ) -> Frames:
-    """How calibrated co-ordinates fix the frames of plates."""
+    """Return the parts of plate frames that calibrated co-ordinates fix."""
     motions = _motions(drawn.design)
 
     def fixed(rows: list[CandidateRows]) -> Array:

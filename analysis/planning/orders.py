@@ -43,12 +43,12 @@ Sequenced = tuple[tuple[Candidate, tuple[str, ...]], ...]
 def in_order(
     candidates: Sequence[Candidate], changes: ChangeTimes, order: ReadingOrder
 ) -> Sequenced:
-    """Positions mirrored or random in blocks, their probes in the order that costs least, or all in
+    """Return positions mirrored or random in blocks, their probes in the cheapest order, or all in
     a stated sequence.
 
-    A mirrored order goes through the kinds of positions with the least change-over, reads half of
-    each, and goes back with the other half; what is single stands in the middle. A block has one
-    position of each kind that is left, in random order.
+    A mirrored order passes through the classes of positions with the least change-over, reads half
+    of each, and returns with the other half; single positions are in the middle. A block has one
+    position of each remaining class, in random order.
     """
     if order.sequence:
         by_name = {candidate.name: candidate for candidate in candidates}

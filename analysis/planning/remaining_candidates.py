@@ -1,9 +1,8 @@
-"""Candidates for the continuation of a campaign: those left, those done, and interrupted
-positions.
+"""Candidates for the continuation of a campaign: remaining, completed and interrupted positions.
 
-A position that was interrupted is offered twice: for completion, as long as the artefact stands
-there, where neither its set-up is paid again nor what has been read; and to be set up anew in full.
-What was read of it counts in any case.
+An interrupted position is offered twice: for completion while its artefact is still set up, at the
+cost of the missing readings alone, and for a new set-up in full. Its existing readings count in
+both.
 """
 
 from __future__ import annotations
@@ -20,9 +19,8 @@ from ballplate.simulator.experiment.model import AtMost, Candidate, Experiment, 
 class Interrupted:
     """A position that was read in part, by indices of an offer.
 
-    `part` is what has been read, `rest` completes it, None where the artefact does not stand there
-    any more, and `again` is a new set-up of the same position. `whole` is the position with all its
-    readings.
+    `part` has the readings taken, `rest` completes it (absent if the artefact has been removed),
+    and `again` is a new set-up. `whole` is the position with all its readings.
     """
 
     part: int
@@ -35,9 +33,9 @@ class Interrupted:
 class Offer:
     """Candidates, those of the pool first, and limits on choosing them.
 
-    `done` in the order in which they were read; `must` and `at_least` (of each, one) have to be
-    chosen. `replaced` tells by what candidates of the pool that were interrupted may be chosen now.
-    `names` are short names of an earlier plan, by those of candidates.
+    `done` follows the order of reading; `must` and one of each `at_least` are required. `replaced`
+    maps interrupted candidates of the pool to those that may be chosen instead. `names` are short
+    names of an earlier plan, by those of candidates.
     """
 
     candidates: tuple[Candidate, ...]
@@ -66,8 +64,8 @@ class Offer:
 
     @property
     def weighed(self) -> tuple[list[Candidate], dict[int, int]]:
-        """Candidates as they are weighed: what completes another with all its readings, and which
-        that is.
+        """Return candidates for evaluation, with completions in full, and the indices of these
+        completions.
         """
         candidates, completed = list(self.candidates), {}
         for interrupted_position in self.interrupted:
@@ -91,8 +89,8 @@ class Offer:
         return [by_index[k] for k in sorted(by_index)]
 
     def begun(self, experiment: Experiment) -> dict[str, tuple[int, ...]]:
-        """Plates of which some balls alone have been read, and the candidates that read all the
-        others.
+        """Return plates that were read in part only, and the candidates that read all their other
+        balls.
         """
         balls: dict[str, set[int]] = {}
         for k in self.done:
@@ -115,7 +113,7 @@ class Offer:
         return begun_by
 
     def without_begun(self, experiment: Experiment) -> Offer:
-        """The offer as if nothing had been read in part of plates that were only begun."""
+        """Return the offer without the partial readings of plates that were only begun."""
         plates = self.begun(experiment)
         if not plates:
             return self
@@ -137,7 +135,7 @@ class Offer:
         return self.candidates[k].name
 
     def now(self, k: int) -> int:
-        """The candidate that stands for one of the pool."""
+        """Return the candidate that represents one of the pool."""
         return self.replaced.get(k, (k,))[0]
 
 
@@ -147,10 +145,10 @@ def offer(
     standing: bool = True,
     known_names: Mapping[str, str] | None = None,
 ) -> Offer:
-    """What may be chosen from a pool after some set-ups have been read.
+    """Return the choices of a pool after some set-ups have been read.
 
-    `standing` states whether the artefact still is where it was read last, so that this position
-    can be completed; `known` are short names of an earlier plan.
+    `standing` is true if the artefact is still where it was read last, so that this position can
+    be completed; `known` are short names of an earlier plan.
     """
     candidates = list(pool.candidates)
     index: dict[str, int] = {}
@@ -213,11 +211,11 @@ def offer(
 
 
 def open_directions(offered: Offer, information: Information, chosen: Collection[int]) -> int:
-    """What interrupted positions that are not completed leave undetermined of their own poses and
-    lengths.
+    """Return the number of undetermined directions that interrupted, uncompleted positions have in
+    their own poses and lengths.
 
-    These are parameters that nothing else depends on: of a pose that too few balls were read in,
-    and the unknown length of a standard of which no length was read.
+    No other parameter depends on these: a pose read in too few balls, or the unknown length of a
+    standard without a reading.
     """
     unfinished = [
         interrupted_position

@@ -69,7 +69,7 @@ def sheet_data(sheet: RunSheet) -> dict[str, Any]:
 
 
 def summary(sheet: RunSheet) -> str:
-    """What there is to do, in a sentence."""
+    """Return the remaining work as a sentence."""
     todo = [step for step in sheet.steps if not step.done]
     done_count = len(sheet.steps) - len(todo)
     words = [

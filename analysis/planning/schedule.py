@@ -17,7 +17,7 @@ from .short_names import with_short_name
 
 @dataclass(frozen=True)
 class Completion:
-    """What is missing of a position whose artefact still stands, and the position with all its
+    """Missing readings of a position whose artefact is still set up, and the position with all its
     readings.
     """
 
@@ -27,14 +27,13 @@ class Completion:
 
 @dataclass(frozen=True)
 class Step:
-    """A position of a run sheet: what to set up, in words, and what to read, with the probes in
-    order.
+    """A position of a run sheet: set-up and readings as text, probes in order.
 
-    `change` says what is changed before it, in `change_seconds`; `seconds` is what it takes by
-    itself, and `start` when its change-over begins, in seconds from the first position that is to
-    be read. What is `done` has neither. Of a position that is completed, `whole` has all readings
-    and `candidate` those still to be taken. One that was interrupted and is not completed is `left`
-    so. `short` is the short name of a position whose name the pool composed.
+    `change` describes the change before it, of `change_seconds`; `seconds` is its own duration,
+    and `start` the begin of its change-over, in seconds from the first position to read. `done`
+    positions have neither. A completed position has all readings in `whole` and the missing ones
+    in `candidate`; an interrupted one that is not completed is `left`. `short` is the short name
+    of a position whose name the pool composed.
     """
 
     candidate: Candidate
@@ -61,7 +60,7 @@ class Step:
 
     @property
     def description(self) -> str:
-        """What the position is, beside its name; empty where the name says all there is."""
+        """Description of the position, empty if the name contains it."""
         item = self.position.item
         assert isinstance(item, Position)
         return item.description if self.name == self.position.name else self.position.name
@@ -86,10 +85,10 @@ class Step:
 
 @dataclass(frozen=True)
 class RunSheet:
-    """Positions in the order to read them, those done first, and items of calibration with their
-    price in seconds.
+    """Positions in reading order, completed ones first, and items of calibration with their price
+    in seconds.
 
-    Where no times are stated it is not `timed`, and all times are zero. An order of least
+    Without durations in the file it is not `timed`, and all times are zero. An order of least
     change-over takes at most `gap` seconds more than any other.
     """
 
@@ -131,9 +130,7 @@ class RunSheet:
 
     @property
     def seconds(self) -> float:
-        """What is yet to be spent: on positions that are not done, changes between them, and
-        calibration.
-        """
+        """Time still needed for positions, changes and calibration."""
         of_positions = sum(step.seconds + step.change_seconds for step in self.steps)
         return of_positions + sum(calibration.seconds for calibration in self.calibration)
 
@@ -152,13 +149,13 @@ def run_sheet(
     names: Mapping[str, str] | None = None,
     order: ReadingOrder = LEAST_CHANGE_OVER,
 ) -> RunSheet:
-    """The run sheet of chosen candidates: the order that costs least, or another one, what is done
-    already first and as it was.
+    """Return the run sheet of chosen candidates in the cheapest order or another one, completed
+    ones first in theirs.
 
-    Candidates that are `done` may be among the chosen ones too. They take no time any more, and as
-    before any first position nothing is changed before the first that is left. A position that is
-    `completed` is that first one, as long as its artefact stands; only its rest takes time. What
-    else is `interrupted` stays as it is. `names` are short names by those of candidates.
+    `done` candidates may be among the chosen ones; they take no more time, and the first remaining
+    position needs no change, like any first one. A `completed` position is that first one while
+    its artefact is set up; only its missing readings take time. Other `interrupted` positions are
+    unchanged. `names` are short names by those of candidates.
     """
     again = set() if completed is None else {completed.whole.name}
     before = [
@@ -237,7 +234,7 @@ def change_over(
     to_visit: tuple[Candidate, tuple[str, ...]],
     changes: ChangeTimes,
 ) -> tuple[float, str]:
-    """Seconds of the change from one position to another, and what is changed in words."""
+    """Return the seconds and the description of the change from one position to another."""
     before, after = kind_of(from_visit[0]), kind_of(to_visit[0])
     words = []
     if before.artefact != after.artefact:
@@ -252,7 +249,7 @@ def change_over(
 
 
 def place_words(candidate: Candidate) -> str:
-    """How the artefact is set up, in words; lengths are those of the file."""
+    """Return the description of the set-up; lengths are those of the file."""
     settings: Mapping[str, Any] = candidate.settings
     if settings.get("pose") is not None:
         pose = settings["pose"]
@@ -292,7 +289,9 @@ def _at(lengths: Mapping[str, str]) -> str:
 
 
 def ball_words(candidate: Candidate) -> str:
-    """Which balls are read, in words; with several groups of readings, by which probes."""
+    """Return the description of the balls to read, and of the probes of several groups of
+    readings.
+    """
     assert isinstance(candidate.item, Position)
     groups = candidate.item.readings
     reading_settings: Sequence[Any] = candidate.settings.get("readings") or [candidate.settings]
@@ -315,11 +314,10 @@ def ordered(
     done_candidates: Sequence[Candidate] = (),
     first: Candidate | None = None,
 ) -> tuple[Sequenced, float]:
-    """Positions, those `done` first, in the order that costs least change-over, each with the order
-    of its probes; and the seconds that another order may be cheaper by at most.
+    """Return positions, `done` ones first, in the cheapest order, each with the order of its
+    probes; and the largest possible saving in seconds of another order.
 
-    Positions of equal kind keep the order they are given in. Of those that are not done, one may
-    have to be `first`.
+    Positions of one class keep their given order. One of the remaining may be required as `first`.
     """
     positions = [candidate for candidate in chosen if isinstance(candidate.item, Position)]
     after = first if first is not None else done_candidates[-1] if done_candidates else None

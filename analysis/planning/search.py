@@ -1,10 +1,9 @@
-"""Selections by local search: a greedy start, then exchanges while any makes the criterion smaller.
+"""Selections by local search: a greedy start, then exchanges while one lowers the criterion.
 
 An exchange adds one matrix to that of the remaining selection and factors the sum. A position read
-with a whole plate changes about half of the directions that count, and an update of that rank costs
-as much as the factor anew. What keeps a step cheap are small matrices and a sieve: of all
-candidates that could come in, those are evaluated in full that do best by the tangent of the
-criterion at the present selection.
+with a whole plate changes about half of the relevant directions, and an update of that rank costs
+as much as a new factor. Small matrices and a sieve keep a step cheap: only candidates with the
+best tangents of the criterion at the present selection are evaluated in full.
 """
 
 from __future__ import annotations
@@ -52,7 +51,7 @@ COMPARED = 33
 
 @dataclass(frozen=True)
 class SelectionProblem:
-    """What is to be chosen from, by which criterion, within which limits."""
+    """Candidates, criterion and limits of a selection."""
 
     information: Information
     criterion: Criterion
@@ -60,17 +59,17 @@ class SelectionProblem:
 
     @cached_property
     def limits(self) -> Constraints:
-        """The constraints with what the criterion needs of every choice."""
+        """Constraints, with those that the criterion adds."""
         needed = tuple(placing for _, placing in self.criterion.needed)
         return replace(self.constraints, at_least=(*self.constraints.at_least, *needed))
 
     @property
     def counted(self) -> slice:
-        """The z that the criterion is about, the last: what is left when balls are eliminated."""
+        """The last z, which remain after elimination of balls and which the criterion concerns."""
         return slice(None) if self.criterion.about_balls else self.information.shared
 
     def lacking(self, chosen: Collection[int]) -> list[tuple[int, ...]]:
-        """Sets of candidates of which one has to be chosen, and none is."""
+        """Return required sets of candidates without a chosen member."""
         return [at_least for at_least in self.limits.at_least if set(at_least).isdisjoint(chosen)]
 
     def value(self, root: Array) -> float:
@@ -78,8 +77,8 @@ class SelectionProblem:
         return self.criterion.value(root[self.counted, self.counted])
 
     def tangent(self, root: Array, *power: float) -> tuple[float, float, Array]:
-        """As that of the criterion, with a square root H of the derivative by the covariance in
-        place of it: the derivative by the covariance of what counts is H H'.
+        """Return the criterion's tangent, with a square root H of the derivative by the covariance
+        of the counted z, H H', as its second part.
         """
         smooth, value, weight = self.criterion.tangent(root[self.counted, self.counted], *power)
         scale, directions = np.linalg.eigh(weight)
@@ -88,8 +87,8 @@ class SelectionProblem:
 
 @dataclass(frozen=True)
 class Found:
-    """A selection: indices of candidates, sorted, and the criterion, infinite where the selection
-    is deficient; then `lack` compares what it leaves undetermined.
+    """A selection: sorted indices of candidates, and the criterion, infinite if deficient; then
+    `lack` compares the undetermined directions.
     """
 
     chosen: tuple[int, ...]
@@ -103,8 +102,8 @@ class Found:
 
 
 def full_root(information: Array) -> Array | None:
-    """Root R of the covariance R R' of all z, upper triangular, from their information (z, z); None
-    if deficient.
+    """Return the upper triangular root R of the covariance R R' of all z from their information
+    (z, z), unless deficient.
     """
     try:
         factor = np.asarray(np.linalg.cholesky(information), float)
@@ -132,23 +131,21 @@ def _inverse(triangle: Array) -> Array:
 
 
 def _is_deficient(inverse: Array) -> bool:
-    """Whether something is undetermined, by the inverse (z, z) of a Cholesky factor: by the sum of
-    all variances.
+    """True if a direction is undetermined, by the sum of all variances from the inverse (z, z) of
+    a Cholesky factor.
 
-    A small pivot is a sure sign as well, but often there is none: of a null vector whose last
-    components are small, rounding or the ridge is divided by their squares, and spread over several
-    pivots.
+    A small pivot is sufficient but not necessary: of a null vector whose last components are
+    small, rounding or the ridge is divided by their squares, and spread over several pivots.
     """
     return bool(np.vdot(inverse, inverse) > 1.0 / UNDETERMINED)
 
 
 class Losses:
-    """What is made small, of selections, each computed once: the criterion, or for deficient ones
-    something larger.
+    """Loss of selections, each computed once: the criterion, or a larger value for deficient ones.
 
-    With `by_pivots` a selection counts as deficient by a small pivot alone. Some that are deficient
-    then count as if they were not, with the criterion that the ridge leaves them: no verdict, but
-    it leads from selections that are just enough to others.
+    With `by_pivots` a selection counts as deficient by a small pivot alone. Some deficient ones
+    then have the criterion that the ridge gives them: not a verdict, but a path between selections
+    that are just sufficient.
     """
 
     def __init__(self, problem: SelectionProblem, by_pivots: bool = False) -> None:
@@ -183,7 +180,7 @@ class Losses:
 
 
 def _ridged_root(information: Array) -> Array | None:
-    """Square root of the inverse of information (z, z) with the ridge; None where a pivot is
+    """Return a square root of the inverse of information (z, z) with the ridge, unless a pivot is
     small.
     """
     factor = np.asarray(np.linalg.cholesky(_ridged(information)), float)
@@ -191,11 +188,10 @@ def _ridged_root(information: Array) -> Array | None:
 
 
 def _in_place(information: Array) -> float:
-    """What is made small in place of the criterion, of information (z, z) that leaves something
-    undetermined.
+    """Return the substitute loss of deficient information (z, z).
 
-    It falls with the determinant, so that what determines most directions, and those best, is
-    chosen first.
+    It falls with the determinant, so that candidates that determine most directions, and those
+    best, come first.
     """
     scale = _scale(information)
     root = np.sqrt(scale)
@@ -206,27 +202,25 @@ def _in_place(information: Array) -> float:
 
 
 def _scale(information: Array) -> Array:
-    """What rounding is relative to in each of the z of information (..., z, z): 1, or more beside
-    what is exact.
+    """Return the reference of rounding for each of the z of information (..., z, z): 1, or more
+    next to exact values.
     """
     return np.maximum(np.diagonal(information, axis1=-2, axis2=-1), 1.0)
 
 
 def _ridged(information: Array) -> Array:
-    """Information (..., z, z) with the ridge, which makes it positive definite whatever is
-    undetermined.
-    """
+    """Return information (..., z, z) with the ridge, which makes it positive definite."""
     return information + RIDGE * _scale(information)[..., None] * np.eye(information.shape[-1])
 
 
 def _sieve(
     problem: SelectionProblem, information: Array, added: Integers, by_pivots: bool = False
 ) -> tuple[Integers, Array]:
-    """Candidates that may be the best to add to `information`, and the criterion's tangent with
-    each of them.
+    """Return the candidates that may be the best addition to `information`, and the criterion's
+    tangent with each.
 
-    The first sieve is the slope of the criterion where something of every candidate is added, the
-    second its tangent there with each candidate added by itself.
+    The first sieve is the slope of the criterion as a little of every candidate is added, the
+    second its tangent with each candidate added separately.
     """
     whole, matrices = np.eye(len(information)), problem.information.matrices
     # All candidates together have the identity, up to what the base has.
@@ -254,9 +248,10 @@ def _sieve(
 def best_addition(
     problem: SelectionProblem, members: frozenset[int], losses: Losses, per_second: bool = False
 ) -> tuple[int, float] | None:
-    """The candidate that lowers the criterion most within the limits, and the criterion with it.
+    """Return the candidate that lowers the criterion most within the limits, and the criterion
+    with it, if one may be added.
 
-    None if none may be added. With `per_second` the gain is divided by what a candidate takes.
+    With `per_second` the improvement is divided by the candidate's duration.
     """
     added = problem.constraints.additions(members)
     lacking = problem.lacking(members)
@@ -282,10 +277,10 @@ def best_addition(
 def fill(
     problem: SelectionProblem, chosen: Collection[int], losses: Losses, thorough: bool = True
 ) -> frozenset[int]:
-    """Add candidates, the best first, as long as the limits allow one and it gains anything.
+    """Add candidates, the best first, while the limits allow one and it lowers the criterion.
 
-    Where time is limited and the filling `thorough`, what is best may also be what gains most for
-    the time it takes, whichever ends better.
+    If time is limited and the filling `thorough`, the better of two results counts: largest
+    improvement first, or largest improvement per second first.
     """
     timed = thorough and problem.constraints.budget.seconds is not None
     ways = (False, True) if timed else (False,)
@@ -314,11 +309,11 @@ def improve(
     at_once: int,
     thorough: bool = False,
 ) -> Found:
-    """The best selection that exchanges lead to from a start within the limits.
+    """Return the best selection reached by exchanges from a start within the limits.
 
-    One candidate is taken out at a time and the gap filled anew until that gains nothing, then two,
-    and so on up to `at_once`. Where it is `thorough`, the gap is filled beginning with each
-    candidate in turn, which gets out of traps that tight limits set.
+    Removing one candidate and refilling the gap is repeated until it brings no improvement, then
+    with two, up to `at_once`. If `thorough`, the gap is filled beginning with each candidate in
+    turn, which escapes from traps of tight limits.
     """
     members = fill(problem, start, losses)
     size = 1

@@ -35,7 +35,7 @@ WITHOUT_DRIFT: Mapping[str, Any] = {"drift": {"point": 1e-6, "scale": 1e-6}, "or
 
 @dataclass(frozen=True, repr=False)
 class Campaign(Selection, Result):
-    """A selection that shows itself, with the run sheet of what was chosen."""
+    """A selection with its tables, pictures and run sheet."""
 
     @property
     def label(self) -> str:
@@ -66,7 +66,7 @@ class Campaign(Selection, Result):
         return in_time(self.experiment, self.sheet, self.pool.changes, self.names)
 
     def to_yaml(self, folder: str | Path = ".") -> str:
-        """The choice as the text of an experiment file that is to stand in a folder.
+        """Return the choice as the text of an experiment file for a folder.
 
         :raises ExperimentError: the experiment comes from no file.
         """
@@ -98,7 +98,7 @@ class Campaign(Selection, Result):
 
     @property
     def to_print(self) -> Any:
-        """The run sheet with what it is printed with: the table to fill in, and the points."""
+        """Return the run sheet with the table to fill in and the points."""
         return service("Sheet")(self.experiment, self.sheet)
 
     def headline(self) -> str:
@@ -109,8 +109,8 @@ class Campaign(Selection, Result):
         return f"{count}, {self.criterion} {value}"
 
     def lines(self) -> list[str]:
-        """The choice beside its bound, gains, the curve, U1 to U6 and the run sheet, as lines of
-        text.
+        """Return the choice with its bound, effects, the curve, U1 to U6 and the run sheet, as
+        lines of text.
         """
         lines = [
             f"{self.prediction.label}: {self.prediction.title}",
@@ -184,20 +184,20 @@ class Campaign(Selection, Result):
         return list(sheet_data(self.sheet)["steps"])
 
     def plot(self, path: str | Path | None = None) -> Figure:
-        """The criterion against the budget, what each position gains, and the positions in the
-        volume.
+        """Draw the criterion against the limit of time, the effect of each position, and the
+        positions in the volume.
 
         With a path, which ends in .svg, .png or .pdf, the picture is written as well.
 
-        :raises ImportError: matplotlib is missing.
-        :raises ValueError: the path ends in something else.
+        :raises ImportError: matplotlib is missing. :raises ValueError: the path has another
+            suffix.
         """
         figure: Figure = service("draw_campaign")(self, path)
         return figure
 
 
 def _interrupted(campaign: Campaign) -> list[str]:
-    """What becomes of positions that were read in part."""
+    """Return lines on positions that were read in part."""
     names = {position.name for position in campaign.chosen}
     lines = []
     for position in campaign.interrupted:

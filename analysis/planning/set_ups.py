@@ -17,8 +17,8 @@ AGAIN = re.compile(r"(.*) again(?: ([1-9][0-9]*))?", re.DOTALL)
 class SetUp:
     """Readings of one set-up of the candidate `base` of a pool.
 
-    `read` has the readings that were taken, `whole` those that were planned as well, and `rest`
-    what is still missing, None where nothing is. `is_last` marks the set-up that was read last.
+    `read` has the readings taken, `whole` the planned ones too, and `rest` the missing ones, if
+    any are missing. `is_last` marks the last set-up.
     """
 
     base: int
@@ -47,7 +47,7 @@ def renamed(candidate: Candidate, name: str) -> Candidate:
 
 
 def next_name(name: str, names_taken: Sequence[str]) -> str:
-    """The name of a further set-up of a position, which nothing else has.
+    """Return an unused name for a further set-up of a position.
 
     >>> next_name("low", ["low"]), next_name("low", ["low", "low again"])
     ('low again', 'low again 2')

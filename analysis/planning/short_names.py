@@ -17,11 +17,11 @@ OF_ALL = "="
 def short_names(
     order: Iterable[Candidate], names_known: Mapping[str, str], names_taken: Collection[str]
 ) -> dict[str, str]:
-    """Short names by the names of candidates, P1, P2 … by place in the order of measuring.
+    """Return short names by the names of candidates, P1, P2 … in the order of measuring.
 
-    Positions that somebody named keep their names, and those `known` from an earlier plan keep what
-    they were called there. No name is `taken`, nor differs from another in capitals alone; a number
-    in use is passed over, so that no number means two places.
+    Positions named in the file keep their names, and those `known` from an earlier plan keep
+    these. No name is `taken`, or differs from another in capitals alone; numbers in use are
+    skipped, so that each number means one position.
     """
     used = {name.casefold() for name in (*names_taken, *names_known.values())}
     names_found: dict[str, str] = {}
@@ -39,7 +39,7 @@ def short_names(
 
 
 def is_composed(candidate: Candidate) -> bool:
-    """Whether the name of a candidate was composed of its place, not given by somebody."""
+    """True if the pool composed the candidate's name."""
     return (
         isinstance(candidate.item, Position)
         and not candidate.drawn
@@ -71,7 +71,7 @@ def with_short_name(candidate: Candidate, name: str, probes: tuple[str, ...]) ->
 
 
 def with_names(experiment: Experiment, names: Mapping[str, str]) -> Experiment:
-    """The experiment with what it says of single positions under their short names."""
+    """Return the experiment with its statements on single positions under short names."""
     influences = tuple(
         influence.model_copy(update={"positions": renamed(old_positions, names)})
         if (old_positions := getattr(influence, "positions", None)) is not None
@@ -87,7 +87,7 @@ def with_names(experiment: Experiment, names: Mapping[str, str]) -> Experiment:
 
 
 def renamed_of_all(column: str | None, names: Mapping[str, str]) -> str | None:
-    """A table's column of positions, or where it is =NAME, the position of all rows, by its short
+    """Return a table's column of positions, or the position of all rows stated as =NAME, by short
     name.
     """
     if column is None or not column.startswith(OF_ALL):
@@ -97,7 +97,7 @@ def renamed_of_all(column: str | None, names: Mapping[str, str]) -> str | None:
 
 
 def renamed(settings: Mapping[str, Any] | Sequence[str], names: Mapping[str, str]) -> Any:
-    """What is stated by position, or a list of positions, by short names."""
+    """Return settings by position, or a list of positions, by short names."""
     if isinstance(settings, Mapping):
         return {names.get(name, name): value for name, value in settings.items()}
     new_names = [names.get(name, name) for name in settings]
@@ -105,7 +105,7 @@ def renamed(settings: Mapping[str, Any] | Sequence[str], names: Mapping[str, str
 
 
 def names_of_plan(chosen: Experiment, candidates: Collection[str]) -> dict[str, str]:
-    """What the file of an earlier plan calls candidates, by their names in the pool."""
+    """Return the candidates' names in the file of an earlier plan, by their names in the pool."""
     return {
         position.description: position.name
         for position in chosen.positions
