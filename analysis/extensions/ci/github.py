@@ -16,10 +16,9 @@ from ballplate.simulator.inputs import in_lines, in_one_line
 
 
 def annotation_lines(checked: CheckedFile, workspace: Path | None = None) -> list[str]:
-    """One line for each error of a file and for each design; those as expected are told without a
-    mark.
+    """Return one line per error of a file and per design, without a mark if as expected.
 
-    Files are named from `workspace`, the top of the repository, where they lie in it.
+    File names are relative to `workspace`, the top of the repository, if they are in it.
     """
     lines = [
         _error(

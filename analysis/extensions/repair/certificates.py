@@ -102,7 +102,9 @@ def calibrated_distances(artefact: str, words: str, item: DistanceCalibration) -
 
 
 def like_distances(experiment: Experiment, artefact: str) -> DistanceCalibration:
-    """Distances of an artefact, none yet, as certain as others of it, or else as readings."""
+    """Return distances of an artefact without any, with the uncertainty of its other calibrations,
+    or else of readings.
+    """
     calibrations = [
         c
         for c in experiment.calibration
@@ -123,8 +125,8 @@ def like_distances(experiment: Experiment, artefact: str) -> DistanceCalibration
 
 
 def natural_distances(layout: BallLayout) -> Iterator[tuple[str, Indices]]:
-    """Words and pairs (m, 2) of single distances along the edges, diagonals and rows, and of sets
-    of them.
+    """Return names and pairs (m, 2) of single distances along the edges, diagonals and rows, and
+    of sets of these pairs.
     """
     n = len(layout.names)
     if n < 2:
@@ -156,8 +158,8 @@ def natural_distances(layout: BallLayout) -> Iterator[tuple[str, Indices]]:
 
 
 def row_pairs(layout: BallLayout) -> list[tuple[int, int]]:
-    """Balls on the same line along x or y as an outer ball of it, no more than `MOST_DISTANCES`,
-    evenly from all.
+    """Return pairs of an outer ball and the balls on its line along x or y, at most
+    `MOST_DISTANCES`, evenly spread.
     """
     chosen_pairs = []
     xy = np.round(layout.coordinates[:, :2], 9)
@@ -174,7 +176,7 @@ def row_pairs(layout: BallLayout) -> list[tuple[int, int]]:
 
 
 def length_words(value: LengthFunction) -> str:
-    """An uncertainty that may grow with length, in words."""
+    """Return an uncertainty, constant or growing with length, as text."""
     constant = format_length(value.constant)
     return f"{constant} + L/{1.0 / value.slope:.6g}" if value.slope else constant
 

@@ -1,4 +1,4 @@
-"""A change of an experiment: in words, with its price, and as a function from experiment to
+"""A change of an experiment: its description, its price, and a function from experiment to
 experiment.
 """
 
@@ -22,7 +22,7 @@ from ballplate.simulator.machines import Array
 
 
 class ChangeKind(IntEnum):
-    """What is changed, the cheapest first."""
+    """Classes of changes, the cheapest first."""
 
     POOL = 0
     MOVE = 1
@@ -54,13 +54,13 @@ KINDS = {
 
 @dataclass(frozen=True, eq=False)
 class Change:
-    """What may be changed of an experiment.
+    """Possible change of an experiment.
 
-    `words` is an imperative sentence. `cost` compares changes of one kind: seconds for candidates
-    of a pool, otherwise readings or distances more. Two changes that touch the same thing do not go
-    together. `adds` is what is observed besides, where everything else stays as it is: a
-    calibration item, a position, or the further readings in the position that `of` names.
-    `candidate` is the index of the pool's candidate, -1 where it is none.
+    `words` is an imperative sentence. `cost` compares changes of one class: seconds for candidates
+    of a pool, otherwise additional readings or distances. Two changes of the same subject exclude
+    each other. `adds` is the additional observation of a change that only adds: a calibration
+    item, a position, or the further readings in the position that `of` names. `candidate` is the
+    index of the pool's candidate, or -1.
     """
 
     kind: ChangeKind
@@ -81,7 +81,7 @@ def apply_all(changes: Sequence[Change], experiment: Experiment) -> Experiment:
 
 
 def go_together(changes: Sequence[Change]) -> bool:
-    """Whether no two of the changes touch the same."""
+    """True if no two changes concern the same subject."""
     touched = [name for change in changes for name in change.touches]
     return len(touched) == len(set(touched))
 
@@ -89,7 +89,7 @@ def go_together(changes: Sequence[Change]) -> bool:
 def is_inside(
     position: Position, layout: BallLayout, volume: Volume, probes: Mapping[str, Probe]
 ) -> bool:
-    """Whether all scale readings of a position are in the volume, as in a file."""
+    """True if all scale readings of a position are in the volume, as in a file."""
     places = ball_coordinates(position.pose, layout)
     lower, upper = volume.of_readings
     for group in position.readings:
@@ -121,7 +121,7 @@ def moved(position: Position, rotation: Array, origin: Array) -> Position:
 
 
 def further(position: Position, probe: str) -> Position:
-    """Everything that is read in a position, read once with another probe, and nothing else."""
+    """Return all readings of a position, taken once with another probe."""
     every = {
         int(i): name
         for group in position.readings
@@ -138,8 +138,8 @@ def further(position: Position, probe: str) -> Position:
 def with_further(
     experiment: Experiment, name: str, more: Position, probes: Mapping[str, Probe]
 ) -> Experiment:
-    """The experiment with the readings of `more` in the position `name` besides, with probes that
-    may be new.
+    """Return the experiment with the readings of `more` added to position `name`, and with any new
+    probes.
     """
     (group,) = more.readings
     position = _named(experiment, name)
@@ -164,7 +164,7 @@ def with_pose(experiment: Experiment, name: str, pose: Pose) -> Experiment:
 
 
 def with_repeats(experiment: Experiment, name: str, times: int) -> Experiment:
-    """The experiment with everything in a position read so many times as often."""
+    """Return the experiment with every reading of a position repeated `count` times as often."""
     position = _named(experiment, name)
     groups = tuple(replace(group, repeats=times * group.repeats) for group in position.readings)
     return with_position(experiment, replace(position, readings=groups))
@@ -175,7 +175,7 @@ def _named(experiment: Experiment, name: str) -> Position:
 
 
 def pair_set(layout: BallLayout, chosen: Indices) -> str | None:
-    """Name of the set of pairs that indices (m, 2) are, None if they are none."""
+    """Return the name of the set of pairs that indices (m, 2) form, if it has one."""
     wanted = {frozenset(pair) for pair in chosen.tolist()}
     for name in (*layout.pair_sets, "all"):
         if name == "all" and len(wanted) != len(layout.names) * (len(layout.names) - 1) // 2:
@@ -190,7 +190,7 @@ def pair_set(layout: BallLayout, chosen: Indices) -> str | None:
 
 
 def ball_set(layout: BallLayout, chosen: Indices) -> str | None:
-    """`all` or `corners` where indices are those, None otherwise."""
+    """Return `all` or `corners` if the indices are those."""
     wanted = set(chosen.tolist())
     if len(wanted) == len(layout.names):
         return "all"
@@ -200,8 +200,8 @@ def ball_set(layout: BallLayout, chosen: Indices) -> str | None:
 def with_artefact(
     experiment: Experiment, name: str, settings: ArtefactSettings
 ) -> Experiment | None:
-    """The experiment with another artefact of that name; None where what is said of its balls would
-    not carry over.
+    """Return the experiment with another artefact of that name, if the statements on its balls
+    still apply.
     """
     old, new = experiment.layouts[name], settings.layout()
     places = []

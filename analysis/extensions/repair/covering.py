@@ -56,10 +56,10 @@ def covering_set(
     effort: Callable[[Change], float],
     may_be: Callable[[Sequence[Change]], bool],
 ) -> tuple[Change, ...]:
-    """A set built up of what removes most null directions for its effort each time; empty if some
-    stay.
+    """Return a set in which each member removes most null directions for its effort; empty if some
+    remain.
 
-    What the others make superfluous is left out again, the most expensive first.
+    Members made superfluous by later ones are removed, the most expensive first.
     """
     if not additions:
         return ()
@@ -84,13 +84,13 @@ def covering_set(
 
 
 def open_of(rows: Array) -> Array:
-    """Orthonormal columns (k, open) that rows (m, k) say nothing of."""
+    """Return orthonormal columns (k, open) of the null space of rows (m, k)."""
     _, values, directions = np.linalg.svd(rows)
     return directions[int((values > SEEN).sum()) :].T
 
 
 def _may_cover(first: Array, second: Array) -> bool:
-    """Whether what two leave open each is not too much for them to leave nothing together."""
+    """True if the dimensions allow two changes to leave no direction undetermined together."""
     return first.shape[1] + second.shape[1] <= len(first)
 
 

@@ -13,13 +13,13 @@ from ballplate.simulator.inputs import ensure_path, read_text
 
 
 def repair(path: PathLike, variant: str | None = None) -> str:
-    """The text of an experiment file after the first changes of `check --suggest` that determine
-    everything, of one variant or of each; the rest of it is as it was, line ends included.
+    """Return the text of an experiment file with the first full repair of `check --suggest`, for
+    one variant or for each; the rest keeps every byte, line ends included.
 
-    The text of a file that leaves nothing undetermined is returned as it is. Nothing is written.
+    A file without undetermined parameters is returned unchanged. No file is written.
 
-    :raises ExperimentError: the file is wrong; no changes were found, or they cannot be written
-        without changing the rest of the file.
+    :raises ExperimentError: the file cannot be used; no changes were found, or writing them would
+        change the rest of the file.
 
     >>> import ballplate as bp
     >>> line = "    positions[z low].quarter_turns: 1"

@@ -22,12 +22,12 @@ COMPONENT_TOLERANCE = 1e-6
 
 @dataclass(frozen=True)
 class Judged:
-    """A design's rank and what it knows least.
+    """Rank of a design and its least determined direction.
 
-    `weak` counts weakly determined directions, `worst` is what one standard deviation along the
-    weakest adds to corrected points, and `spread` the same of all directions together, in metres.
-    `open_errors` (model parameters, deficiency) is what null directions do to the machine, scaled
-    to micrometres.
+    `weak` counts weakly determined directions, `worst` is the effect of one standard deviation
+    along the weakest on corrected points, and `spread` that of all directions together, in metres.
+    `open_errors` (model parameters, deficiency) are the machine errors of null directions, in
+    micrometres.
     """
 
     deficiency: int
@@ -39,7 +39,7 @@ class Judged:
 
     @property
     def is_cured(self) -> bool:
-        """Whether nothing is undetermined, or weakly determined."""
+        """True if every direction is determined, none of them weakly."""
         return not self.deficiency and not self.weak
 
     @property
@@ -72,7 +72,7 @@ class Examined:
 
 
 def examine(experiment: Experiment) -> Examined:
-    """Rank of an experiment's design in full, without what only its pool places.
+    """Return the rank of an experiment's full design, without artefacts that only its pool uses.
 
     :raises ExperimentError: the design cannot be laid out.
     """
@@ -80,8 +80,8 @@ def examine(experiment: Experiment) -> Examined:
 
 
 def judge(experiment: Experiment, changes: Sequence[Change] = ()) -> Judged | None:
-    """What an experiment determines after changes; None where they contradict something else that
-    it says.
+    """Return the rank of an experiment after changes, unless these contradict other statements in
+    it.
     """
     try:
         return examine(apply_all(changes, experiment)).judged
@@ -95,10 +95,10 @@ def work(base: Examined) -> float:
 
 
 def removed(before: Array, after: Array) -> tuple[int, ...]:
-    """Which null directions, told by what they do to the machine (parameters, k), are no part of
-    those afterwards.
+    """Return the null directions, described by their machine errors (parameters, k), that are
+    outside the space of those afterwards.
 
-    Directions that do nothing to the machine, or the same as others, are never reported as removed.
+    Directions without machine errors, or with those of others, are never reported as removed.
     """
     if not after.shape[1]:
         return tuple(range(before.shape[1]))

@@ -32,10 +32,10 @@ READINGS = ("probes", "balls", "repeats", "standard_uncertainty", "readings")
 
 
 def to_write(repairs: Repairs | None, judged: Verdict, nothing_weak: bool = False) -> Repair | None:
-    """The repair of a design that may be written without being asked about: the cheapest; None
-    where none is needed, or where it repairs the design in name only.
+    """Return the cheapest repair, which may be written without a question, unless the design needs
+    none or it would repair the design in name only.
 
-    A design that leaves nothing undetermined needs one where `nothing_weak` is to be left either.
+    With `nothing_weak` a weakly determined design needs one too.
     """
     if repairs is None or not repairs.complete or not (judged.deficiency or nothing_weak):
         return None
@@ -47,13 +47,13 @@ def to_write(repairs: Repairs | None, judged: Verdict, nothing_weak: bool = Fals
 def mended(
     text: str, source: Path, variant: str | None, repair: Repair, trust: Trust = UNKNOWN
 ) -> str:
-    """The text of an experiment's file with a repair in it; what a variant does not say itself is
+    """Return the text of an experiment's file with a repair; values that a variant inherits are
     changed for that variant alone.
 
-    The experiment is loaded from the new text, and its rank computed from that.
+    The new text is loaded and its rank computed.
 
-    :raises ExperimentError: the repair cannot be written without changing what stands about it, or
-        what others refer to.
+    :raises ExperimentError: writing the repair would change neighbouring text, or text that
+        aliases     refer to.
     """
     loaded = load(source, True, trust, text)
     (experiment,) = (
@@ -81,7 +81,7 @@ def mended(
 
 
 def _taken_from_pool(experiment: Experiment, repair: Repair) -> Iterator[TextChange]:
-    """What the pool no longer offers, as it is in the experiment now."""
+    """Remove chosen candidates from the pool, as in the present experiment."""
     settings, pool = to_python(experiment.tree).get("pool") or {}, experiment.pool
     indices = [change.candidate for change in repair.changes if change.candidate >= 0]
     in_pool = {pool.candidates[k].name for k in indices} if pool is not None else set()
@@ -103,13 +103,12 @@ def with_experiment(
     needed: Iterable[Edit] | None = None,
     extra: Iterable[TextChange] = (),
 ) -> str:
-    """The text of an experiment's file that says what has changed of it; what a variant does not
-    say itself is changed for that variant alone.
+    """Return the text of an experiment's file with the changes of the experiment; values that a
+    variant inherits are changed for that variant alone.
 
-    `needed` are the edits where these are known, and `extra` changes are made besides.
+    `needed` are the edits, if known, and `extra` further changes.
 
-    :raises ExperimentError: this cannot be written without changing what stands about it, or what
-        others refer to.
+    :raises ExperimentError: writing would change neighbouring text, or text that aliases refer to.
     """
     before = {experiment.name: experiment}
     if experiment.name is not None:
@@ -149,9 +148,9 @@ def with_experiment(
 def with_text_changes(
     text: str, source: Path, variant: str | None, changes: Iterable[TextChange]
 ) -> str:
-    """The text with changes of what it says of a variant, or of its only experiment.
+    """Return the text with changes of a variant, or of its only experiment.
 
-    :raises ExperimentError: as `with_experiment` does.
+    :raises ExperimentError: as for `with_experiment`.
     """
     for change in changes:
         for path in _in_file(parse_tree(text, str(source)), variant, change):
@@ -160,7 +159,7 @@ def with_text_changes(
 
 
 def changes_of(experiment: Experiment, needed: Iterable[Edit]) -> Iterator[TextChange]:
-    """What the experiment's own file would have to say otherwise, of a variant's its tree."""
+    """Return the necessary changes of the experiment's file, for a variant those of its tree."""
     experiment_settings = to_python(experiment.tree)
     places = {place.name: place for place in experiment.positions}
     needed = tuple(needed)
@@ -197,8 +196,8 @@ def changes_of(experiment: Experiment, needed: Iterable[Edit]) -> Iterator[TextC
 def _of_position(
     steps: Steps, settings: Mapping[str, Any], before: dict[str, Any], after: dict[str, Any]
 ) -> Iterator[TextChange]:
-    """Changes of what a file says of a position, whose settings were `before`, however it says
-    them.
+    """Return the changes of a position in a file, whose settings were `before`, in the form the
+    file uses.
     """
     for group in (PLACEMENT, READINGS):
         if {key: before.get(key) for key in group} == {key: after.get(key) for key in group}:
@@ -235,9 +234,9 @@ def _of_value(steps: Steps, setting: Any, before: Any, after: Any) -> Iterator[T
 
 
 def _in_file(root: Node, variant: str | None, change: TextChange) -> Iterator[TextChange]:
-    """The change where the file has to be changed for one variant, whose new values have paths.
+    """Return the change for one variant, whose new values have paths.
 
-    :raises ExperimentError: the variant has a value for a part of the place already.
+    :raises ExperimentError: the variant already has a value below this path.
     """
     if variant is None:
         yield change
@@ -265,7 +264,7 @@ def _in_file(root: Node, variant: str | None, change: TextChange) -> Iterator[Te
 
 
 def _path_of(root: Node, steps: Steps) -> str:
-    """The path of a place for a variant, of a position by its name where that is clear."""
+    """Return the path for a variant, with a position's name if that is unique."""
     if len(steps) > 1 and isinstance(steps[1], int):
         name = written(root, steps[0], steps[1], "name")
         named = f"{steps[0]}[{getattr(name, 'value', '')}]"

@@ -29,11 +29,10 @@ BAD_FILE = 3
 def with_repairs(
     checked: CheckedFile, wanted: Wanted, options: Namespace
 ) -> tuple[CheckedFile, int]:
-    """A checked file after the cheapest repair of each of its designs was written into it; with
-    `options.diff` it is as before, and the difference is printed.
+    """Write the cheapest repair of each design into a checked file and return its new check; with
+    `options.diff` print the difference instead.
 
-    Designs that could not be repaired are as they were, with what is suggested. The number is the
-    exit status that this demands at least.
+    Unrepaired designs keep their suggestions. The number is the least exit status.
     """
     path = Path(checked.file)
     repaired: set[str | None] = set()
@@ -87,20 +86,20 @@ def with_repairs(
 
 
 def _as_asked(design: CheckedDesign, with_suggestions: bool) -> CheckedDesign:
-    """Without suggestions where nothing is undetermined, unless these were asked for."""
+    """Remove suggestions of sufficient designs, unless requested."""
     if with_suggestions or design.prediction.verdict.deficiency:
         return design
     return advised(replace(design, suggestions=Suggestions()))
 
 
 def _suggestions(design: CheckedDesign) -> Suggestions:
-    """What was suggested of a design; nothing where nothing was looked for."""
+    """Return the suggestions of a design; empty without a search."""
     suggestions = design.suggestions
     return suggestions if isinstance(suggestions, Suggestions) else Suggestions()
 
 
 def _text(path: Path) -> tuple[str, str]:
-    """The byte order mark of a file, or nothing, and its text.
+    """Return the byte order mark of a file, possibly empty, and its text.
 
     :raises ExperimentError: it is not a file that can be changed.
     """
@@ -111,9 +110,9 @@ def _text(path: Path) -> tuple[str, str]:
 
 
 def _write(path: Path, mark: str, text: str, new: str, options: Namespace) -> int:
-    """Put a new text in the place of a file that has still the old one; the exit status.
+    """Replace a file that still has the old text; return the exit status.
 
-    :raises ExperimentError: it has not, or cannot be written.
+    :raises ExperimentError: the text has changed, or the file cannot be written.
     """
     with options.interruption.held():
         check_overwritten(path)
@@ -128,7 +127,7 @@ def _write(path: Path, mark: str, text: str, new: str, options: Namespace) -> in
 
 
 def difference(text: str, new: str, file: str) -> Iterator[str]:
-    r"""Lines of a unified difference, with their ends; nothing where there is none.
+    r"""Return the lines of a unified difference with their ends; empty if the texts are equal.
 
     >>> print(*difference("a: 1\nb: 2", "a: 3\nb: 2", "f.yaml"), sep="", end="")
     --- f.yaml

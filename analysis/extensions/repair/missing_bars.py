@@ -1,10 +1,10 @@
-"""Reasons why bars and gauges leave scales or squareness undetermined: missing directions,
-unknown lengths.
+"""Reasons why bars and gauges leave scales or squareness undetermined: missing directions, unknown
+lengths.
 
-A bar in direction u tells of small strains of the machine's axes, a symmetric matrix S, only u' S
-u: a sum of the six products of its direction cosines. From a Bryan gauge comes the same less what a
-shift of its pivot would do. What is undetermined of the six is described by what the bars have in
-common.
+A bar in direction u observes u' S u of the small strains of the machine's axes, a symmetric matrix
+S: a sum of the six products of its direction cosines. A Bryan gauge observes the same less the
+effect of a shift of its pivot. A common property of all bars describes the undetermined part of
+the six.
 """
 
 from __future__ import annotations
@@ -25,7 +25,9 @@ AXES = "xyz"
 
 
 def bar_reasons(design: Design, layout: SharedLayout, open_: Array) -> tuple[str, ...]:
-    """What bars and gauges lack, given what changes of the shared parameters (s, k) are open."""
+    """Return the shortcomings of bars and gauges, given undetermined changes of the shared
+    parameters (s, k).
+    """
     if not len(design.of(Lengths)) or not open_.shape[1] or not len(design.evaluation.points):
         return ()
     strains = _open_strains(design, layout, open_)
@@ -76,10 +78,10 @@ def _open_strains(design: Design, layout: SharedLayout, open_: Array) -> Array:
 
 
 def _what_is_missing(design: Design, strains: Array, unseen: Array) -> str:
-    """What all directions have in common that leaves strains open; empty where another reason must
-    do.
+    """Return the common property of all directions that leaves strains undetermined, or an empty
+    text if there is another reason.
 
-    `left` is what remains of the open strains without the overall scale of a machine whose lengths
+    `left` is the undetermined strain space without the overall scale of a machine whose lengths
     are all unknown.
     """
     lengths, d = design.of(Lengths), design.dimension
@@ -138,8 +140,8 @@ def _quadric(form: Array) -> str:
 
 
 def _told(strains: Array, d: int, without_one: bool) -> str:
-    """Scales and squareness that are open by themselves, in words; others as mixtures of them, one
-    of them left out.
+    """Return text for scales and squareness that are separately undetermined, and for mixtures of
+    others, one of these omitted.
     """
     pairs = list(combinations_with_replacement(range(d), 2))
     pure = [
@@ -217,7 +219,7 @@ def _unit_strain(form: Array) -> Array:
 
 
 def _is_among(strain: Array, span: Array) -> bool:
-    """Whether a strain of length one is a mixture of orthonormal ones."""
+    """True if a strain of length one is a mixture of orthonormal ones."""
     return bool(np.linalg.norm(strain - span @ (span.T @ strain)) < 10 * MISSING)
 
 
@@ -228,7 +230,7 @@ def _less(span: Array, direction: Array) -> Array:
 
 
 def _null_space(rows: Array, size: float | None = None) -> Array:
-    """Orthonormal columns that the rows leave all but alone."""
+    """Return orthonormal columns that the rows map almost to zero."""
     triangle = np.linalg.qr(rows, mode="r") if len(rows) > rows.shape[1] else rows
     _, values, directions = np.linalg.svd(triangle)
     largest = values.max(initial=0.0) if size is None else size

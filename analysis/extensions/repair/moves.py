@@ -100,7 +100,7 @@ def _laid(experiment: Experiment, place: Position) -> Iterator[tuple[str, tuple[
 
 
 def more_readings(experiment: Experiment) -> Iterator[Change]:
-    """Positions read with further probes, those there are and, where they lie on one line, new
+    """Return positions read with further probes: existing ones and, if these are on one line, new
     ones.
     """
     tips = new_tips(experiment)
@@ -139,7 +139,7 @@ def repeats(experiment: Experiment) -> Iterator[Change]:
 
 
 def new_tips(experiment: Experiment) -> dict[str, Probe]:
-    """Probes opposite and perpendicular to those there are, where all of them lie on one line."""
+    """Return probes opposite and perpendicular to the existing ones, if these are on one line."""
     probes = experiment.probes.values()
     if experiment.dimension == 2 or any(probe.is_estimated for probe in probes):
         return {}

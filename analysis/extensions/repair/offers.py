@@ -17,10 +17,10 @@ Generator = Callable[[Experiment], Iterator[Change]]
 
 
 def offers(experiment: Experiment, is_deficient: bool = True) -> dict[ChangeKind, list[Change]]:
-    """Changes that stay within the volume, by kind; additions are those of the pool where the
+    """Return changes within the volume, by class; additions are those of the pool, if the
     experiment has one.
 
-    What only makes observations more certain is offered where none is missing.
+    Changes that only reduce uncertainties are offered if no observation is missing.
     """
     makers: list[tuple[ChangeKind, Generator]] = [
         (ChangeKind.MOVE, moves),
@@ -71,13 +71,13 @@ def pool_additions(experiment: Experiment) -> Iterator[Change]:
 
 
 def allowed(pool: Pool, chosen: tuple[int, ...]) -> bool:
-    """Whether the pool's limits allow candidates beside those that are drawn."""
+    """True if the pool's limits allow candidates in addition to chosen ones."""
     drawn = {k for k, candidate in enumerate(pool.candidates) if candidate.drawn} | set(chosen)
     return all(len(drawn & set(limit.members)) <= limit.count for limit in pool.at_most)
 
 
 def duration(seconds: float) -> str:
-    """A time in hours, or in minutes where it is less than one.
+    """Return a time in hours, or in minutes below one hour.
 
     >>> duration(5400), duration(90)
     ('1.5 h', '1.5 min')

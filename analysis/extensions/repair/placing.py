@@ -1,4 +1,4 @@
-"""Possible places of artefacts, and the distances between their balls."""
+"""Possible poses of artefacts, and the distances between their balls."""
 
 from __future__ import annotations
 

@@ -55,7 +55,9 @@ def positions(experiment: Experiment) -> Iterator[Change]:
 
 
 def with_added(experiment: Experiment, position: Position) -> Experiment:
-    """The experiment with one position more, by another name where it has one of that name."""
+    """Return the experiment with an additional position, under another name if this one is
+    in use.
+    """
     name = _free_name(experiment, position.name)
     return with_position(experiment, replace(position, name=name))
 

@@ -1,5 +1,5 @@
-"""Bars and places of a Bryan gauge that would determine what is undetermined: the smallest set
-of natural ones.
+"""Smallest sets of natural bars, or locations of a Bryan gauge, that determine the undetermined
+strains.
 """
 
 from __future__ import annotations
@@ -31,11 +31,11 @@ def products(u: Array) -> Array:
 
 
 def bars_to_add(design: Design, strains: Array, overall: Array | None) -> str:
-    """In words what would leave nothing open of strains (products, k) but the `overall` one; empty
-    if nothing simple.
+    """Return text for bars that would determine the strains (products, k) except the `overall`
+    one; empty without a simple set.
 
-    Every proposal is verified by the rank of what all lengths together tell of strains, pivots and
-    unknown lengths.
+    Every proposal is verified by the rank of all lengths together in strains, pivots and unknown
+    lengths.
     """
     lengths = design.of(Lengths)
     gauge_only = bool(lengths.to_pivot.all())
@@ -76,13 +76,13 @@ def _rows(design: Design, u: Array, like: np.ndarray) -> Array:
 
 
 def _leave_open(rows: Array, strains: Array) -> int:
-    """How many of the strains are still open."""
+    """Return the number of strains that remain undetermined."""
     values = np.linalg.svd(_what_is_told(rows, strains), compute_uv=False)
     return strains.shape[1] - int((values > SINGULAR_VALUE_TOLERANCE).sum())
 
 
 def _what_is_told(rows: Array, strains: Array) -> Array:
-    """What rows tell of strains (m, k), pivots and lengths taking up what they can."""
+    """Return the strain content of rows (m, k) after elimination of pivots and lengths."""
     size = len(strains)
     u, values, _ = np.linalg.svd(rows[:, size:], full_matrices=False)
     determined = u[:, values > SINGULAR_VALUE_TOLERANCE * max(values.max(initial=0.0), 1.0)]

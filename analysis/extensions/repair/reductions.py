@@ -65,7 +65,7 @@ def _with_artefact(experiment: Experiment, name: str, settings: Any) -> Experime
 
 
 def fewer_coefficients(experiment: Experiment) -> Iterator[Change]:
-    """An error model that asks for less."""
+    """Return an error model with fewer coefficients."""
     model = experiment.error_model
     if any(prior.by_model.any() for prior in experiment.priors):
         # They are about coefficients that there would be no more.

@@ -1,7 +1,7 @@
 """Search for the cheapest repairs of a deficient design.
 
-Every set of changes that is reported has been applied to the experiment, and the rank of the
-resulting design computed in full; none of its members can be left out.
+Every reported set of changes has been applied to the experiment, and the rank of the resulting
+design computed in full; every member is necessary.
 """
 
 from __future__ import annotations
@@ -44,15 +44,14 @@ MOST_VERIFIED = 8
 
 @dataclass(frozen=True, eq=False)
 class Repair:
-    """Changes that leave nothing undetermined, with the prediction of the changed design.
+    """Changes that determine every parameter, with the prediction of the changed design.
 
-    They take `readings` and `seconds` more. `loosened` are the lengths, U6, where probe offsets
-    that the file holds exact have a standard uncertainty of `OFFSET_TRIAL`, None where these are
-    undetermined. `removes` are the numbers, from 0, of the undetermined directions that are gone.
-    `weak` counts directions still weakly determined, of which `worst` is what one standard
-    deviation along the weakest adds to corrected points, in metres. `smallest` is the smallest
-    singular value, and `is_faint` says that it is far below those of the design before. `edits` is
-    what the file is to say.
+    They take `readings` and `seconds` more. `loosened` are the lengths, U6, if probe offsets that
+    the file holds exact have a standard uncertainty of `OFFSET_TRIAL` and the lengths remain
+    determined. `removes` are the indices, from 0, of the determined directions. `weak` counts
+    directions still weakly determined, `worst` is the effect of one standard deviation along the
+    weakest on corrected points, in metres. `smallest` is the smallest singular value; `is_faint`
+    is true if it is far below those of the design before. `edits` are the changes of the file.
     """
 
     changes: tuple[Change, ...]
@@ -70,14 +69,14 @@ class Repair:
 
     @property
     def rests_on_offsets(self) -> bool:
-        """Whether scale then rests on probe offsets that are held exact."""
+        """True if scale then rests on probe offsets that are held exact."""
         scale = None if self.prediction is None else self.prediction.scale
         return scale is not None and scale.rests_on_offsets
 
     @property
     def order(self) -> tuple[bool, bool, float, float]:
-        """The better, the smaller: what repairs in more than name and asks for no less, then by U6
-        with uncertain offsets, then by the time that it takes.
+        """Sort key: first repairs in more than name without a reduced model, then by U6 with
+        uncertain offsets, then by time.
         """
         u6 = inf if self.loosened is None else self.loosened.total / self.loosened.count
         asks_for_less = any(change.kind == ChangeKind.MODEL for change in self.changes)
@@ -86,10 +85,10 @@ class Repair:
 
 @dataclass(frozen=True)
 class Repairs:
-    """What was found: `complete` repairs, `partial` ones of single directions, and how much was
-    tried.
+    """Result of a search: `complete` repairs, `partial` ones of single directions, and the extent
+    of the search.
 
-    `tried` counts by kind the changes that were judged, and `sets` sets of several.
+    `tried` counts the changes judged by class, and `sets` sets of several.
     """
 
     complete: tuple[Repair, ...]
@@ -102,8 +101,8 @@ class Repairs:
 def repairs(
     experiment: Experiment, most: int = MOST_TOLD, report: Report = unreported
 ) -> Repairs | None:
-    """Repairs of an experiment's design, `most` at most; None where nothing is undetermined or
-    weakly determined.
+    """Return at most `most` repairs of an experiment's design, or None if no direction is
+    undetermined or weak.
     """
     base = examine(experiment)
     if base.judged.is_cured:
@@ -117,7 +116,7 @@ def effort(change: Change) -> float:
 
 
 class _Search:
-    """One search: what was judged, and how often."""
+    """One search: judged changes and their number."""
 
     def __init__(self, base: Examined, most: int) -> None:
         self.most = most
@@ -172,8 +171,8 @@ class _Search:
         )
 
     def ranked(self, repairs: Sequence[Repair]) -> tuple[Repair, ...]:
-        """The best repairs first; where even scale of the best rests on probe offsets, that with a
-        calibrated distance besides comes before it.
+        """Return the best repairs first; if even scale of the best rests on probe offsets, that
+        with an additional calibrated distance precedes it.
         """
         order = sorted(repairs, key=lambda repair: repair.order)
         if order and order[0].rests_on_offsets and self.base.experiment.pool is None:
@@ -186,7 +185,7 @@ class _Search:
         return tuple(order[: self.most])
 
     def is_worth_more(self, possible: Sequence[tuple[Change, ...]]) -> bool:
-        """Whether several changes of a kind may be better than the best one."""
+        """True if several changes of a class may be better than the best one."""
         cheapest = min(map(self.preference, possible), default=None)
         return cheapest is None or cheapest[0] or cheapest[1] > 1.0
 
@@ -195,8 +194,8 @@ class _Search:
         offered: Mapping[ChangeKind, Sequence[Change]],
         best: Mapping[ChangeKind, tuple[Change, ...]],
     ) -> Iterator[tuple[Change, ...]]:
-        """Sets of changes where no sound repair is known but to ask for less: additions first, then
-        moves as well.
+        """Return sets of changes if the only sound repairs reduce the model: additions first, then
+        moves too.
         """
 
         def is_enough(some: Iterable[tuple[Change, ...]]) -> bool:
@@ -229,26 +228,28 @@ class _Search:
                 return
 
     def useful(self, changes: Sequence[Change]) -> list[Change]:
-        """Changes less those that add nothing that is missing."""
+        """Return changes, without those that add only known directions."""
         return [change for change in changes if change not in self.seen or self.ranks[change]]
 
     def is_faint(self, after: Judged) -> bool:
-        """Whether what was undetermined is so little determined now that nobody would call it
+        """True if a former null direction is so weakly determined that it cannot count as
         known.
         """
         return self.before.deficiency > 0 and after.smallest < FAINT * self.before.smallest
 
     def is_sound(self, after: Judged) -> bool:
-        """Whether changes repair the design in more than name."""
+        """True if changes repair the design in more than name."""
         return after.is_cured and not self.is_faint(after)
 
     def helps(self, changes: tuple[Change, ...]) -> bool:
-        """Whether changes are worth reporting: full rank, or fewer weak directions."""
+        """True if changes give full rank, or fewer weak directions."""
         after = self.judge(changes)
         return after.deficiency < self.before.deficiency or after.weak < self.before.weak
 
     def judge(self, changes: Sequence[Change]) -> Judged:
-        """What changes lead to, remembered; as before where they are impossible."""
+        """Return the rank after changes, from memory if known; that of the design before if they
+        are impossible.
+        """
         key = frozenset(changes)
         if key not in self.judged:
             self.judged[key] = judge(self.base.experiment, changes)
@@ -259,8 +260,8 @@ class _Search:
         return self.judged[key] or self.before
 
     def preference(self, changes: tuple[Change, ...]) -> tuple[bool, float, int, float]:
-        """A repair that leaves nothing weak first, then the cheapest, then the one that leaves
-        least uncertain.
+        """Sort key: repairs without weak directions first, then the cheapest, then the least
+        uncertain.
         """
         after = self.judge(changes)
         return (
@@ -286,7 +287,7 @@ class _Search:
         return inf if lengths is None else float(comparable(lengths.total / lengths.count))
 
     def thinned(self, changes: Sequence[Change]) -> list[Change]:
-        """No more of them than can be judged, evenly from all."""
+        """Return as many as can be judged, evenly spread."""
         if len(changes) <= self.at_most:
             return list(changes)
         return [changes[k] for k in np.linspace(0, len(changes) - 1, self.at_most).astype(int)]
@@ -310,7 +311,7 @@ class _Search:
         return judged, part
 
     def cheapest(self, changes: Sequence[Change]) -> list[Change]:
-        """The first of a list in order of cost up to one that cures, and none beyond."""
+        """Return a list in order of cost, up to the first that cures."""
         tried = []
         for change in changes[: self.at_most]:
             tried.append(change)
@@ -319,7 +320,7 @@ class _Search:
         return tried
 
     def set_of_additions(self, changes: Sequence[Change]) -> tuple[Change, ...]:
-        """Several additions that together leave nothing undetermined; empty if there are none."""
+        """Return several additions that together determine every direction; possibly empty."""
         additions = [change for change in changes if change in self.seen and self.ranks[change]]
         nominal: tuple[Change, ...] = ()
         for together in self.cheapest_sets(additions):
@@ -346,7 +347,7 @@ class _Search:
         return [*sets[:MOST_VERIFIED], *([built] if len(built) > 1 else [])]
 
     def may_be(self, changes: Sequence[Change]) -> bool:
-        """Whether changes go together, in the pool's limits and within the volume."""
+        """True if changes are compatible, within the pool's limits and within the volume."""
         experiment = self.base.experiment
         pool = experiment.pool
         chosen = tuple(change.candidate for change in changes if change.candidate >= 0)
@@ -387,9 +388,7 @@ class _Search:
         return built
 
     def of_single_directions(self, singles: Sequence[Change]) -> tuple[Repair, ...]:
-        """For each null direction the cheapest single change after which it is no part of what is
-        open.
-        """
+        """Return, for each null direction, the cheapest single change that determines it."""
         if not self.before.deficiency:
             return ()
         open_errors = self.open_errors()
@@ -408,7 +407,7 @@ class _Search:
         )
 
     def open_errors(self) -> Array:
-        """What the null directions do to the machine, in the form in which they are reported."""
+        """Machine errors of the null directions, in the reported form."""
         return self.before.open_errors @ independent_mixture(self.base.at)
 
     def told(self, changes: tuple[Change, ...], removes: tuple[int, ...] | None = None) -> Repair:
@@ -442,7 +441,7 @@ def _loosened(experiment: Experiment) -> PairSummary | None:
 
 
 def _seconds_more(experiment: Experiment, changes: Sequence[Change]) -> float:
-    """Time that changes take, in seconds: what the pool states, else as long as usual."""
+    """Return the time of changes in seconds: stated in the pool, or as usual."""
     seconds = sum(change.cost for change in changes if change.kind == ChangeKind.POOL)
     additions = [change for change in changes if change.kind != ChangeKind.POOL]
     before = {place.name: seconds_of(place) for place in experiment.positions}

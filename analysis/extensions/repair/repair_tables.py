@@ -21,9 +21,7 @@ MOST_NAMES = 8
 
 
 def repair_lines(repairs: Repairs | None, judged: Verdict) -> list[str]:
-    """What was found, one repair after the other, each with what the file is to say; nothing where
-    all is well.
-    """
+    """Return lines of each repair, with its change of the file; empty for a sufficient design."""
     if repairs is None:
         return []
     lines = []
@@ -45,7 +43,7 @@ def repair_lines(repairs: Repairs | None, judged: Verdict) -> list[str]:
 
 
 def changes_in_words(repair: Repair) -> str:
-    """What a repair changes, as imperative sentences."""
+    """Return the changes of a repair as imperative sentences."""
     return "; and ".join(change.words for change in repair.changes)
 
 
@@ -77,12 +75,12 @@ def _worth(repair: Repair, judged: Verdict) -> str:
 
 
 def caveat(repair: Repair) -> str:
-    """That scale rests on offsets taken as exact after a repair; empty where it does not."""
+    """Return the note that scale rests on offsets taken as exact after a repair, if it does."""
     return "; scale rests on probe offsets taken as exact" if repair.rests_on_offsets else ""
 
 
 def _with_offsets(repair: Repair) -> str:
-    """What becomes of U6 where exact offsets are uncertain, if that is another."""
+    """Return U6 with uncertain offsets, if it differs."""
     if repair.prediction is None or repair.prediction.experiment is None:
         return ""
     if not exact_offsets(repair.prediction.experiment):
@@ -120,7 +118,7 @@ def _tried(repairs: Repairs) -> str:
 
 
 def certificate_lines(certificate: ScaleCertificate | None) -> list[str]:
-    """The certificate that carries scale, with what the file is to say; nothing where none is
+    """Return lines of the certificate that provides scale, with its change of the file, if one is
     needed.
     """
     if certificate is None:
@@ -136,8 +134,8 @@ def certificate_lines(certificate: ScaleCertificate | None) -> list[str]:
 
 
 def certificate_data(certificate: ScaleCertificate | None) -> dict[str, Any] | None:
-    """The same as plain data in metres; None where none is needed, and without a text where none
-    was found.
+    """Return that certificate as plain data in metres, if one is needed; without a text if the
+    search failed.
     """
     if certificate is None:
         return None
@@ -153,7 +151,7 @@ def certificate_data(certificate: ScaleCertificate | None) -> dict[str, Any] | N
 
 
 def repair_data(repairs: Repairs | None) -> dict[str, Any] | None:
-    """Repairs as plain data in metres at full precision; None where nothing is to be repaired."""
+    """Return repairs as plain data in metres at full precision, if any are needed."""
     if repairs is None:
         return None
     return {

@@ -21,11 +21,11 @@ HELPS = 2.0
 
 @dataclass(frozen=True)
 class ScaleCertificate:
-    """The calibrated distance with which U6 is smallest where the offsets have
-    `offset_uncertainty`, in metres.
+    """The calibrated distance with the smallest U6 if offsets have `offset_uncertainty`, in
+    metres.
 
-    `average` is that U6, and `edits` what the file is to say; without a `change` none that was
-    tried makes U6 smaller by half.
+    `average` is that U6, and `edits` the changes of the file; without a `change`, no candidate
+    halves U6.
     """
 
     change: Change | None
@@ -36,9 +36,7 @@ class ScaleCertificate:
 
 @single_threaded
 def scale_certificate(experiment: Experiment, scale: Scale | None) -> ScaleCertificate | None:
-    """The best single certificate; None where the scale does not rest on offsets that are held
-    exact.
-    """
+    """Return the best single certificate, if scale rests on offsets that are held exact."""
     if scale is None or not scale.rests_on_offsets or scale.loosened is None:
         return None
     singles = [change for change in certificates(experiment) if change.cost == 1.0][:MOST_TRIED]

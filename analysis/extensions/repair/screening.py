@@ -27,12 +27,12 @@ SEEN = 1e-6
 
 
 def seen_by(base: Examined, changes: Sequence[Change]) -> dict[Change, Array]:
-    """What the observations that changes add say of the null directions: a triangle (deficiency,
-    deficiency) for each.
+    """Return the null directions that added observations see: a triangle (deficiency, deficiency)
+    per change.
 
-    The pose of an added position is eliminated. Changes that do more than add readings or distances
-    of plates that are read already are left out. A set of changes removes as many directions as the
-    rank of its triangles together.
+    The pose of an added position is eliminated. Only changes that add readings or distances of
+    plates already read are included. A set of changes removes as many directions as the rank of
+    its triangles together.
     """
     effects: dict[Change, Array] = {}
     if not base.at.deficiency:
@@ -108,8 +108,8 @@ def _by_readings(base: Examined, added: dict[Change, Position]) -> dict[Change, 
 
 
 def _of_influences(base: Examined, extended: Design, null: Array) -> Array:
-    """How null directions (s, k) change influence quantities (p, k) of a design with more
-    positions; those of the latter alone stay.
+    """Return the effect of null directions (s, k) on influence quantities (p, k) of a design with
+    more positions; only those of the latter remain.
     """
     rows = null[base.at.layout.influences]
     names = [parameter.name for parameter in base.at.design.influence_parameters]
@@ -121,7 +121,9 @@ def _of_influences(base: Examined, extended: Design, null: Array) -> Array:
 
 
 def _without(rows: Array, by_pose: Array) -> Array:
-    """Rows (m, d, k) less what a pose of its own can do, with derivatives (m, d, pose size)."""
+    """Return rows (m, d, k) after elimination of their own pose, with derivatives (m, d, pose
+    size).
+    """
     u, sizes, _ = np.linalg.svd(by_pose.reshape(-1, by_pose.shape[2]), full_matrices=False)
     u = u[:, sizes > 1e-10 * sizes[0]]
     flat = rows.reshape(len(u), -1)
@@ -136,14 +138,14 @@ def _triangle(rows: Array) -> Array:
 
 
 def rank_of(triangles: Sequence[Array]) -> int:
-    """How many directions the triangles together remove."""
+    """Return the number of directions that the triangles remove together."""
     if not triangles:
         return 0
     return int((np.linalg.svd(np.concatenate(list(triangles)), compute_uv=False) > SEEN).sum())
 
 
 def weakest_of(triangles: Sequence[Array]) -> float:
-    """How well the triangles together show the direction that they show least, in standard
-    deviations.
+    """Return the singular value, in standard deviations, of the direction that the triangles
+    determine least.
     """
     return float(np.linalg.svd(np.concatenate(list(triangles)), compute_uv=False)[-1])

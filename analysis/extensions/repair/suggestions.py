@@ -1,4 +1,4 @@
-"""What is suggested of a design that is checked: repairs, and a certificate that carries scale."""
+"""Suggestions for a checked design: repairs, and a certificate that provides scale."""
 
 from __future__ import annotations
 
@@ -17,13 +17,13 @@ from .scale import ScaleCertificate, scale_certificate
 
 @dataclass(frozen=True)
 class Suggestions:
-    """Repairs, None where nothing is open, and the certificate, None where none is needed."""
+    """Repairs and certificate, each only if needed."""
 
     repairs: Repairs | None = None
     certificate: ScaleCertificate | None = None
 
     def lines(self, judged: Verdict) -> list[str]:
-        """What is suggested for a design that is so judged."""
+        """Return lines of suggestions for a design with this verdict."""
         return [*certificate_lines(self.certificate), *repair_lines(self.repairs, judged)]
 
     def data(self) -> dict[str, Any]:
@@ -35,6 +35,6 @@ class Suggestions:
 
 
 def suggested(experiment: Experiment, prediction: Prediction, report: Report) -> Suggestions:
-    """What is suggested for an experiment with its pool, whose design is so predicted."""
+    """Return suggestions for an experiment with its pool, whose design has this prediction."""
     suggestions = repairs(experiment, report=report)
     return Suggestions(suggestions, scale_certificate(experiment, prediction.scale))

@@ -1,4 +1,4 @@
-"""What even all candidates of a pool together leave undetermined, and what would determine it."""
+"""Parameters that all candidates of a pool together leave undetermined, and their cure."""
 
 from __future__ import annotations
 
@@ -37,9 +37,9 @@ FAINT, EVEN = 1e-9, 0.1
 
 @dataclass(frozen=True, eq=False)
 class PoolGap:
-    """What all `candidates` of a pool leave undetermined, by the `verdict` of a design with as many
-    of them as leave the same; `cures` would determine all of it, or else `partial` ones some, if
-    they were `sought`.
+    """Directions that all `candidates` of a pool leave undetermined, by the `verdict` of a design
+    with a subset that leaves the same; `cures` would determine all directions, otherwise `partial`
+    ones some, if they were `sought`.
     """
 
     candidates: int
@@ -50,7 +50,7 @@ class PoolGap:
 
     @property
     def words(self) -> str:
-        """What stays open, by the names of the errors."""
+        """Undetermined directions, by the names of the errors."""
         null = self.verdict.null
         names = dict.fromkeys(name for direction in null for name in changed_names(direction))
         count = "one direction" if len(null) == 1 else f"{len(null)} directions"
@@ -61,7 +61,7 @@ class PoolGap:
 
     @property
     def remedy(self) -> str:
-        """What would determine it."""
+        """Text of the cure."""
         if self.verdict.as_expected:
             return "the file expects that"
         if not self.sought:
@@ -86,7 +86,7 @@ class PoolGap:
         }
 
     def refusing(self, error: ExperimentError) -> ExperimentError:
-        """An error of the pool with what stays open, and what would determine it."""
+        """Return an error of the pool with its undetermined directions and their cure."""
         text = f"{self.words}; {self.remedy}"
         return ExperimentError(
             replace(message, text=f"{message.text}; {text}") for message in error.messages
@@ -99,13 +99,12 @@ def pool_gap(
     information: Information,
     report: Report = unreported,
 ) -> PoolGap | None:
-    """What the candidates of a pool, the first of those that `information` is about, leave
-    undetermined together, and what would determine it; None where that cannot be told.
+    """Return the directions that the candidates of a pool (the first in `information`) leave
+    undetermined together, and their cure, if both computations agree.
 
-    A few candidates that determine all that the others do stand for all: they leave the same
-    directions open, and what determines these in a design with the few does so in one with all,
-    which has the same observations and others. That two computations agree on how many directions
-    the few leave open is the condition for telling anything.
+    A few candidates with the rank of all represent all: they leave the same directions
+    undetermined, and a change that determines these with the few does so with all, whose
+    observations include theirs. The rank computed from the few must equal that of the pool.
     """
     open_count = information.deficiency + information.balls_open
     # Words beside a plan, which is as good without them: nothing wrong with them is a reason to
@@ -133,12 +132,11 @@ def pool_gap(
 
 
 def spanning(information: Information, candidates: Sequence[Candidate]) -> tuple[int, ...]:
-    """A few candidates that together determine all that a pool determines, in order; empty where
-    `MOST_SPANNING` positions do not.
+    """Return a few candidates, in order, with the rank of the pool; empty if `MOST_SPANNING`
+    positions are too few.
 
-    All certificates are among them, positions that leave something of their own pose open, and
-    enough others to read every ball that is read; each further one adds most to what is known
-    least.
+    These are all certificates, positions with a partly undetermined pose, and enough others to
+    read every ball that the pool reads; each further one adds most to the least known direction.
     """
     count = len(candidates)
     unread = {

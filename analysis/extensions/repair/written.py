@@ -59,7 +59,7 @@ class Edit:
 
 
 def edits(before: Experiment, after: Experiment) -> tuple[Edit, ...]:
-    """What the file of `before` has to say otherwise to be that of `after`.
+    """Return the changes that turn the file of `before` into that of `after`.
 
     Positions, calibration, probes, sizes of artefacts and of the error model are compared.
     """
@@ -108,7 +108,7 @@ def edits(before: Experiment, after: Experiment) -> tuple[Edit, ...]:
 
 
 def lacks_probes(settings: Mapping[str, Any]) -> bool:
-    """Whether what a file says of a position leaves out which probes read it."""
+    """True if a position in a file omits the probes that read it."""
     return any("probes" not in group for group in settings.get("readings", [settings]))
 
 
@@ -120,7 +120,7 @@ def _fields(steps: tuple[Step, ...], before: Any, after: Any) -> list[Edit]:
 
 
 def position_settings(experiment: Experiment, position: Position) -> dict[str, Any]:
-    """What a file says of a position."""
+    """Return a position in the form of a file."""
     settings: dict[str, Any] = {"name": position.name}
     if len(experiment.artefacts) > 1:
         settings["artefact"] = position.artefact
@@ -152,7 +152,7 @@ def _placement(experiment: Experiment, position: Position) -> dict[str, Any]:
 
 
 def plane_of(rotation: Array) -> tuple[Any, int] | None:
-    """The plane and the quarter-turns that a rotation (d, d) is, None where it is free.
+    """Return the plane and quarter-turns of a rotation (d, d), unless it is a general one.
 
     >>> plane_of(np.eye(3)), plane_of(-np.eye(2)), plane_of(np.diag([1.0, -1.0, -1.0]))
     (('z', 0), ('z', 2), None)
@@ -200,7 +200,7 @@ def _group(experiment: Experiment, position: Position, group: ReadingGroup) -> d
 
 
 def can_be_written(item: Calibration) -> bool:
-    """Whether `calibration_settings` tell all of an item but its certified values."""
+    """True if `calibration_settings` contain all of an item except its certified values."""
     if isinstance(item, DistanceCalibration):
         return item.standard_uncertainty is not None
     if isinstance(item, CoordinateCalibration):
@@ -210,7 +210,7 @@ def can_be_written(item: Calibration) -> bool:
 
 
 def calibration_settings(experiment: Experiment, item: Calibration) -> dict[str, Any]:
-    """What a file says of a calibration item that can be written, its certified values left out."""
+    """Return a calibration item in the form of a file, without its certified values."""
     layout = experiment.layouts[item.artefact]
     settings: dict[str, Any] = {"kind": item.kind}
     if len(experiment.artefacts) > 1:
@@ -243,8 +243,7 @@ def length_function(value: LengthFunction) -> str:
 
 
 def written_length(value: float) -> str:
-    """A length as written in a file: the shortest that reads well, with all digits where it needs
-    them.
+    """Return a length as written in a file: the shortest readable form, with all digits if needed.
 
     >>> written_length(0.125), written_length(0.1 / 3)
     ('125 mm', '0.03333333333333333 m')

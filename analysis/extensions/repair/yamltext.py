@@ -1,4 +1,4 @@
-"""Changes of a YAML text at certain places that keep every other byte."""
+"""Changes of a YAML text at given paths that keep every other byte."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ PROPERTIES = re.compile(r"(?:[&!]\S*\s+)*")
 
 @dataclass(frozen=True)
 class TextChange:
-    """A value that is set at a path, where it may be new, appended to the list there, or
+    """A value that is set at a path, possibly a new one, appended to the list there, or
     removed.
     """
 
@@ -40,11 +40,10 @@ class TextChange:
 
 @dataclass(frozen=True, eq=False)
 class _Span:
-    """Where a value stands: indices of its text, less spaces after it, and `column` of a block's
-    entries, from 0.
+    """Indices of a value in its text, without trailing spaces, and `column` of a block's entries,
+    from 0.
 
-    `entries` are keys, or indices, with the span of the key, or of the item, and of what stands
-    there.
+    `entries` are keys, or indices, with the span of the key or item and of its value.
     """
 
     start: int
@@ -60,7 +59,7 @@ class _Span:
 @dataclass(frozen=True, eq=False)
 class _Text:
     """A text with the spans of its values; `scalars` has the indices of all, keys included, and
-    `aliases` what they refer to.
+    `aliases` their targets.
     """
 
     text: str
@@ -79,14 +78,14 @@ def flow(value: Any) -> str:
 
 
 def with_changes(text: str, file: str, changes: Iterable[TextChange]) -> str:
-    """The text with changes made one after the other; it says nothing else than before besides.
+    r"""Return the text with changes made in sequence; the rest keeps its meaning.
 
-    :raises ExperimentError: a place that others refer to, or that refers to another; a comment
-        there would be lost; or the rest of the text would not mean the same.
+    :raises ExperimentError: a path with an alias or anchor; a comment there would be lost; or the
+        rest     of the text would change its meaning.
 
-    >>> text = "plate: {balls: 5}  # ours\\n"
+    >>> text = "plate: {balls: 5}  # ours\n"
     >>> with_changes(text, "example", [TextChange(("plate", "balls"), 6)])
-    'plate: {balls: 6}  # ours\\n'
+    'plate: {balls: 6}  # ours\n'
     """
     for change in changes:
         before = to_python(parse_tree(text, file))
@@ -106,7 +105,7 @@ def with_changes(text: str, file: str, changes: Iterable[TextChange]) -> str:
 
 
 def changed_data(data: Any, change: TextChange) -> Any:
-    """What plain data, with tuples for lists, become by a change.
+    """Return plain data, with tuples for lists, after a change.
 
     >>> changed_data({"a": (1,)}, TextChange(("a",), 2, "append"))
     {'a': (1, 2)}
@@ -140,7 +139,7 @@ def _as_read(value: Any) -> Any:
 
 
 class _Dumper(yaml.SafeDumper):
-    """Puts a text in quotes that would be read as something else, by rules of YAML 1.1 or 1.2."""
+    """YAML writer that quotes texts with another meaning under YAML 1.1 or 1.2."""
 
     def ignore_aliases(self, data: Any) -> bool:
         return True
@@ -209,7 +208,7 @@ def _spans(text: str, file: str) -> _Text:
 
 
 def _way(text: _Text, steps: Steps) -> list[_Span]:
-    """The values that a path leads through, as far as there are any."""
+    """Return the values along a path, up to the last that exists."""
     way = [text.root]
     for step in steps:
         below = next((value for key, _, value in way[-1].entries if key == step), None)
@@ -354,6 +353,6 @@ def _line_end(text: str, start: int) -> int:
 
 
 def _break(text: str, start: int) -> str:
-    """What ends the line there, or else the first line."""
+    """Return the line end there, or else that of the first line."""
     line_break = LINE_END.match(text, start) or LINE_END.search(text)
     return "\n" if line_break is None else line_break[0]

@@ -1,4 +1,4 @@
-"""Answers of the search for what a goal needs, as text and data."""
+"""Answers of the search for the requirements of a goal, as text and data."""
 
 from __future__ import annotations
 
@@ -19,15 +19,14 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Answer:
-    """What an unknown must be for the goal to be met, the others as they are.
+    """Value that an unknown needs for the goal to be met, the others unchanged.
 
-    `status`: a value was `found` beside which the next, `beside`, is not enough; `any` value that
-    was looked at does; `none` does; nothing of this kind repairs what is `undetermined`; or the
-    unknown cannot be `varied`. `words` and `value`, in metres, the
-    `unit` of an uncertainty that is no length, or a number, are the value needed, or
-    without one that comes nearest, or the last looked at; `outcome` is what the prediction with it
-    gives. `remarks` tell of the range. `tried` are the values that were looked at, with how far
-    from the goal each is and whether it meets it.
+    `status`: `found`, with the next value, `beside`, insufficient; `any` value tried suffices;
+    `none` does; the rank remains `undetermined` with each; or the unknown cannot be `varied`.
+    `words` and `value` (metres, the `unit` of an uncertainty that is not a length, or a number)
+    are the value needed, otherwise the nearest, or the last tried; `outcome` is its prediction.
+    `remarks` describe the range. `tried` are the values, each with its distance from the goal and
+    whether it meets it.
     """
 
     name: UnknownName
@@ -50,7 +49,7 @@ class Answer:
 
 @dataclass(frozen=True, repr=False)
 class Reach(Result):
-    """A goal, whether the design as drawn meets it, and the necessary value of each unknown."""
+    """A goal, whether the current design meets it, and the necessary value of each unknown."""
 
     label: str
     title: str
@@ -111,12 +110,12 @@ class Reach(Result):
         return [{"unknown": answer.name, **_answer_data(answer)} for answer in self.answers]
 
     def plot(self, path: str | Path | None = None) -> Figure:
-        """How far from the goal the values are that were tried of each unknown.
+        """Draw the distance from the goal by the values tried of each unknown.
 
         With a path, which ends in .svg, .png or .pdf, the picture is written as well.
 
-        :raises ImportError: matplotlib is missing.
-        :raises ValueError: the path ends in something else, or there is nothing to be drawn.
+        :raises ImportError: matplotlib is missing. :raises ValueError: the path has another
+            suffix, or no values were tried.
         """
         panels = [_panel(answer) for answer in self.answers if answer.tried]
         if not panels:
@@ -129,7 +128,7 @@ class Reach(Result):
 
 
 def _panel(answer: Answer) -> TriedValues:
-    """What was tried of an unknown: uncertainties in millionths of their unit, sizes of plates in
+    """Panel of an unknown: uncertainties in millionths of their unit, sizes of plates in
     millimetres.
     """
     unit, factor = {

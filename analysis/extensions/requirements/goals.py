@@ -36,11 +36,11 @@ class GoalError(ValueError):
 
 @dataclass(frozen=True)
 class Goal:
-    """What is to be reached.
+    """A goal of a design.
 
-    `lengths`: at least the `share` of the distances between corrected points (U6) within the target
-    accuracy of the file. `tasks`: every task within its target. `quantity`: a `statistic` of the
-    quantity `symbol` at most `limit`, in metres or radians.
+    `lengths`: at least the `share` of the distances between corrected points (U6) within the
+    target uncertainty of the file. `tasks`: every task within its target. `quantity`: a
+    `statistic` of the quantity `symbol` at most `limit`, in metres or radians.
     """
 
     kind: Literal["lengths", "tasks", "quantity"] = "lengths"
@@ -61,9 +61,9 @@ class Goal:
 
 @dataclass(frozen=True)
 class Judgement:
-    """Whether a design meets a goal, how far it is from it (smaller is better), and in words.
+    """Verdict on a goal, the distance from it (smaller is better), and a text.
 
-    `undetermined` counts what the goal asks about and the observations leave open.
+    `undetermined` counts quantities of the goal that the observations do not determine.
     """
 
     is_met: bool
@@ -75,7 +75,7 @@ class Judgement:
 def parse_goal(text: str, share: float | None = None) -> Goal:
     """Read a goal.
 
-    :raises GoalError: it is none.
+    :raises GoalError: it cannot be parsed.
 
     >>> str(parse_goal("U6 average 0.3 um"))
     'average U6 at most 0.3 µm'
@@ -109,7 +109,7 @@ def parse_goal(text: str, share: float | None = None) -> Goal:
 
 
 def check_goal(goal: Goal, prediction: Prediction | PlannedUncertainty) -> None:
-    """Refuse a goal about what a design does not have.
+    """Refuse a goal without its subject in the design.
 
     :raises GoalError: no target, no tasks, or no such quantity.
     """
@@ -136,7 +136,7 @@ def check_goal(goal: Goal, prediction: Prediction | PlannedUncertainty) -> None:
 
 
 def judge(goal: Goal, prediction: Prediction | PlannedUncertainty) -> Judgement:
-    """Whether a design meets a goal that `check_goal` lets pass."""
+    """Return the judgement of a goal that `check_goal` accepts."""
     if goal.kind == "tasks":
         return _judge_tasks(prediction)
     if goal.kind == "quantity":

@@ -34,13 +34,13 @@ def reach(
     calibration: int | None = None,
     report: Report = unreported,
 ) -> Reach:
-    """The repeatability, certificate, repeats, balls or size of the plate with which a goal is met.
+    """Return the repeatability, certificate, repeats, balls or size of the plate that meets a
+    goal.
 
-    `goal` is as for `ballplate reach --goal`, with the `share` of lengths that are to be within,
-    `unknowns` one of repeatability, certificate, repeats, balls and size, or several; without any
-    it is all of them. `target` replaces the experiment's target, as a text with a unit. The
-    `artefact` by its name and the entry of the `calibration` are what varies where there are
-    several.
+    `goal` is as for `ballplate reach --goal`, with the `share` of lengths to be within, `unknowns`
+    one or several of repeatability, certificate, repeats, balls and size; by default all five.
+    `target` replaces the experiment's target, as a text with a unit. The `artefact` by its name
+    and the entry of the `calibration` select the varied ones among several.
 
     >>> import ballplate as bp
     >>> bp.reach(bp.quickstart(), "U6 average 0.2 um", ["repeatability"]).answers[0].is_met

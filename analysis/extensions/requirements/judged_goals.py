@@ -13,7 +13,7 @@ from .goals import Goal, GoalError, check_goal, judge
 def judged_goals(
     experiment: Experiment, goals: Sequence[Goal]
 ) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """How goals are met, in words, and those of them that are not."""
+    """Return a line per goal, and those that are not met."""
     planned = planned_uncertainty(experiment)
     parts, missed = [], []
     for goal in goals:

@@ -1,4 +1,4 @@
-"""`ballplate reach`: what one unknown of a design must be for a goal to be met."""
+"""`ballplate reach`: value of one unknown of a design that meets a goal."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ def add_options(parser: ArgumentParser) -> None:
 
 
 def run(options: Namespace) -> int:
-    """Solve for what was asked; 1 if no value does."""
+    """Solve for the requested unknowns; return 1 if no value suffices."""
     from ballplate.cli import progress
     from ballplate.simulator.inputs import QuantityError, parse_length_function
 

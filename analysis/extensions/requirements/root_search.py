@@ -55,14 +55,14 @@ def reach(
     target: str | None = None,
     report: Report = unreported,
 ) -> Reach:
-    """Solve for each of some unknowns, the others staying as they are.
+    """Solve for each of some unknowns, the others unchanged.
 
-    `artefact` and `calibration`, an index, choose what varies where there are several; `target`
-    replaces the target uncertainty of the file, and `report` receives the number of unknowns done.
+    `artefact` and `calibration`, an index, select the varied ones among several; `target` replaces
+    the target uncertainty of the file, and `report` receives the number of unknowns done.
 
-    :raises GoalError: the experiment does not have what the goal is about.
-    :raises NotVariableError: a single unknown is asked for that the experiment does not have.
-    :raises ExperimentError: the target is wrong, or there are more than 10,000 evaluation points.
+    :raises GoalError: the experiment lacks the subject of the goal. :raises NotVariableError: the
+        experiment lacks the single requested unknown. :raises ExperimentError: the target is
+        invalid, or there are more than 10,000 evaluation points.
     """
     count = len(experiment.evaluation.points)
     if count > MOST_POINTS:
@@ -102,16 +102,16 @@ def reach(
 
 @dataclass(frozen=True)
 class _Searched:
-    """The file of which values are tried, and what makes the experiment of a tree."""
+    """The file whose values are varied, and the function from its tree to an experiment."""
 
     root: Node
     built: Callable[[Node], Experiment]
     goal: Goal
 
     def uncertainty(self, tree: Node) -> PlannedUncertainty:
-        """Uncertainties of a tree's design.
+        """Return the uncertainties of a tree's design.
 
-        :raises ExperimentError: the file is wrong so.
+        :raises ExperimentError: the file is invalid with these values.
         """
         return planned_uncertainty(self.built(tree))
 
@@ -154,13 +154,13 @@ class _Trials:
         )
 
     def judgement(self, step: int) -> Judgement:
-        """How the goal is met with a value with which the file is right."""
+        """Return the judgement with a value for which the file is valid."""
         reached = self.at(step).judgement
         assert reached is not None
         return reached
 
     def nearest(self, steps: list[int]) -> int:
-        """Which of some values with which the file is right comes nearest to the goal."""
+        """Return the value nearest to the goal among those for which the file is valid."""
         return steps[int(comparable([self.judgement(step).distance for step in steps]).argmin())]
 
     def verified(self, step: int) -> Judgement:
@@ -168,9 +168,7 @@ class _Trials:
         return judge(self.searched.goal, predict(self.searched.built(self.one.tree(step))))
 
     def is_right(self, step: int) -> bool:
-        """Whether the file is right with a value, which is quicker to find out than the
-        result.
-        """
+        """True if the file is valid with a value; quicker than the result."""
         if step not in self.known:
             try:
                 self.searched.built(self.one.tree(step))
@@ -256,7 +254,9 @@ def _monotone(trials: _Trials, deficiency: int) -> Answer:
 
 
 def _border(trials: _Trials, right: int, wrong: int) -> int:
-    """The last value with which the file is right; it is with `right`, and is not with `wrong`."""
+    """Return the last value for which the file is valid, between a valid one, `right`, and an
+    invalid one.
+    """
     while wrong - right > 1:
         middle = (right + wrong) // 2
         right, wrong = (middle, wrong) if trials.is_right(middle) else (right, middle)
@@ -264,7 +264,7 @@ def _border(trials: _Trials, right: int, wrong: int) -> int:
 
 
 def _convergence(trials: _Trials, extreme: int) -> list[str]:
-    """Whether an extreme is as good as exact."""
+    """True if an extreme value is as good as an exact one."""
     judgements, before = trials.at(extreme).judgement, trials.at(extreme + PER_DECADE).judgement
     if judgements is None or before is None:
         return []
@@ -325,7 +325,7 @@ def _scanned(trials: _Trials) -> Answer:
 
 
 def _first_met(trials: _Trials, probes: list[int], otherwise: int) -> int:
-    """Place of the first value with which the goal is met."""
+    """Return the index of the first value that meets the goal."""
     return next((k for k, step in enumerate(probes) if trials.at(step).is_met), otherwise)
 
 

@@ -10,7 +10,7 @@ PER_DECADE = 9 * 10 ** (DIGITS - 1)
 
 
 def at_step(step: int) -> Decimal:
-    """The number of three digits that has a place in the order of all.
+    """Return the number of three digits with this index in ascending order.
 
     >>> at_step(0), at_step(1), at_step(-1), at_step(PER_DECADE)
     (Decimal('1.00'), Decimal('1.01'), Decimal('0.999'), Decimal('10.0'))
@@ -20,7 +20,7 @@ def at_step(step: int) -> Decimal:
 
 
 def step_of(value: Decimal) -> int:
-    """Place of the largest number of three digits that is not above a positive value.
+    """Return the index of the largest number of three digits not above a positive value.
 
     >>> step_of(Decimal("0.2147")) == step_of(Decimal("0.214")) == step_of(Decimal("0.213")) + 1
     True
@@ -34,17 +34,17 @@ def step_of(value: Decimal) -> int:
 
 
 def round_down(value: Decimal, digits: int = DIGITS) -> Decimal:
-    """A positive number, cut to so many digits."""
+    """Return a positive number cut to `digits` digits."""
     return value.quantize(Decimal(1).scaleb(value.adjusted() - digits + 1), ROUND_FLOOR)
 
 
 def round_up(value: Decimal, digits: int = DIGITS) -> Decimal:
-    """A positive number, rounded up to so many digits."""
+    """Return a positive number rounded up to `digits` digits."""
     return value.quantize(Decimal(1).scaleb(value.adjusted() - digits + 1), ROUND_CEILING)
 
 
 def exact(value: float) -> Decimal:
-    """The number as it was written: the shortest decimal that gives this float."""
+    """Return the shortest decimal that gives this float."""
     return Decimal(repr(value))
 
 

@@ -49,12 +49,11 @@ def draw_tried(
     words: str,
     path: str | Path | None = None,
 ) -> Figure:
-    """How far from a goal the values tried are, a panel for each unknown, with the limit below
+    """Draw the distance from a goal by value tried, one panel per unknown, with the limit below
     which it is met.
 
-    :raises ImportError: matplotlib is missing.
-    :raises ValueError: the name ends in none of the kinds of pictures.
-    :raises OSError: the file cannot be written.
+    :raises ImportError: matplotlib is missing. :raises ValueError: the name has another suffix
+        than pictures. :raises OSError: the file cannot be written.
     """
     height = PANEL + BELOW + ABOVE
     with drawing(len(panels) * height, WIDTH) as figure:

@@ -45,20 +45,19 @@ LARGEST = 100
 
 
 class NotVariableError(ValueError):
-    """The experiment has nothing of the kind, or several of which none is chosen; the message says
-    what to do.
+    """The experiment lacks the unknown, or has several without a choice; the message states the
+    remedy.
     """
 
 
 @dataclass(frozen=True)
 class Unknown:
-    """One quantity of an experiment with values `first` to `last`, by their places in an order of
-    small to large.
+    """One quantity of an experiment with values `first` to `last`, by indices in ascending order.
 
-    `tree` gives the file with a value, `words` the value in words and `value` in metres, in the
-    `unit` of an uncertainty that is no length, or as a number. `grows`: a larger value makes
-    everything better; otherwise a smaller one does; `is_monotone` whether that is sure. `present`
-    is the value as drawn, in words, and `drawn` the value next to it.
+    `tree` gives the file with a value, `words` the value as text and `value` in metres, in the
+    `unit` of an uncertainty that is not a length, or as a number. `grows`: a larger value improves
+    every result, otherwise a smaller one; `is_monotone` is true if that is certain. `present` is
+    the current value as text, and `drawn` the value next to it.
     """
 
     name: UnknownName
@@ -82,11 +81,11 @@ def unknown(
     artefact: str | None,
     calibration: int | None,
 ) -> Unknown:
-    """An unknown of the experiment whose file is `root`.
+    """Return an unknown of the experiment whose file is `root`.
 
-    `artefact` and `calibration`, an index, choose where there are several.
+    `artefact` and `calibration`, an index, select among several.
 
-    :raises NotVariableError: the experiment has no such thing, or several.
+    :raises NotVariableError: the experiment lacks it, or has several.
     """
     if artefact is not None and artefact not in experiment.artefacts:
         raise NotVariableError(
@@ -116,9 +115,9 @@ def unknown(
 
 
 def _certificate(root: Node, items: list[str]) -> Unknown:
-    """Standard uncertainties of calibration items, by their paths; lengths come first.
+    """Return standard uncertainties of calibration items by their paths, lengths first.
 
-    :raises NotVariableError: none of them states one that can be multiplied.
+    :raises NotVariableError: no item states one that can be multiplied.
     """
     lengths, rows_skipped, skipped = list[str](), list[str](), list[str]()
     for item in items:
@@ -146,15 +145,15 @@ def _certificate(root: Node, items: list[str]) -> Unknown:
 
 @dataclass(frozen=True)
 class _Quantity:
-    """A number above zero with a unit that is none of length, as it is written."""
+    """A number above zero with a unit other than of length, as written."""
 
     number: Decimal
     unit: str
 
 
 def _scaled(name: UnknownName, title: str, root: Node, paths: list[str]) -> Unknown:
-    """Uncertainties that are multiplied by the same factor; the first of them has three digits, the
-    others less.
+    """Return uncertainties multiplied by one factor; the first has three digits, the others
+    fewer.
     """
     nodes = [node_at(root, path) for path in paths]
     leaves = [leaf for node in nodes if node is not None for leaf in _leaves(node)]
@@ -203,7 +202,7 @@ def _metres(step: int) -> float:
 
 
 def _leaf(value: object) -> LengthFunction | _Quantity:
-    """An uncertainty as it is written.
+    """Return an uncertainty as written.
 
     :raises QuantityError: neither a length nor another number above zero with a unit.
     """
@@ -236,8 +235,8 @@ def _with_leaves(node: Node, factor: Fraction) -> Node:
 
 
 def _text(leaf: LengthFunction | _Quantity, factor: Fraction) -> str:
-    """An uncertainty multiplied by a factor, as it is written; cut to three digits unless the
-    factor is 1.
+    """Return an uncertainty multiplied by a factor, in its written form; cut to three digits
+    unless the factor is 1.
     """
     if isinstance(leaf, _Quantity):
         number = leaf.number if factor == 1 else round_down(times(leaf.number, factor))
@@ -254,14 +253,12 @@ def _text(leaf: LengthFunction | _Quantity, factor: Fraction) -> str:
 
 
 def _several(texts: list[str]) -> str:
-    """One text for all, where all are the same."""
+    """Return one text if all are equal."""
     return texts[0] if len(set(texts)) == 1 else listing(texts, 3)
 
 
 def _repeats(experiment: Experiment, root: Node, artefact: str | None) -> Unknown:
-    """How often everything is read: so many times, or so many times as often where repeats
-    differ.
-    """
+    """Return the number of repeats, or its multiple if repeats differ."""
     places = [
         k
         for k, position in enumerate(experiment.positions)
