@@ -235,7 +235,7 @@ WRONG: list[tuple[Callable[[], object], type[Exception], str]] = [
     (lambda: bp.reach(QUICKSTART, target=3), TypeError, "target=3; give a text with a unit"),
     (lambda: bp.check(QUICKSTART, goals=[3]), TypeError, "goals=3; give texts such as"),
     (lambda: bp.check(QUICKSTART, "U9"), ValueError, '"U9" is not a goal'),
-    (lambda: bp.check(QUICKSTART, share=0.9), ValueError, "share goes with the goal lengths"),
+    (lambda: bp.check(QUICKSTART, share=0.9), ValueError, "share applies to the goal lengths"),
     (lambda: bp.plan(QUICKSTART, hours="7 h"), TypeError, "hours='7 h'; give hours above 0"),
     (lambda: bp.plan(QUICKSTART, done=3), TypeError, "done=3; give the path of a CSV file"),
     (lambda: bp.sweep(3), TypeError, "path=3; give the path of a file"),

@@ -345,7 +345,8 @@ def _refuse_lacking(
             experiment,
             problem.constraints,
             [k for placing in missing.values() for k in placing],
-            f"{name} includes the distances of {names}, but no position of these can be read",
+            f"{name} includes the distances of {names}, but no position of this artefact can be"
+            " read",
             ", keep one, or take the artefact out of the pool",
         )
 
@@ -361,7 +362,7 @@ def _out_of_reach(
     time.
     """
     if limits.forbids(members):
-        why = "as limits allow none of them; change at_most or never_together"
+        why = "as limits exclude each; change at_most or never_together"
         return _impossible(experiment, "pool.limits", f"{text}, {why}{or_else}")
     return _impossible(experiment, "pool", f"{text} with {limits.budget}; allow more{or_else}")
 
@@ -374,7 +375,7 @@ def _as_drawn(
         raise _impossible(
             experiment,
             "positions",
-            "there are none to take the budget from; give --hours or --positions",
+            "there are no positions to take the limit from; give --hours or --positions",
         )
     return free.spent(reference).budget
 
@@ -390,8 +391,8 @@ def _refuse_impossible(
         if len(members) > limit.count:
             names = ", ".join(f'"{candidates[k].name}"' for k in members)
             text = (
-                f"{names} have to be chosen, but no more than {limit.count} of them may be; change"
-                " one of the two"
+                f"{names} are required, but at most {limit.count} may be chosen; change one of"
+                " the two"
             )
             raise _impossible(experiment, "pool.limits", text)
     text = (

@@ -265,7 +265,8 @@ def calibration_rows(
     named = drawn.design.unknown_lengths.of(artefact)
     if len(named) != 1:
         text = (
-            f'"{name}": {item.artefact} has no unknown length that this could tell; remove one of'
+            f'"{name}": {item.artefact} has no unknown length that this could determine; remove'
+            " one of"
             " its certificates"
         )
         raise refused(experiment.source, text, "pool.calibration")

@@ -465,7 +465,7 @@ def criterion(information: Information, experiment: Experiment, name: CriterionN
         if not functions.count:
             reason = "no selection determines any of it; offer other candidates"
             lacks = reason if functions.excluded else f"the experiment has no {kind.needs}"
-            text = f"{name} has nothing to minimise: {lacks}"
+            text = f"{name} has no function to minimise: {lacks}"
             raise refused(experiment.source, text, "pool")
     excluded = 0 if functions is None else functions.excluded
     target = _target(experiment, name, functions)

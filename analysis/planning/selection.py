@@ -121,8 +121,8 @@ class Campaign(Selection, Result):
         ]
         if not self.is_determined:
             lines.append(
-                "no choice was found that determines everything; what the nearest one leaves"
-                " undetermined follows"
+                "no choice was found that determines every parameter; the undetermined ones of the"
+                " nearest follow"
             )
         elif math.isnan(self.bound):
             lines.append(f"there is no bound of {self.criterion}")
@@ -217,12 +217,12 @@ def _interrupted(campaign: Campaign) -> list[str]:
     if campaign.left_open:
         count = "one direction" if campaign.left_open == 1 else f"{campaign.left_open} directions"
         lines.append(
-            f"too little was read there to determine {count} of its pose; nothing else"
-            " depends on that"
+            f"too little was read to determine {count} of its pose; no other parameter depends on"
+            " that"
         )
     for position in campaign.ignored:
         lines.append(
-            f"{position.name} is left out: nothing else worth its time reads the other balls of"
+            f"{position.name} is left out: no affordable position reads the other balls of"
             f" {position.item.artefact}; delete its readings from the file"
         )
     return lines

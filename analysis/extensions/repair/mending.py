@@ -75,7 +75,7 @@ def mended(
     )
     verdict = check(checked).verdict
     if verdict.deficiency or len(verdict.weak) > repair.weak:
-        text = "the repaired file does not have the rank that was found; nothing is changed"
+        text = "the repaired file does not have the computed rank; the file is unchanged"
         raise experiment.refused((), text)
     return new
 
@@ -140,7 +140,7 @@ def with_experiment(
     )
     written_as = after.get(experiment.name, experiment)
     if others_differ or edits(written_as, changed) or edits(changed, written_as):
-        text = "the change cannot be written as it was made; write it by hand"
+        text = "the change cannot be written in this form; write it by hand"
         raise experiment.refused((), text)
     return new
 

@@ -117,7 +117,7 @@ def _write(path: Path, mark: str, text: str, new: str, options: Namespace) -> in
     with options.interruption.held():
         check_overwritten(path)
     if _text(path) != (mark, text):
-        changed = "the file has changed meanwhile; nothing was written, start again"
+        changed = "the file has changed meanwhile and is not overwritten; start again"
         raise refused(path, changed)
     content = (mark + new).encode()
     is_written = write_outputs(

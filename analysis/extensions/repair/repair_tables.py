@@ -62,7 +62,7 @@ def _worth(repair: Repair, judged: Verdict) -> str:
     elif repair.is_faint:
         words += ", but only just: see the smallest singular value"
     else:
-        words += ", and nothing is weakly determined"
+        words += ", and no weak direction"
     u6 = None if repair.prediction is None else repair.prediction.quantities.get("U6")
     words += caveat(repair)
     if u6 is not None:

@@ -239,7 +239,9 @@ def _changed(text: _Text, change: TextChange) -> str:
             )
     is_there = len(way) == len(change.steps) + 1
     if not is_there and (len(way) < len(change.steps) or way[-1].kind != "mapping"):
-        raise _refusal(way[-1], change.steps, "there is nothing to put it into; write it by hand")
+        raise _refusal(
+            way[-1], change.steps, "there is no mapping or list to extend; write it by hand"
+        )
     if change.kind == "remove":
         return _without(text, way[-2], way[-1], change)
     if not is_there:

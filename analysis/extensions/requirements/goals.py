@@ -84,7 +84,7 @@ def parse_goal(text: str, share: float | None = None) -> Goal:
     """
     if text in ("lengths", "tasks"):
         if share is not None and text == "tasks":
-            raise GoalError("a share goes with the goal lengths; leave it out")
+            raise GoalError("a share applies to the goal lengths; leave it out")
         return Goal(text, 1.0 if share is None else share)  # type: ignore[arg-type]
     match = PATTERN.fullmatch(text)
     if match is None:
@@ -98,7 +98,7 @@ def parse_goal(text: str, share: float | None = None) -> Goal:
         )
         raise GoalError(f'"{symbol}" is not a quantity with a limit; {advice}')
     if share is not None:
-        raise GoalError("a share goes with the goal lengths; leave it out")
+        raise GoalError("a share applies to the goal lengths; leave it out")
     try:
         value = (parse_positive_angle if symbol.endswith("angles") else parse_positive_length)(
             limit

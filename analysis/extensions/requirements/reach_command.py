@@ -14,8 +14,8 @@ DESCRIPTION = (
     " largest repeatability or certificate uncertainty, or the fewest repeats, fewest"
     " balls or smallest plate that meets a goal. Each answer is a value of three digits,"
     " or a whole number, for which the design was computed and meets the goal; the next"
-    " value fails. The exit status is 0 if every unknown asked for has such a value"
-    " (without --by: one of them), otherwise 1; with --fail it is 0 if the design in the"
+    " value fails. The exit status is 0 if every requested unknown has such a value (without --by:"
+    " one), otherwise 1; with --fail it is 0 if the design in the"
     " file meets the goal, otherwise 1."
 )
 

@@ -180,10 +180,8 @@ class _Trials:
 
 def _answer(unknown: Unknown, searched: _Searched, present: Judgement, deficiency: int) -> Answer:
     if unknown.is_monotone and present.undetermined:
-        reason = (
-            f"rank deficiency {deficiency} leaves {present.undetermined} undetermined, whatever"
-            " the value"
-        )
+        subject = present.undetermined
+        reason = f"rank deficiency {deficiency} leaves {subject} undetermined with any value"
         return _without_value(unknown, "undetermined", reason)
     trials = _Trials(unknown, searched)
     answers = _monotone(trials, deficiency) if unknown.is_monotone else _scanned(trials)
@@ -270,7 +268,7 @@ def _convergence(trials: _Trials, extreme: int) -> list[str]:
         return []
     if abs(before.distance - judgements.distance) <= CONVERGED * judgements.distance:
         return ["an exact one would not be better: ten times that gives the same result"]
-    return ["a smaller one would still change the figure"]
+    return ["a smaller one would still change the result"]
 
 
 def _scanned(trials: _Trials) -> Answer:

@@ -141,7 +141,7 @@ def test_all_stays_beside_what_is_removed(random: Random, has_comments: bool) ->
         ("a: [1, &x 2]\nc: *x\n", TextChange(("a",), 2), "f:1:8: a: an anchor here"),
         ("a: &x 1\nc: *x\nd: [*x]\n", TextChange(("d",), 2), "f:3:5: d: an alias here"),
         ("a:  # why\n  b: 1 # here\n", TextChange(("a", "b"), kind="remove"), "f:2:8: a.b: a comment"),
-        ("a: 1\n", TextChange(("b", "c"), 2), "f:1:1: b.c: there is nothing to put it into"),
+        ("a: 1\n", TextChange(("b", "c"), 2), "f:1:1: b.c: there is no mapping or list to extend"),
         ("a: text\n", TextChange(("a",), 2, "append"), "f:1:4: a: cannot be changed without"),
         ("? a\n: {b: 1}\n", TextChange(("c",), 2), "f:1:1: c: cannot be changed without"),
     ],

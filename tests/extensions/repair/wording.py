@@ -30,7 +30,7 @@ EVERY_BAR_LIES_PARALLEL_TO_THE_XZ = (
     "squareness to X and Z; add for"
 )
 EVERY_DIRECTION_OF_THE_BAR_LIES = "every direction of the bar lies parallel to the "
-FULL_RANK_AND_NOTHING_IS_WEAKLY = "full rank, and nothing is weakly determined; average U6 0.2"
+FULL_RANK_AND_NOTHING_IS_WEAKLY = "full rank, and no weak direction; average U6 0.2"
 NOTHING_DETERMINES_THE_SCALE = "nothing determines the scale of Z; add for example a bar along z"
 NOTHING_DETERMINES_THE_SCALE_OF_NOR = (
     "nothing determines the scale of Y nor its squareness to X and Z nor a combination of "
@@ -54,7 +54,7 @@ SCALE_RESTS_ON_PROBE_OFFSETS = "scale rests on probe offsets"
 SMALLEST_SINGULAR_VALUE = "smallest singular value 0.0"
 TAKING_THE_OTHERS_AS_ZERO = "taking the others as zero"
 THE_FILE_EXPECTS = "the file expects that"
-THE_FILE_HAS_CHANGED_MEANWHILE = "the file has changed meanwhile; nothing was written"
+THE_FILE_HAS_CHANGED_MEANWHILE = "the file has changed meanwhile and is not overwritten"
 THE_FILE_THERE = "the file there is as it was"
 THE_SCALE_OF_NOR_ITS_SQUARENESS = (
     "the scale of Y nor its squareness to X nor a combination of the scale of X and the scale of Z"
