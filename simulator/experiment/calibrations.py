@@ -70,29 +70,32 @@ def _unsuitable(item: Calibration, layout: BallLayout) -> str:
     """Return the fault of values that nominal ball positions do not define, or an empty text."""
     if text := _unnamed(item.names(layout)):
         return text
-    names = [", ".join(one) for one in item.names(layout)]
-    given, extent = item.observed(0), float(np.ptp(layout.coordinates, axis=0).max())
-    assert isinstance(given, BallObservations)
-    values, slopes = _values_at(given, layout.coordinates)
+    names = [", ".join(name) for name in item.names(layout)]
+    value_and_extent, extent = item.observed(0), float(np.ptp(layout.coordinates, axis=0).max())
+    assert isinstance(value_and_extent, BallObservations)
+    values, slopes = _values_at(value_and_extent, layout.coordinates)
     # Each ball is moved otherwise, by what rounding may do.
     way = np.sin(np.arange(1.0, layout.coordinates.size + 1.0)).reshape(layout.coordinates.shape)
-    beside = _values_at(given, layout.coordinates + 1e-12 * extent * way)[1]
-    size, change = (np.abs(one).max(axis=(1, 2)) for one in (slopes, beside - slopes))
+    beside = _values_at(value_and_extent, layout.coordinates + 1e-12 * extent * way)[1]
+    size, change = (np.abs(name).max(axis=(1, 2)) for name in (slopes, beside - slopes))
     # A change that is no number is no small one.
     is_smooth = np.isfinite(values) & (change <= 0.5 * size)
     if not is_smooth.all():
-        told = listing(np.array(names)[~is_smooth].tolist())
+        names_listed = listing(np.array(names)[~is_smooth].tolist())
         return (
-            f"{told} cannot be told where balls are as drawn, for example of balls in one line or"
+            f"{names_listed} cannot be told where balls are as drawn, for example of balls in one"
+            " line or"
             " in one place; choose other balls"
         )
     # A ball that is named twice moves with both.
-    is_same = given.balls[:, :, None] == given.balls[:, None, :]
+    is_same = value_and_extent.balls[:, :, None] == value_and_extent.balls[:, None, :]
     moved = np.abs(np.einsum("mij,mjd->mid", is_same, slopes)).max(axis=(1, 2))
     is_fixed = ~(moved > 1e-9 * size)
     if is_fixed.any():
-        told = listing(np.array(names)[is_fixed].tolist())
-        return f"{told} is the same wherever balls are; name each ball once, or choose others"
+        names_listed = listing(np.array(names)[is_fixed].tolist())
+        return (
+            f"{names_listed} is the same wherever balls are; name each ball once, or choose others"
+        )
     return ""
 
 

@@ -123,11 +123,13 @@ def _true_machine_of_file(
     from ..machines.description import random_part
 
     steps: Steps = ("true_machine", "file")
-    found = _machine_of_file(truth.file, ("true_machine",), references, references.problems.doubts)
-    if found is None:
+    true_machine = _machine_of_file(
+        truth.file, ("true_machine",), references, references.problems.doubts
+    )
+    if true_machine is None:
         return
-    truth.set_machine(found)
-    random = random_part(found)
+    truth.set_machine(true_machine)
+    random = random_part(true_machine)
     if random and truth.random_part is None:
         text = (
             f"has a random part that simulated readings would lack: {listing(random)}; let"
@@ -140,16 +142,21 @@ def _true_machine_of_file(
     level = truth.level
     if level is not None and machine.dimension == 3:
         references.problems.add(("true_machine", "level"), "is for two dimensions; remove it")
-    elif level is not None and not found.lower[2] <= level <= found.upper[2]:
-        ends = " to ".join(format_length(one[2]) for one in (found.lower, found.upper))
+    elif level is not None and not true_machine.lower[2] <= level <= true_machine.upper[2]:
+        ends = " to ".join(
+            format_length(end[2]) for end in (true_machine.lower, true_machine.upper)
+        )
         text = f"is outside the file's volume, which goes from {ends} in z; stay within it"
         references.problems.add(("true_machine", "level"), text)
     for axis, name in enumerate(AXES[: machine.dimension]):
         low, high = machine.volume.lower[axis], machine.volume.upper[axis]
-        if low < found.lower[axis] - TOLERANCE or high > found.upper[axis] + TOLERANCE:
+        if (
+            low < true_machine.lower[axis] - TOLERANCE
+            or high > true_machine.upper[axis] + TOLERANCE
+        ):
             text = (
-                f"its volume goes from {format_length(found.lower[axis])} to"
-                f" {format_length(found.upper[axis])} in {name}, but machine.volume from"
+                f"its volume goes from {format_length(true_machine.lower[axis])} to"
+                f" {format_length(true_machine.upper[axis])} in {name}, but machine.volume from"
                 f" {format_length(low)} to {format_length(high)}; stay within it"
             )
             references.problems.add(steps, text)
@@ -162,8 +169,8 @@ def check_true_machine(sections: Sections, machine: Machine | None, references: 
     settings, truth = sections.get("error_model"), sections.get("true_machine")
     if truth is None:
         return
-    other = getattr(truth, "error_model", None)
-    if other is not None and not _check_model(other, _TRUE_MODEL, machine, references):
+    true_model = getattr(truth, "error_model", None)
+    if true_model is not None and not _check_model(true_model, _TRUE_MODEL, machine, references):
         return
     if isinstance(truth, CurvesSettings):
         _read_curves(truth, machine, references)
@@ -223,7 +230,7 @@ def _read_curves(truth: CurvesSettings, machine: Machine | None, references: Ref
         curves |= found
         if machine is None:
             continue
-        if machine.dimension == 2 and not any(AXIS_ERRORS[one].in_plane for one in found):
+        if machine.dimension == 2 and not any(AXIS_ERRORS[curve].in_plane for curve in found):
             text = "has no error that moves points within the plane of x and y; leave it out"
             problems.add(steps, text)
             continue
@@ -285,7 +292,7 @@ def check_inside(
     places = ball_coordinates(position.pose, layout)
     balls = np.concatenate([indices for indices, _, _ in rows])
     by_how_much, axes, sides = excess(
-        np.concatenate([places[one] - offset for one, _, offset in rows]), volume
+        np.concatenate([places[reading] - offset for reading, _, offset in rows]), volume
     )
     outside = np.flatnonzero(by_how_much > SLIGHTLY * (volume.upper - volume.lower)[axes])
     if len(outside) == 0:
@@ -294,7 +301,7 @@ def check_inside(
     worst = int(outside[np.argmax(by_how_much[outside] > by_how_much.max() - TOLERANCE)])
     axis, probe = int(axes[worst]), [probe for indices, probe, _ in rows for _ in indices][worst]
     offset, place = float(probes[probe].offset[axis]), float(places[balls[worst], axis])
-    others = f", and {number_of(len(outside) - 1, 'more reading')}" if len(outside) > 1 else ""
+    others_text = f", and {number_of(len(outside) - 1, 'more reading')}" if len(outside) > 1 else ""
     less = (
         f" (the ball at {format_length(place)} less the offset of {format_length(offset)})"
         if offset
@@ -303,7 +310,8 @@ def check_inside(
     text = (
         f'reading ball "{layout.names[balls[worst]]}" with probe "{probe}" puts the scales at'
         f" {AXES[axis]} = {format_length(place - offset)}{less},"
-        f" {format_length(by_how_much[worst])} {sides[worst]} the measuring volume{others}; move"
+        f" {format_length(by_how_much[worst])} {sides[worst]} the measuring volume{others_text};"
+        " move"
         " the artefact, or read it otherwise"
     )
     references.problems.add(steps, text)
@@ -340,7 +348,7 @@ def check_use(
     in_pool = (
         set(references.artefact_names)
         if candidates is None
-        else {one.artefact for one in candidates}
+        else {candidate.artefact for candidate in candidates}
     )
     readers = [*positions.values(), *(candidates or () if planning else ())]
     if planning:
@@ -368,7 +376,9 @@ def check_use(
                 of_key=True,
             )
         elif name in references.layouts and name not in uncertain:
-            _check_balls_read(name, [one for one in readers if one.artefact == name], references)
+            _check_balls_read(
+                name, [candidate for candidate in readers if candidate.artefact == name], references
+            )
     calibration_count = len(sections.entries("calibration"))
     for name, settings in references.artefacts.items():
         with_one_length = isinstance(settings, TwoSpheresSettings | BryanGaugeSettings)
@@ -379,9 +389,9 @@ def check_use(
         ):
             kinds = (
                 [
-                    one.kind
-                    for one in sections.entries("calibration").values()
-                    if getattr(one, "artefact", "") in (name, None)
+                    candidate.kind
+                    for candidate in sections.entries("calibration").values()
+                    if getattr(candidate, "artefact", "") in (name, None)
                 ]
                 if calibration_count
                 else []
@@ -410,10 +420,12 @@ def check_calibration_read(
         return
     if len(positions) < position_count:
         return
-    own = [position for position in positions.values() if position.artefact == calibration.artefact]
+    artefact_positions = [
+        position for position in positions.values() if position.artefact == calibration.artefact
+    ]
     layout = references.layouts[calibration.artefact]
-    unread = np.setdiff1d(calibration.pairs, read_balls(own))
-    if own and len(unread):
+    unread = np.setdiff1d(calibration.pairs, read_balls(artefact_positions))
+    if artefact_positions and len(unread):
         names = listing(layout.names[i] for i in unread)
         references.problems.add(
             (*steps, "pairs"),
@@ -449,7 +461,9 @@ def check_size(
     if settings is None or machine is None or problems.has_below(("error_model",)):
         return
     d = machine.dimension
-    poses = sum(references.artefacts[one.artefact].role == "plate" for one in positions.values())
+    poses = sum(
+        references.artefacts[position.artefact].role == "plate" for position in positions.values()
+    )
     pivots = _pivots(positions.values(), references)
     errors = len(build_error_model(settings, *machine.volume.corners).parameters)
     offsets = sum(probe.is_estimated for probe in probes.values())
@@ -462,7 +476,9 @@ def check_size(
         )
         problems.add(("positions",), text, of_key=True)
     check_lengths(
-        {("calibration", i): one for i, one in calibrations.items()}, positions.values(), references
+        {("calibration", i): position for i, position in calibrations.items()},
+        positions.values(),
+        references,
     )
 
 
@@ -497,7 +513,11 @@ def check_derivatives(
 def _pivots(positions: Iterable[Position], references: References) -> list[Position]:
     """Positions of Bryan gauges."""
     kinds = references.artefacts
-    return [one for one in positions if isinstance(kinds[one.artefact], BryanGaugeSettings)]
+    return [
+        position
+        for position in positions
+        if isinstance(kinds[position.artefact], BryanGaugeSettings)
+    ]
 
 
 def check_lengths(
@@ -507,7 +527,7 @@ def check_lengths(
 ) -> None:
     """Report length standards and gauges that are read too often."""
     problems = references.problems
-    rows = sum(one.count for one in _pivots(positions, references))
+    rows = sum(pivot.count for pivot in _pivots(positions, references))
     if rows > MOST_LENGTHS:
         text = f"Bryan gauges are read {rows} times; at most {MOST_LENGTHS} lengths are possible"
         problems.add(("positions",), text, of_key=True)
@@ -516,7 +536,7 @@ def check_lengths(
         if not isinstance(calibration, DistanceCalibration):
             continue
         if references.artefacts[name].role == "length_standard":
-            times = sum(len(one.probes) for one in positions if one.artefact == name)
+            times = sum(len(pivot.probes) for pivot in positions if pivot.artefact == name)
             if len(calibration.pairs) * times > MOST_LENGTHS:
                 text = (
                     f'{len(calibration.pairs)} distances of "{name}", read {times} times, are too'
@@ -529,14 +549,19 @@ def check_lengths(
 def _check_joint_lengths(calibrations: Mapping[Steps, Calibration], references: References) -> None:
     """Report length standards of which too many lengths have balls in common."""
     of_standards: dict[str, list[tuple[Steps, DistanceCalibration]]] = {}
-    for steps, one in calibrations.items():
-        if not isinstance(one, DistanceCalibration) or one.repeatability != "included":
+    for steps, calibration in calibrations.items():
+        if (
+            not isinstance(calibration, DistanceCalibration)
+            or calibration.repeatability != "included"
+        ):
             continue
-        if references.artefacts[one.artefact].role == "length_standard":
-            of_standards.setdefault(one.artefact, []).append((steps, one))
-    for name, own in of_standards.items():
-        ends = np.concatenate([one.pairs.ravel() for _, one in own])
-        place = (*own[-1][0], "pairs")
+        if references.artefacts[calibration.artefact].role == "length_standard":
+            of_standards.setdefault(calibration.artefact, []).append((steps, calibration))
+    for name, calibrations_of_standard in of_standards.items():
+        ends = np.concatenate(
+            [calibration.pairs.ravel() for _, calibration in calibrations_of_standard]
+        )
+        place = (*calibrations_of_standard[-1][0], "pairs")
         is_joint = len(ends) > 2 * MOST_JOINT_LENGTHS and np.bincount(ends).max() > 1
         if is_joint and not references.problems.has_below(place):
             text = (
@@ -563,14 +588,14 @@ def check_points(
     outside = np.flatnonzero(by_how_much > TOLERANCE)
     for i in outside if marks is None else outside[:1]:
         axis = int(axes[i])
-        others = (
+        others_text = (
             f", as {len(outside) - 1} further points are"
             if marks is not None and len(outside) > 1
             else ""
         )
         text = (
             f"{AXES[axis]} = {format_length(points[i, axis])} is {format_length(by_how_much[i])}"
-            f" {sides[i]} the measuring volume{others}; move the point inside"
+            f" {sides[i]} the measuring volume{others_text}; move the point inside"
         )
         if marks is None:
             problems.add(steps if of_one else (*steps, int(i)), text)
@@ -582,7 +607,9 @@ def read_balls(positions: Iterable[Position]) -> np.ndarray[tuple[int], np.dtype
     """Return the indices of the balls that are read in any of the positions of one artefact, in
     order.
     """
-    return np.unique(np.concatenate([np.zeros(0, np.intp), *(one.balls for one in positions)]))
+    return np.unique(
+        np.concatenate([np.zeros(0, np.intp), *(position.balls for position in positions)])
+    )
 
 
 def _check_balls_read(name: str, positions: list[Position], references: References) -> None:

@@ -56,8 +56,8 @@ def read_numbered_curves(
             " of them out"
         )
         raise refused(file, text, line=lines[0][0])
-    known = (*NAMES, *(f"{name}{BANDWIDTH}" for name in NAMES)) if bandwidths else NAMES
-    names, factors = _columns(Mark(file, lines[0][0], 1), lines[0][1], known)
+    names_known = (*NAMES, *(f"{name}{BANDWIDTH}" for name in NAMES)) if bandwidths else NAMES
+    names, factors = _columns(Mark(file, lines[0][0], 1), lines[0][1], names_known)
     messages: list[Message] = []
     rows: list[tuple[int, list[float]]] = []
     for number, line in lines[1:]:

@@ -61,23 +61,23 @@ def parse_line(text: str) -> dict[str, float]:
     {'y': 0.6, 'z': 0.2}
     """
     _refuse_decimal_comma(text)
-    found: dict[str, float] = {}
+    values: dict[str, float] = {}
     for part in text.split(","):
-        name, equals, value = (one.strip() for one in part.partition("="))
+        name, equals, value = (piece.strip() for piece in part.partition("="))
         if not equals or name not in AXES:
             raise LineError(
                 f'"{shorten(part)}" is not a position of an axis; write for example y = 600 mm, z ='
                 " 200 mm"
             )
-        if name in found:
+        if name in values:
             raise LineError(f"{name} is given twice; leave one of them out")
         try:
-            found[name] = parse_length(value)
+            values[name] = parse_length(value)
         except QuantityError as error:
             raise LineError(f"{name}: {error}") from None
-    if len(found) > 2:
+    if len(values) > 2:
         raise LineError("a line needs an axis along which it runs; leave that one out")
-    return found
+    return values
 
 
 def _refuse_decimal_comma(text: str) -> None:
@@ -96,7 +96,7 @@ def read_error_table(path: Path, name: str, axis: tuple[float, float] | None = N
     :raises ExperimentError: everything that is wrong with the file at once.
     """
     messages: list[Message] = []
-    stated: dict[str, tuple[Mark, str]] = {}
+    stated_values: dict[str, tuple[Mark, str]] = {}
     for number, line in enumerate(read_text(path).splitlines(), start=1):
         match = COMMENT.match(line)
         if match is None:
@@ -111,22 +111,24 @@ def read_error_table(path: Path, name: str, axis: tuple[float, float] | None = N
                     " reword the comment"
                 )
                 messages.append(mark.message("", text))
-        elif (key := key.rstrip()) in stated:
+        elif (key := key.rstrip()) in stated_values:
             messages.append(
-                mark.message("", f'"{key}:" is already in line {stated[key][0].line}; remove one')
+                mark.message(
+                    "", f'"{key}:" is already in line {stated_values[key][0].line}; remove one'
+                )
             )
         else:
             begin = match.end(1) - len(value.lstrip()) + 1
-            stated[key] = (Mark(str(path), number, begin), value.strip())
+            stated_values[key] = (Mark(str(path), number, begin), value.strip())
     values: dict[str, Any] = {}
-    for key, (mark, text) in stated.items():
+    for key, (mark, text) in stated_values.items():
         try:
             values[key] = KEYS[key](text)
         except LineError as error:
             messages.append(mark.message("", str(error)))
     line_of, along = values.get("line", {}), AXES[AXIS_ERRORS[name].axis]
     if along in line_of:
-        mark = stated["line"][0]
+        mark = stated_values["line"][0]
         messages.append(mark.message("", f"the line runs along {along}; leave it out"))
     curves: dict[str, Points] = {}
     try:
@@ -135,18 +137,18 @@ def read_error_table(path: Path, name: str, axis: tuple[float, float] | None = N
             messages += _range(str(path), next(iter(curves.values())).positions, numbers, axis)
     except ExperimentError as error:
         messages += error.messages
-    others = [one for one in curves if one.removesuffix(BANDWIDTH) != name]
-    if curves and (others or name not in curves):
+    other_curves = [curve for curve in curves if curve.removesuffix(BANDWIDTH) != name]
+    if curves and (other_curves or name not in curves):
         text = f"the file should have {name}" + (
-            f" alone, but has {listing(others)}" if others else ""
+            f" alone, but has {listing(other_curves)}" if other_curves else ""
         )
         messages.append(Message(str(path), 0, 0, "", f"{text}; write one file for each error"))
     elif not AXIS_ERRORS[name].is_straightness:
         text = f"{name} is not a straightness error; remove this line"
         messages += [
-            stated[key][0].message("", text)
+            stated_values[key][0].message("", text)
             for key in ("straightness", "straightedge")
-            if key in stated
+            if key in stated_values
         ]
     bandwidth = curves.get(name + BANDWIDTH)
     if bandwidth is not None and min(bandwidth.values) < 0:
@@ -163,7 +165,7 @@ def read_error_table(path: Path, name: str, axis: tuple[float, float] | None = N
         line_of,
         values.get("probe", (0.0, 0.0, 0.0)),
         values.get("straightness"),
-        "straightedge" in stated,
+        "straightedge" in stated_values,
     )
 
 
@@ -173,11 +175,11 @@ def _meant(comment: str) -> str | None:
     words = re.findall(r"[a-z]+", head.partition("=")[0].casefold())
     if colon and len(words) <= MOST_WORDS:
         for word in words:
-            if (found := OTHER_WORDS.get(word) or nearest(word, KEYS)) is not None:
-                return found
-    first, _, rest = comment.partition(" ")
-    known = first.casefold().rstrip("=:,")
-    return known if known in KEYS and VALUE.search(rest) else None
+            if (key := OTHER_WORDS.get(word) or nearest(word, KEYS)) is not None:
+                return key
+    first, _, remainder = comment.partition(" ")
+    word_stem = first.casefold().rstrip("=:,")
+    return word_stem if word_stem in KEYS and VALUE.search(remainder) else None
 
 
 def _range(
@@ -186,13 +188,13 @@ def _range(
     """What is wrong with the ends of a table whose points stand in lines `numbers`."""
     lower, upper = axis
     length = upper - lower
-    found = []
+    limits = []
     for k, beside, end, sign, word in ((0, 1, lower, -1.0, "begins"), (-1, -2, upper, 1.0, "ends")):
         beyond = sign * (positions[k] - end)
         spacing = min(abs(positions[beside] - positions[k]), WIDEST * length)
         if beyond > MARGIN * length or -beyond > max(MARGIN * length, spacing):
-            found.append((numbers[k], f"the table {word} at {format_length(positions[k])}"))
-    if not found:
+            limits.append((numbers[k], f"the table {word} at {format_length(positions[k])}"))
+    if not limits:
         return []
     shift = lower - positions[0]
     right = "give positions of the axis, in the unit that the header says, and cover the axis"
@@ -203,8 +205,8 @@ def _range(
             else f"take {format_length(-shift)} from"
         )
         right = f"{change} every position, or state the volume as the scales read"
-    told = f"but the axis goes from {format_length(lower)} to {format_length(upper)}"
-    return [Message(file, number, 1, "", f"{text}, {told}; {right}") for number, text in found]
+    reason = f"but the axis goes from {format_length(lower)} to {format_length(upper)}"
+    return [Message(file, number, 1, "", f"{text}, {reason}; {right}") for number, text in limits]
 
 
 def parse_point(text: str) -> Three:
@@ -228,8 +230,8 @@ def parse_point(text: str) -> Three:
 
 def _criterion(text: str) -> str:
     if text not in get_args(Criterion):
-        known = hint(text, get_args(Criterion))
-        raise LineError(f'unknown criterion "{shorten(text)}"; {known}')
+        advice = hint(text, get_args(Criterion))
+        raise LineError(f'unknown criterion "{shorten(text)}"; {advice}')
     return text
 
 

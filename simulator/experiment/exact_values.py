@@ -65,11 +65,11 @@ class _Exact:
     def misfit(self, balls: Array) -> tuple[Array, Array]:
         """Values less those stated (m,) at `balls` (n, d), and their derivatives (m, k, d)."""
         misfits, rows = [], []
-        for given, chosen in self.parts:
-            value, slope = given.values(balls)
-            misfits.append((value - given.value)[chosen])
+        for values, chosen in self.parts:
+            value, slope = values.values(balls)
+            misfits.append((value - values.value)[chosen])
             row = np.zeros((len(chosen), len(self.balls), balls.shape[1]))
-            for k, ball in enumerate(given.balls[chosen].T):
+            for k, ball in enumerate(values.balls[chosen].T):
                 place = np.searchsorted(self.balls, ball)
                 row[np.arange(len(chosen)), place] += slope[chosen, k]
             rows.append(row)
@@ -96,23 +96,27 @@ def exact_contradictions(
     the first is, and in words.
     """
     for artefact in plates:
-        mine = {i: one for i, one in calibrations.items() if one.artefact == artefact}
+        mine = {
+            i: calibration
+            for i, calibration in calibrations.items()
+            if calibration.artefact == artefact
+        }
         layout = layouts[artefact]
         exact = _exact_values(mine, layout)
         if not exact.name:
             continue
         if len(exact.name) * len(exact.balls) * layout.coordinates.shape[1] > MOST_ENTRIES:
             continue
-        found = _least_misfit(exact, layout.coordinates)
-        if found is None:
+        least = _least_misfit(exact, layout.coordinates)
+        if least is None:
             continue
-        misfit = found[1]
+        misfit = least[1]
         most = float(np.abs(misfit).max())
-        order = np.argsort(-comparable(_doubtfulness(exact, *found), DIGITS), kind="stable")
-        told = [k for k in order.tolist() if abs(misfit[k]) > SHARE * most]
-        names = listing(f"{exact.name[k]} in calibration[{exact.item[k]}]" for k in told)
+        order = np.argsort(-comparable(_doubtfulness(exact, *least), DIGITS), kind="stable")
+        contradictory = [k for k in order.tolist() if abs(misfit[k]) > SHARE * most]
+        names = listing(f"{exact.name[k]} in calibration[{exact.item[k]}]" for k in contradictory)
         yield (
-            min(exact.item[k] for k in told),
+            min(exact.item[k] for k in contradictory),
             f"values that are stated as exact contradict one another: {names}; no balls have them"
             f" all, at best one is off by {1e6 * most:.3g} µm: correct the one that is wrong, or"
             " state uncertainties above 0 um",
@@ -121,18 +125,18 @@ def exact_contradictions(
 
 def _exact_values(calibrations: Mapping[int, Calibration], layout: BallLayout) -> _Exact:
     parts, items, names = [], [], []
-    for i, one in calibrations.items():
-        if not isinstance(one, DistanceCalibration | CoordinateCalibration):
+    for i, calibration in calibrations.items():
+        if not isinstance(calibration, DistanceCalibration | CoordinateCalibration):
             continue
-        given = one.observed(0)
-        chosen = np.flatnonzero(given.is_exact)
+        observed = calibration.observed(0)
+        chosen = np.flatnonzero(observed.is_exact)
         if not len(chosen):
             continue
-        called = one.names(layout)
-        parts.append((given, chosen))
+        called = calibration.names(layout)
+        parts.append((observed, chosen))
         items += [i] * len(chosen)
         names += [
-            f"{value_name(called[k], one.are_lengths)} {1e3 * given.value[k]:.10g} mm"
+            f"{value_name(called[k], calibration.are_lengths)} {1e3 * observed.value[k]:.10g} mm"
             for k in chosen.tolist()
         ]
     return _Exact(tuple(parts), tuple(items), tuple(names))
@@ -144,8 +148,8 @@ def _doubtfulness(exact: _Exact, balls: Array, misfit: Array) -> Array:
     """
     rows = exact.misfit(balls)[1]
     u, values, _ = np.linalg.svd(rows.reshape(len(rows), -1), full_matrices=False)
-    left = 1.0 - (u[:, values > KNOWN * values.max(initial=0.0)] ** 2).sum(axis=1)
-    return np.asarray(np.abs(misfit) / np.sqrt(np.maximum(left, SHARE)))
+    unexplained = 1.0 - (u[:, values > KNOWN * values.max(initial=0.0)] ** 2).sum(axis=1)
+    return np.asarray(np.abs(misfit) / np.sqrt(np.maximum(unexplained, SHARE)))
 
 
 def _least_misfit(exact: _Exact, drawn: Array) -> tuple[Array, Array] | None:
@@ -171,8 +175,8 @@ def _solved(exact: _Exact, balls: Array) -> tuple[Array, Array]:
         if np.abs(misfit).max() <= exact.rounding:
             break
         u, values, vh = np.linalg.svd(rows.reshape(len(rows), -1), full_matrices=False)
-        known = values > KNOWN * values.max(initial=0.0)
-        gain = np.where(known, values / np.where(known, values**2 + damping**2, 1.0), 0.0)
+        is_known = values > KNOWN * values.max(initial=0.0)
+        gain = np.where(is_known, values / np.where(is_known, values**2 + damping**2, 1.0), 0.0)
         step = np.zeros_like(balls)
         step[exact.balls] = -(vh.T @ (gain * (u.T @ misfit))).reshape(rows.shape[1:])
         if np.abs(step).max() <= 1e-16:

@@ -29,7 +29,7 @@ def resolve_influences(
     sections: Sections, positions: dict[int, Position], references: References
 ) -> tuple[InfluenceSettings, ...]:
     """Return the influence quantities; what is wrong goes to the problems."""
-    placed = {one.name: one.artefact for one in positions.values()}
+    placed = {position.name: position.artefact for position in positions.values()}
     found: list[InfluenceSettings] = []
     standards = [
         name
@@ -70,9 +70,9 @@ def with_influences(design: Design, experiment: Experiment, is_pool: bool = Fals
         experiment.source.parent,
     )
     influences = []
-    for i, one in enumerate(experiment.influences):
+    for i, parameter in enumerate(experiment.influences):
         try:
-            influences.append(one.influence(parts))
+            influences.append(parameter.influence(parts))
         except ValueError as error:
             raise experiment.refused(("influences", i), str(error)) from None
         text = wrong_of_parameters(influences[-1].parameters, len(design.positions.names))
@@ -84,35 +84,43 @@ def with_influences(design: Design, experiment: Experiment, is_pool: bool = Fals
     state = nominal_state(disturbed)
     x = locations(disturbed, state, chosen) - state.probes[chosen.probe]
     at = disturbed_readings(state, chosen, x)
-    for i, one in enumerate(experiment.influences):
-        text = wrong_of_shifts(influences[i], one, at, lambda other: other.influence(parts))
+    for i, parameter in enumerate(experiment.influences):
+        text = wrong_of_shifts(
+            influences[i], parameter, at, lambda candidate: candidate.influence(parts)
+        )
         if text:
             raise _of_class(experiment, i, text)
     parameters = disturbed.influence_parameters
-    twice = [name for name, count in Counter(one.name for one in parameters).items() if count > 1]
+    twice = [
+        name
+        for name, count in Counter(parameter.name for parameter in parameters).items()
+        if count > 1
+    ]
     if twice:
         text = f"{twice[0]} is stated by two of them; remove it from one"
         raise experiment.refused(("influences",), text)
     _refuse_too_many(disturbed, experiment, is_pool)
-    known = np.flatnonzero(np.isfinite([one.uncertainty for one in parameters]))
-    stated = [parameters[k] for k in known]
-    return disturbed.observed(_with_stated(design.of(Priors), known, stated))
+    known_indices = np.flatnonzero(np.isfinite([parameter.uncertainty for parameter in parameters]))
+    known_parameters = [parameters[k] for k in known_indices]
+    return disturbed.observed(_with_stated(design.of(Priors), known_indices, known_parameters))
 
 
-def _with_stated(priors: Priors, known: Integers, stated: list[InfluenceParameter]) -> Priors:
+def _with_stated(
+    priors: Priors, known_indices: Integers, parameters: list[InfluenceParameter]
+) -> Priors:
     """Priors, and what is stated of the parameters `known` of influence quantities."""
-    none = np.full(len(known), -1)
+    none = np.full(len(known_indices), -1)
     offsets = priors.by_offset
     return Priors(
-        (*priors.names, *(one.name for one in stated)),
+        (*priors.names, *(parameter.name for parameter in parameters)),
         np.append(priors.position, none),
         np.append(priors.probe, none),
         np.append(priors.component, none),
-        np.concatenate([priors.by_model, np.zeros((len(known), priors.by_model.shape[1]))]),
-        np.append(priors.value, [one.value for one in stated]),
-        np.append(priors.uncertainty, [one.uncertainty for one in stated]),
-        np.append(np.full(len(priors), -1), known),
-        None if offsets is None else np.pad(offsets, ((0, len(known)), (0, 0), (0, 0))),
+        np.concatenate([priors.by_model, np.zeros((len(known_indices), priors.by_model.shape[1]))]),
+        np.append(priors.value, [parameter.value for parameter in parameters]),
+        np.append(priors.uncertainty, [parameter.uncertainty for parameter in parameters]),
+        np.append(np.full(len(priors), -1), known_indices),
+        None if offsets is None else np.pad(offsets, ((0, len(known_indices)), (0, 0), (0, 0))),
         priors.units,
     )
 
@@ -126,7 +134,7 @@ def _refuse_too_many(disturbed: Design, experiment: Experiment, is_pool: bool) -
     shared = disturbed.parameter_count - disturbed.dimension * len(disturbed.plate_balls)
     if is_pool:
         poses = ~disturbed.positions.held[disturbed.posed_positions]
-        shared -= int(poses.sum()) + sum(one.position >= 0 for one in parameters)
+        shared -= int(poses.sum()) + sum(parameter.position >= 0 for parameter in parameters)
     if shared > MOST_SHARED:
         text = (
             f"their {len(parameters)} parameters make {shared} besides the balls; at most"

@@ -66,11 +66,13 @@ def lay_out(experiment: Experiment, is_pool: bool = False) -> Design:
     for item in experiment.calibration:
         if isinstance(item, RadiusCalibration):
             first = first_ball[item.artefact]
-            own = slice(first, first + len(experiment.layouts[item.artefact].names))
-            balls[own] *= item.value / np.sqrt((balls[own] ** 2).sum(axis=1))[:, None]
-    is_plate = np.array([one.role == "plate" for one in experiment.artefacts.values()])
+            balls_of_artefact = slice(first, first + len(experiment.layouts[item.artefact].names))
+            balls[balls_of_artefact] *= (
+                item.value / np.sqrt((balls[balls_of_artefact] ** 2).sum(axis=1))[:, None]
+            )
+    is_plate = np.array([artefact.role == "plate" for artefact in experiment.artefacts.values()])
     is_gauge = np.array(
-        [isinstance(one, BryanGaugeSettings) for one in experiment.artefacts.values()]
+        [isinstance(artefact, BryanGaugeSettings) for artefact in experiment.artefacts.values()]
     )
     probe_index = {name: k for k, name in enumerate(experiment.probes)}
     places = experiment.positions
@@ -78,8 +80,8 @@ def lay_out(experiment: Experiment, is_pool: bool = False) -> Design:
     position_artefact = np.array([artefacts.index(place.artefact) for place in places], np.int64)
     rotations = np.array([place.pose.rotation for place in places])
     origins = np.array([place.pose.origin for place in places])
-    stated = _stated(experiment, first_ball)
-    distances, coordinates, *others = stated
+    observations = _stated(experiment, first_ball)
+    distances, coordinates, *other_observations = observations
     lengths, unknown = standard_lengths(
         experiment, readings, first_ball, rotations, position_artefact, balls
     )
@@ -92,15 +94,15 @@ def lay_out(experiment: Experiment, is_pool: bool = False) -> Design:
         balls,
     )
     across = _across(experiment, rotations, position_artefact)
-    held = _held(laid, position_artefact, rotations, stated)
+    held_flags = _held(laid, position_artefact, rotations, observations)
     if across is not None:
-        read = np.flatnonzero(across >= 0)
+        plane_positions = np.flatnonzero(across >= 0)
         # Nothing is read of a shift across the plane and, of what is in it, of tilts.
-        held[read, across[read]] = True
-        held[read, d:] |= np.arange(d) != across[read][:, None]
+        held_flags[plane_positions, across[plane_positions]] = True
+        held_flags[plane_positions, d:] |= np.arange(d) != across[plane_positions][:, None]
     # A pivot has a place; how the bar turns about it is what the readings say.
-    held[is_gauge[position_artefact]] = np.arange(pose_size(d)) >= d
-    priors = _priors(experiment, held, len(model.parameters))
+    held_flags[is_gauge[position_artefact]] = np.arange(pose_size(d)) >= d
+    priors = _priors(experiment, held_flags, len(model.parameters))
     design = Design(
         model,
         machine,
@@ -116,11 +118,11 @@ def lay_out(experiment: Experiment, is_pool: bool = False) -> Design:
             position_artefact,
             rotations,
             origins,
-            held,
+            held_flags,
             across,
         ),
         readings,
-        (distances, coordinates, lengths, priors, *others, *_stars(experiment)),
+        (distances, coordinates, lengths, priors, *other_observations, *_stars(experiment)),
         unknown,
         EvaluationPoints(points, probe_index[experiment.evaluation.probe]),
         Tasks(
@@ -142,16 +144,16 @@ def _free(experiment: Experiment) -> Flags:
     return np.repeat(np.array(free)[:, None], experiment.dimension, axis=1)
 
 
-def _priors(experiment: Experiment, held: Flags, parameters: int) -> Priors:
+def _priors(experiment: Experiment, held_flags: Flags, parameters: int) -> Priors:
     """What is known beforehand: the priors stated, and the probe offsets that have an uncertainty.
 
     :raises ExperimentError: a prior is about a pose parameter that is held.
     """
-    given = list(experiment.priors)
+    all_priors = list(experiment.priors)
     places = [place.name for place in experiment.positions]
     messages = []
-    for prior in given:
-        if prior.position is not None and held[places.index(prior.position), prior.component]:
+    for prior in all_priors:
+        if prior.position is not None and held_flags[places.index(prior.position), prior.component]:
             text = (
                 f'"{prior.name}" is held, to fix the frame of the artefact; state priors of other'
                 " positions"
@@ -162,23 +164,27 @@ def _priors(experiment: Experiment, held: Flags, parameters: int) -> Priors:
     nowhere = Mark(str(experiment.source), 0, 0)
     for probe, axis, value, u in experiment.certified_offsets:
         label = f"probe {probe.name}: offset {'xyz'[axis]}"
-        given.append(Prior(label, None, probe.name, axis, np.zeros(parameters), value, u, nowhere))
+        all_priors.append(
+            Prior(label, None, probe.name, axis, np.zeros(parameters), value, u, nowhere)
+        )
     probes, by_offset = list(experiment.probes), None
-    if any(prior.by_offset for prior in given):
-        by_offset = np.zeros((len(given), len(probes), experiment.dimension))
-        for k, prior in enumerate(given):
+    if any(prior.by_offset for prior in all_priors):
+        by_offset = np.zeros((len(all_priors), len(probes), experiment.dimension))
+        for k, prior in enumerate(all_priors):
             for name, coefficients in (prior.by_offset or {}).items():
                 by_offset[k, probes.index(name)] = coefficients
     return Priors(
-        tuple(prior.name for prior in given),
-        np.array([-1 if p.position is None else places.index(p.position) for p in given], np.int64),
-        np.array([-1 if p.probe is None else probes.index(p.probe) for p in given], np.int64),
-        np.array([p.component for p in given], np.int64),
-        np.array([p.by_model for p in given], float).reshape(len(given), parameters),
-        np.array([p.value for p in given], float),
-        np.array([p.standard_uncertainty for p in given], float),
+        tuple(prior.name for prior in all_priors),
+        np.array(
+            [-1 if p.position is None else places.index(p.position) for p in all_priors], np.int64
+        ),
+        np.array([-1 if p.probe is None else probes.index(p.probe) for p in all_priors], np.int64),
+        np.array([p.component for p in all_priors], np.int64),
+        np.array([p.by_model for p in all_priors], float).reshape(len(all_priors), parameters),
+        np.array([p.value for p in all_priors], float),
+        np.array([p.standard_uncertainty for p in all_priors], float),
         by_offset=by_offset,
-        units=tuple(p.unit for p in given),
+        units=tuple(p.unit for p in all_priors),
     )
 
 
@@ -188,7 +194,7 @@ def _across(
     """The machine's axis (k,) across artefacts that are read in their plane, -1 for others; None
     where there are no such artefacts.
     """
-    in_plane = [one.reads == "in plane" for one in experiment.artefacts.values()]
+    in_plane = [artefact.reads == "in plane" for artefact in experiment.artefacts.values()]
     if not any(in_plane):
         return None
     axis = np.abs(rotations[:, :, -1]).argmax(axis=1)
@@ -215,7 +221,7 @@ def _readings(
     """
     rows = []
     uncertainties = [experiment.machine.repeatability]
-    is_in_order = any(one.in_order for one in experiment.influences)
+    is_in_order = any(influence.in_order for influence in experiment.influences)
     for k, place in enumerate(experiment.positions):
         for group in place.readings:
             balls = first_ball[place.artefact] + group.ball_indices
@@ -253,19 +259,19 @@ def _stated(experiment: Experiment, first_ball: dict[str, int]) -> list[Observat
     joint = []
     for item in experiment.calibration:
         if experiment.is_observed(item):
-            one = item.observed(int(first_ball.get(item.artefact, 0)))
+            observed = item.observed(int(first_ball.get(item.artefact, 0)))
             root = item.root
             if root is None:
-                parts.setdefault(type(one), []).append(one)
-            elif isinstance(one, BallObservations):
-                joint.append((one, root))
+                parts.setdefault(type(observed), []).append(observed)
+            elif isinstance(observed, BallObservations):
+                joint.append((observed, root))
     for name, artefact in experiment.artefacts.items():
         if artefact.flatness is not None:
             parts[CalibratedCoordinates].append(
                 flat(experiment.layouts[name], int(first_ball[name]), artefact.flatness)
             )
-    found = [kind.joined(own) for kind, own in parts.items()]
-    return [*found, JointValues.of(joint)] if joint else found
+    joined = [kind.joined(parts_of_kind) for kind, parts_of_kind in parts.items()]
+    return [*joined, JointValues.of(joint)] if joint else joined
 
 
 def _held(
@@ -282,18 +288,19 @@ def _held(
     about it open in every pose, a single ball every turn.
     """
     d = balls.places.shape[1]
-    held = np.zeros((len(position_artefact), pose_size(d)), bool)
+    held_flags = np.zeros((len(position_artefact), pose_size(d)), bool)
     ball, axis, _ = (
-        np.concatenate(one) for one in zip(*(one.fixing() for one in observations), strict=True)
+        np.concatenate(observation)
+        for observation in zip(*(observation.fixing() for observation in observations), strict=True)
     )
     for artefact in np.unique(position_artefact):
         positions = np.flatnonzero(position_artefact == artefact)
-        own = balls.of(artefact)
-        places = balls.places[own]
+        members = balls.of(artefact)
+        places = balls.places[members]
         idle = _idle_turns(places)
         for k in positions:
-            held[k] |= _pivots(_in_machine_axes(idle, rotations[k]))
-        chosen = np.isin(ball, own)
+            held_flags[k] |= _pivots(_in_machine_axes(idle, rotations[k]))
+        chosen = np.isin(ball, members)
         fixed = _motion_of_coordinates(
             balls.places[ball[chosen]] - places.mean(axis=0), axis[chosen], d
         )
@@ -301,8 +308,8 @@ def _held(
         free = _null_space(np.concatenate([fixed, idle.T]))
         first = rotations[positions[0]]
         motions = _in_machine_axes(np.concatenate([idle, free], axis=1), first)
-        held[positions[0]] |= _pivots(motions, held[positions[0]])
-    return held
+        held_flags[positions[0]] |= _pivots(motions, held_flags[positions[0]])
+    return held_flags
 
 
 def _idle_turns(balls: Array) -> Array:
@@ -358,13 +365,13 @@ def _pivots(motions: Array, already: Flags | None = None) -> Flags:
     """
     chosen = np.zeros(len(motions), bool)
     waiting = [] if already is None else np.flatnonzero(already).tolist()
-    left = motions.copy()
+    remainder = motions.copy()
     for k in range(motions.shape[1]):
-        size = np.where(chosen, -1.0, (left**2).sum(axis=1))
+        size = np.where(chosen, -1.0, (remainder**2).sum(axis=1))
         row = waiting[k] if k < len(waiting) else int(comparable(size).argmax())
         if size[row] <= FLAT:
             break
         chosen[row] = True
-        direction = left[row] / np.sqrt(left[row] @ left[row])
-        left = left - np.outer(left @ direction, direction)
+        direction = remainder[row] / np.sqrt(remainder[row] @ remainder[row])
+        remainder = remainder - np.outer(remainder @ direction, direction)
     return chosen

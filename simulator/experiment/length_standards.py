@@ -59,31 +59,35 @@ def standard_lengths(
     names: list[str] = []
     standing: list[int] = []
     drawn: list[float] = []
-    read: dict[tuple[int, int, int], int] = {}
+    index_of_pair: dict[tuple[int, int, int], int] = {}
     standards = [
-        k for k, one in enumerate(experiment.artefacts.values()) if one.role == "length_standard"
+        k
+        for k, artefact in enumerate(experiment.artefacts.values())
+        if artefact.role == "length_standard"
     ]
     for i in np.flatnonzero(np.isin(position_artefact[readings.position], standards)).tolist():
-        read[int(readings.position[i]), int(readings.probe[i]), int(readings.ball[i])] = i
+        index_of_pair[int(readings.position[i]), int(readings.probe[i]), int(readings.ball[i])] = i
     anew = count()
 
     def between(number: int, kinds: list[tuple[_Row, Array]]) -> Iterator[_Row]:
         for k in np.flatnonzero(position_artefact == number):
             for probe in range(len(experiment.probes)):
                 for kind, pair in kinds:
-                    first, second = (read.get((int(k), probe, int(ball)), -1) for ball in pair)
+                    first, second = (
+                        index_of_pair.get((int(k), probe, int(ball)), -1) for ball in pair
+                    )
                     if first < 0 or second < 0:
                         continue
                     along = rotations[k] @ (balls[pair[0]] - balls[pair[1]])
                     unit = along / np.sqrt(along @ along)
                     # What repeatability does not excuse is off anew each time.
-                    own = kind.certificate if kind.scatters else ("anew", next(anew))
+                    source = kind.certificate if kind.scatters else ("anew", next(anew))
                     yield replace(
-                        kind, first=first, second=second, direction=tuple(unit), certificate=own
+                        kind, first=first, second=second, direction=tuple(unit), certificate=source
                     )
 
-    def unknown(name: str, what: str, value: float) -> _Row:
-        names.append(f"{name}: {what}")
+    def unknown(name: str, noun: str, value: float) -> _Row:
+        names.append(f"{name}: {noun}")
         standing.append(artefacts.index(name))
         drawn.append(value)
         return _Row(value=value, certificate=(name, 0), free=len(names) - 1)
@@ -114,11 +118,13 @@ def standard_lengths(
             kind = unknown(name, "length", settings.length)
             rows += between(number, [(kind, first_ball[name] + np.array([0, 1]))])
         elif isinstance(settings, BryanGaugeSettings):
-            known = [one for one in experiment.calibration if one.artefact == name]
+            calibrations = [
+                artefact for artefact in experiment.calibration if artefact.artefact == name
+            ]
             kind = (
                 unknown(name, "radius", settings.radius)
-                if not known
-                else _certified_radius(name, known[0])
+                if not calibrations
+                else _certified_radius(name, calibrations[0])
             )
             for k in np.flatnonzero(position_artefact[readings.position] == number):
                 along = rotations[readings.position[k]] @ balls[readings.ball[k]]
@@ -136,7 +142,10 @@ def _certified_radius(name: str, item: object) -> _Row:
 
 
 def _arrays(rows: list[_Row], dimension: int) -> Lengths:
-    numbers = {one: i for i, one in enumerate(dict.fromkeys(row.certificate for row in rows))}
+    numbers = {
+        certificate: i
+        for i, certificate in enumerate(dict.fromkeys(row.certificate for row in rows))
+    }
     return Lengths(
         np.array([row.first for row in rows], np.int64),
         np.array([row.second for row in rows], np.int64),

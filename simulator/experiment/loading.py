@@ -98,9 +98,13 @@ def load(
             variants_of.setdefault(message, []).append(name)
     found = base_problems.messages + [
         Message(
-            one.file, one.line, one.column, one.path, one.text + in_variants(names, list(trees))
+            message.file,
+            message.line,
+            message.column,
+            message.path,
+            message.text + in_variants(names, list(trees)),
         )
-        for one, names in variants_of.items()
+        for message, names in variants_of.items()
     ]
     _raise_if_any(found, refused, source)
     return tuple(experiments)
@@ -124,8 +128,8 @@ def with_pool(experiment: Experiment) -> Experiment:
 
     :raises ExperimentError: what a plan may choose from is wrong.
     """
-    found = experiment.builder(experiment.tree, planning=True)
-    return replace(found, mark=experiment.mark)
+    rebuilt = experiment.builder(experiment.tree, planning=True)
+    return replace(rebuilt, mark=experiment.mark)
 
 
 def written_in_python(sections: AnyMapping[str, Any], folder: Path) -> Experiment:
@@ -149,10 +153,10 @@ def _built(root: Node, source: Path, name: str | None, trust: Trust, planning: b
 
     :raises ExperimentError: it is wrong.
     """
-    found, messages = build(root, source, name, trust, planning)
-    if found is None:
+    experiment, messages = build(root, source, name, trust, planning)
+    if experiment is None:
         raise ExperimentError(sorted(messages))
-    return found
+    return experiment
 
 
 def build(

@@ -81,11 +81,11 @@ def resolve_noise(settings: str | NoiseSettings | None, problems: Problems) -> N
         return Noise()
     if isinstance(settings, str):
         settings = NoiseSettings.model_validate({"distribution": settings})
-    given, steps = settings.degrees_of_freedom, ("noise",)
-    if settings.distribution == "student t" and given is None:
+    freedom_and_path, steps = settings.degrees_of_freedom, ("noise",)
+    if settings.distribution == "student t" and freedom_and_path is None:
         text = "student t has no degrees of freedom; write {distribution: student t, degrees_of_"
         problems.add(steps, text + "freedom: 5}")
-    elif settings.distribution != "student t" and given is not None:
+    elif settings.distribution != "student t" and freedom_and_path is not None:
         text = f"{settings.distribution} noise has none; remove it, or write student t"
         problems.add((*steps, "degrees_of_freedom"), text)
     if settings.correlation:
@@ -94,7 +94,7 @@ def resolve_noise(settings: str | NoiseSettings | None, problems: Problems) -> N
             " independent; have uncertainties with it by Monte Carlo (run --trials)"
         )
         problems.doubt((*steps, "correlation"), text)
-    return Noise(settings.distribution, given or np.inf, settings.correlation)
+    return Noise(settings.distribution, freedom_and_path or np.inf, settings.correlation)
 
 
 def resolve_evaluation(
@@ -119,15 +119,15 @@ def resolve_evaluation(
         references.problems.add(("evaluation",), text)
         return None
     tasks = [
-        _task(i, one, probe, machine, probes, sections, references)
-        for i, one in enumerate(settings.tasks or ())
+        _task(i, task, probe, machine, probes, sections, references)
+        for i, task in enumerate(settings.tasks or ())
     ]
     points = nowhere if settings.points is None else _points(settings.points, machine, references)
-    found = tuple(task for task in tasks if task is not None)
+    resolved = tuple(task for task in tasks if task is not None)
     return (
         None
-        if points is None or len(found) < len(tasks)
-        else Evaluation(frozen(points), probe, found)
+        if points is None or len(resolved) < len(tasks)
+        else Evaluation(frozen(points), probe, resolved)
     )
 
 
@@ -144,7 +144,7 @@ def _task(
     steps: Steps = ("evaluation", "tasks", i)
     problems, dimension = references.problems, references.dimension
     before = len(problems.messages)
-    names = [one.name for one in sections.get("evaluation").tasks]
+    names = [task.name for task in sections.get("evaluation").tasks]
     if settings.name in names[:i]:
         text = (
             f'"{settings.name}" is the name of tasks[{names.index(settings.name)}] already; names'
@@ -178,12 +178,12 @@ def _task(
     )
 
 
-def target_of(sections: Sections, own: LengthFunction | None = None) -> Target | None:
+def target_of(sections: Sections, own_target: LengthFunction | None = None) -> Target | None:
     """What uncertainties are to be within: a length of its `own`, or else the file's, and which of
     them it is about.
     """
-    stated = own or sections.get("target_uncertainty")
-    return None if stated is None else Target(stated, sections.get("coverage_factor"))
+    target = own_target or sections.get("target_uncertainty")
+    return None if target is None else Target(target, sections.get("coverage_factor"))
 
 
 def _unknown(probe: str, references: References) -> str:
@@ -209,7 +209,7 @@ def _points(settings: Any, machine: Machine | None, references: References) -> F
         volume, seed = machine.volume, 1 if settings.seed is None else settings.seed
         size = (settings.random, dimension)
         return np.random.default_rng(seed).uniform(volume.lower, volume.upper, size)
-    if not all([references.has_dimension(one, (*steps, i)) for i, one in enumerate(settings)]):
+    if not all([references.has_dimension(entry, (*steps, i)) for i, entry in enumerate(settings)]):
         return None
     points = np.array(settings)
     if machine is not None and machine.dimension == dimension:

@@ -69,12 +69,12 @@ def load_machine(
         problems.add((), text)
     else:
         problems.add_empty()
-        found = _machine(root, source, problems, trust)
-        if found is not None and not refused:
+        machine = _machine(root, source, problems, trust)
+        if machine is not None and not refused:
             if doubts is not None:
-                _doubt_what_is_taken_off(found, problems)
+                _doubt_what_is_taken_off(machine, problems)
                 doubts += problems.doubts
-            return found
+            return machine
     raise ExperimentError(in_order(problems.messages, refused, source))
 
 
@@ -132,8 +132,10 @@ def _bare(settings: DescribedMachineSettings, problems: Problems) -> MachineDesc
         problems.add(("droop",), text, of_key=True)
     bottom, top = (_three(end) for end in zip(*ends, strict=True))
     temperature = {
-        axis: AxisTemperature(one.expansion, one.deviation, one.standard_uncertainty or 0.0)
-        for axis, one in (
+        axis: AxisTemperature(
+            excess.expansion, excess.deviation, excess.standard_uncertainty or 0.0
+        )
+        for axis, excess in (
             {} if settings.temperature is None else settings.temperature.stated
         ).items()
     }
@@ -241,17 +243,17 @@ def _smoothed(
     knots = tuple(sorted(settings.knots or ()))
     if settings.every is not None:
         knots = at_every(x, settings.every, float(x[0]), float(x[-1]))
-    found = SmoothedPoints(points.positions, points.values, settings.order, knots)
+    smoothed = SmoothedPoints(points.positions, points.values, settings.order, knots)
     try:
         if len(x) < settings.order + len(knots):
             text = f"{len(x)} points do not determine {settings.order + len(knots)} coefficients"
             raise SplineError([SplineProblem(f"{text}; lower the order, or leave knots out")])
-        found.fitted  # noqa: B018
+        smoothed.fitted  # noqa: B018
     except SplineError as error:
         for problem in error.problems:
             problems.add(steps, problem.told(format_length))
         return points
-    return found
+    return smoothed
 
 
 def _doubt_what_is_taken_off(machine: MachineDescription, problems: Problems) -> None:
@@ -316,23 +318,23 @@ def _line(
 ) -> Three | None:
     if settings is None:
         return None
-    stated = settings.stated
-    if AXES[axis] in stated:
+    values = settings.stated
+    if AXES[axis] in values:
         problems.add(
             (*steps, AXES[axis]), f"the line runs along {AXES[axis]}; leave it out", of_key=True
         )
         return None
-    line = _complete(stated, machine, axis)
+    line = _complete(values, machine, axis)
     _inside(line, machine, steps, problems)
     return line
 
 
-def _complete(stated: dict[str, float], machine: MachineDescription, axis: int) -> Three | None:
+def _complete(values: dict[str, float], machine: MachineDescription, axis: int) -> Three | None:
     """Positions of all axes, those not stated being the reference point's."""
-    if not stated:
+    if not values:
         return None
     x, y, z = (
-        stated.get(key, machine.reference[k]) if k != axis else machine.reference[k]
+        values.get(key, machine.reference[k]) if k != axis else machine.reference[k]
         for k, key in enumerate(AXES)
     )
     return x, y, z

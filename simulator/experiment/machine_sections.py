@@ -266,5 +266,5 @@ def machine_schema() -> dict[str, Any]:
     """Return the JSON Schema (draft 2020-12) of a machine file."""
     from .json_schema import DRAFT, tidied
 
-    found: dict[str, Any] = tidied(DescribedMachineSettings.model_json_schema())
-    return {"$schema": DRAFT, **found, "title": "ballplate machine"}
+    schema: dict[str, Any] = tidied(DescribedMachineSettings.model_json_schema())
+    return {"$schema": DRAFT, **schema, "title": "ballplate machine"}

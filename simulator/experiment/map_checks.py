@@ -48,8 +48,13 @@ def map_of_tree(
 ) -> FittedMap | None:
     """The map of a tree, or None after saying what is wrong."""
     if not isinstance(root, MappingNode) or "map" not in root.items:
-        what = describe(to_python(root)) if not isinstance(root, MappingNode) else "no key map"
-        text = f"is no map file ({what}); write one with: ballplate fit FILE READINGS -o map.yaml"
+        description = (
+            describe(to_python(root)) if not isinstance(root, MappingNode) else "no key map"
+        )
+        text = (
+            f"is no map file ({description}); write one with:"
+            " ballplate fit FILE READINGS -o map.yaml"
+        )
         problems.add((), text)
         return None
     problems.add_empty()
@@ -63,13 +68,13 @@ def map_of_tree(
             problems.add(("volume", axis), text)
     if problems.messages:
         return None
-    lower, upper = (np.array(one) for one in zip(*ends, strict=True))
+    lower, upper = (np.array(entry) for entry in zip(*ends, strict=True))
     volume = Volume(lower, upper)
     model = _model(settings, volume, source.parent, problems, trust)
     probes = _probes(settings, len(lower), problems)
     if model is None or probes is None:
         return None
-    values = np.array([one.value for one in settings.parameters])
+    values = np.array([entry.value for entry in settings.parameters])
     _check_parameters(settings, model, problems)
     if problems.messages:
         return None
@@ -95,7 +100,9 @@ def map_of_tree(
         volume=volume,
         values=values,
         probes=probes,
-        drawn_offsets=np.array([one.nominal or one.offset for one in settings.probes.values()]),
+        drawn_offsets=np.array(
+            [entry.nominal or entry.offset for entry in settings.probes.values()]
+        ),
         probe=settings.probe,
         covariance=covariance,
         undetermined=undetermined,
@@ -107,8 +114,8 @@ def map_of_tree(
         frame=settings.frame,
         temperatures=settings.temperatures,
         left_out=tuple(
-            LeftOut(one.name, one.kind, one.unit, one.value, one.standard_uncertainty)
-            for one in settings.left_out
+            LeftOut(entry.name, entry.kind, entry.unit, entry.value, entry.standard_uncertainty)
+            for entry in settings.left_out
         ),
         data=None if data is None else MapData(**data.model_dump()),
         lack_of_fit=None if lack is None else LackOfFit(**lack.model_dump()),
@@ -123,25 +130,29 @@ def _model(
     settings: MapSettings, volume: Volume, folder: Path, problems: Problems, trust: Trust
 ) -> ErrorModel | None:
     """The error model, or None after saying what is wrong."""
-    own: Any = settings.error_model
+    model_settings: Any = settings.error_model
     d = len(volume.lower)
-    kind = kind_of(own)
+    kind = kind_of(model_settings)
     if d not in kind.dimensions:
-        problems.add(("volume",), f"has {d} axes, but {own.kind} models have {kind.dimensions[0]}")
+        problems.add(
+            ("volume",), f"has {d} axes, but {model_settings.kind} models have {kind.dimensions[0]}"
+        )
         return None
     try:
-        if isinstance(own, MachineFileSettings):
-            own.set_machine(load_machine(trust.file(folder, own.file), trust=trust))
-        elif isinstance(own, PythonSettings):
-            own.beside(folder, trust)
-        wrong = list(kind.wrong(own, d))
+        if isinstance(model_settings, MachineFileSettings):
+            model_settings.set_machine(
+                load_machine(trust.file(folder, model_settings.file), trust=trust)
+            )
+        elif isinstance(model_settings, PythonSettings):
+            model_settings.beside(folder, trust)
+        wrong = list(kind.wrong(model_settings, d))
         for below, text in wrong:
             problems.add(("error_model", *below), text)
         # What is not to be run is refused where the model is made.
-        may_look = trust.modules or not isinstance(own, PythonSettings)
+        may_look = trust.modules or not isinstance(model_settings, PythonSettings)
         if wrong or may_look and not _has_its_files(settings, folder, problems):
             return None
-        return build_error_model(own, *volume.corners)
+        return build_error_model(model_settings, *volume.corners)
     except CustomModelError as error:
         problems.add(("error_model", error.key), str(error))
     except ExperimentError as error:
@@ -152,8 +163,8 @@ def _model(
 def _has_its_files(settings: MapSettings, folder: Path, problems: Problems) -> bool:
     """Whether files that the error model rests on are what they were; reports which are not."""
     before = len(problems.messages)
-    stated = to_python(problems.root)["error_model"]  # type: ignore[index,unused-ignore]
-    present = fingerprints(absolute(stated, folder))
+    model_data = to_python(problems.root)["error_model"]  # type: ignore[index,unused-ignore]
+    present = fingerprints(absolute(model_data, folder))
     for name, fingerprint in settings.files.items():
         if name not in present or present[name] != fingerprint:
             text = (
@@ -178,23 +189,32 @@ def _probes(settings: MapSettings, d: int, problems: Problems) -> Probes | None:
         problems.add(("probe",), text)
     if problems.messages:
         return None
-    free = [[axis in one.estimated for axis in AXES[:d]] for one in settings.probes.values()]
-    offsets = np.array([one.offset for one in settings.probes.values()])
+    free = [
+        [axis in probe_settings.estimated for axis in AXES[:d]]
+        for probe_settings in settings.probes.values()
+    ]
+    offsets = np.array([probe_settings.offset for probe_settings in settings.probes.values()])
     return Probes(tuple(settings.probes), offsets, np.array(free, bool))
 
 
 def _check_parameters(settings: MapSettings, model: ErrorModel, problems: Problems) -> None:
     """Report parameters that are not those of the error model."""
-    known, given = model.parameters, settings.parameters
-    if len(known) != len(given):
-        text = f"has {len(given)} entries, but the error model {len(known)} parameters"
+    expected_parameters, stated_parameters = model.parameters, settings.parameters
+    if len(expected_parameters) != len(stated_parameters):
+        text = (
+            f"has {len(stated_parameters)} entries, but the error model"
+            f" {len(expected_parameters)} parameters"
+        )
         problems.add(("parameters",), f"{text}; the file is incomplete, or was edited")
         return
-    for k, (one, stated) in enumerate(zip(known, given, strict=True)):
-        if (one.name, one.unit) != (stated.name, stated.unit):
+    for k, (expected, parameter) in enumerate(
+        zip(expected_parameters, stated_parameters, strict=True)
+    ):
+        if (expected.name, expected.unit) != (parameter.name, parameter.unit):
             text = (
-                f'is "{shorten(stated.name)}" in {stated.unit}, but the error model has'
-                f' "{one.name}" in {one.unit} there: the file was edited; write it again with'
+                f'is "{shorten(parameter.name)}" in {parameter.unit}, but the error model has'
+                f' "{expected.name}" in {expected.unit} there: the file was edited; write it again'
+                " with"
                 " fit -o"
             )
             problems.add(("parameters", k), text)
@@ -204,14 +224,14 @@ def _check_squares(settings: MapSettings, problems: Problems) -> None:
     """Report sums of squares that an estimated sigma does not come from."""
     if not settings.sigma.estimated:
         return
-    for key, stated in (("sigma", settings.sigma), ("lack_of_fit", settings.lack_of_fit)):
-        if stated is None or stated.sum_of_squares is None:
+    for key, statement in (("sigma", settings.sigma), ("lack_of_fit", settings.lack_of_fit)):
+        if statement is None or statement.sum_of_squares is None:
             continue
-        found = settings.sigma.value * settings.sigma.value * stated.degrees_of_freedom
-        if not math.isclose(stated.sum_of_squares, found, rel_tol=SAME_SQUARES):
+        sum_of_squares = settings.sigma.value * settings.sigma.value * statement.degrees_of_freedom
+        if not math.isclose(statement.sum_of_squares, sum_of_squares, rel_tol=SAME_SQUARES):
             text = (
-                f"contradicts sigma, whose square times {stated.degrees_of_freedom} degrees of"
-                f" freedom is {found:.6g}: the file was edited; write it again with fit -o"
+                f"contradicts sigma, whose square times {statement.degrees_of_freedom} degrees of"
+                f" freedom is {sum_of_squares:.6g}: the file was edited; write it again with fit -o"
             )
             problems.add((key, "sum_of_squares"), text)
 
@@ -219,18 +239,18 @@ def _check_squares(settings: MapSettings, problems: Problems) -> None:
 def _triangle(settings: MapSettings, size: int, problems: Problems) -> Array:
     """The covariance (size, size) of the rows of its lower triangle."""
     rows = settings.covariance
-    found = np.zeros((size, size))
+    triangle = np.zeros((size, size))
     if len(rows) != size:
         text = (
             f"has {len(rows)} rows; {size} parameters and estimated offsets need {size}: the file"
             " is incomplete, or was edited"
         )
         problems.add(("covariance",), text)
-        return found
+        return triangle
     for k, row in enumerate(rows):
-        found[k, : k + 1] = _numbers(row, k + 1, ("covariance", k), problems)
-        found[:k, k] = found[k, :k]
-    return found
+        triangle[k, : k + 1] = _numbers(row, k + 1, ("covariance", k), problems)
+        triangle[:k, k] = triangle[k, :k]
+    return triangle
 
 
 def _directions(settings: MapSettings, size: int, problems: Problems) -> Array:
@@ -246,16 +266,16 @@ def _numbers(row: str | float, count: int, steps: tuple[str, int], problems: Pro
     """The numbers of a row, zeros after saying what is wrong with them."""
     words = str(row).split()
     try:
-        found = np.array(list(map(float, words)))
+        values = np.array(list(map(float, words)))
     except ValueError:
-        found = np.full(len(words), np.nan)
+        values = np.full(len(words), np.nan)
     if len(words) != count:
         problems.add(steps, f"{len(words)} numbers instead of {count}; write the map again")
-    elif not np.isfinite(found).all():
+    elif not np.isfinite(values).all():
         wrong = next(word for word in words if not _is_number(word))
         problems.add(steps, f'"{shorten(wrong)}" is not a number; write the map again')
     else:
-        return found
+        return values
     return np.zeros(count)
 
 
@@ -305,23 +325,23 @@ def _check_unchanged(
     problems: Problems,
 ) -> None:
     """Report values that were edited, and a model that corrects otherwise than it did."""
-    said = {
+    head = {
         key: value
         for key, value in to_python(root).items()
         if key not in ("covariance", "undetermined")
     }
-    own = settings.checksum
-    if own is not None and own != checksum_of(said, covariance, undetermined):
+    checksum = settings.checksum
+    if checksum is not None and checksum != checksum_of(head, covariance, undetermined):
         text = (
             "is not that of what the file says: it was edited or damaged since it was written;"
             " write it again with fit -o, or remove the checksum if the changes are meant"
         )
         problems.add(("checksum",), text)
         return
-    found = corner_corrections(model, values, volume)
+    corrections = corner_corrections(model, values, volume)
     if not settings.check:
         return
-    count, d = found.shape
+    count, d = corrections.shape
     if len(settings.check) != count:
         text = f"has {len(settings.check)} points instead of {count}; write the map again"
         problems.add(("check",), text)
@@ -330,10 +350,10 @@ def _check_unchanged(
             problems.add(("check", k), f"{len(row)} numbers instead of {d}; write the map again")
     if problems.messages:
         return
-    stated = np.array(settings.check)
-    apart = np.abs(stated - found) > SAME + SAME_PART * np.abs(found)
+    stated_corrections = np.array(settings.check)
+    apart = np.abs(stated_corrections - corrections) > SAME + SAME_PART * np.abs(corrections)
     if apart.any():
-        worst = float(np.abs(stated - found).max())
+        worst = float(np.abs(stated_corrections - corrections).max())
         text = (
             f"the error model with these values corrects by up to {format_length(worst)} otherwise"
             " than when the map was written; it, or the values, have changed: fit again"

@@ -25,7 +25,7 @@ WORDS = ("title", "experiment", "date", "program", "frame", "checksum")
 def head_of(fitted: FittedMap, folder: Path) -> dict[str, Any]:
     """What a map file holds besides its covariance and undetermined directions."""
     lower, upper = fitted.volume.corners
-    found: dict[str, Any] = {
+    head: dict[str, Any] = {
         "map": 1,
         "title": fitted.title,
         "experiment": fitted.experiment,
@@ -38,7 +38,7 @@ def head_of(fitted: FittedMap, folder: Path) -> dict[str, Any]:
             for axis, low, high in zip(AXES, lower, upper, strict=False)
         },
         "frame": fitted.frame,
-        "repeatability": [_length(one) for one in fitted.repeatability.tolist()],
+        "repeatability": [_length(value_of) for value_of in fitted.repeatability.tolist()],
         "probes": _probe_data(fitted),
         "probe": fitted.probe,
         "sigma": {
@@ -52,35 +52,37 @@ def head_of(fitted: FittedMap, folder: Path) -> dict[str, Any]:
         "data": None if fitted.data is None else to_list(_data(fitted.data)),
         "lack_of_fit": None if fitted.lack_of_fit is None else dict(vars(fitted.lack_of_fit)),
         "left_out": [
-            {key: value for key, value in vars(one).items() if value is not None}
-            for one in fitted.left_out
+            {key: value for key, value in vars(value_of).items() if value is not None}
+            for value_of in fitted.left_out
         ],
         "parameters": [
-            {"name": one.name, "unit": one.unit, "value": value}
-            for one, value in zip(fitted.model.parameters, fitted.values.tolist(), strict=True)
+            {"name": value_of.name, "unit": value_of.unit, "value": value}
+            for value_of, value in zip(fitted.model.parameters, fitted.values.tolist(), strict=True)
         ],
         "check": corner_corrections(fitted.model, fitted.values, fitted.volume).tolist(),
     }
-    found = {key: value for key, value in found.items() if value not in (None, {}, [], "")}
-    found["checksum"] = checksum_of(found, fitted.covariance, fitted.undetermined)
-    return found
+    head = {key: value for key, value in head.items() if value not in (None, {}, [], "")}
+    head["checksum"] = checksum_of(head, fitted.covariance, fitted.undetermined)
+    return head
 
 
-def _data(given: MapData) -> dict[str, Any]:
-    return {key: value for key, value in vars(given).items() if value not in ((), None)}
+def _data(map_data: MapData) -> dict[str, Any]:
+    return {key: value for key, value in vars(map_data).items() if value not in ((), None)}
 
 
 def _probe_data(fitted: FittedMap) -> dict[str, Any]:
     """Probes as a file states them, by name."""
-    found: dict[str, Any] = {}
+    data: dict[str, Any] = {}
     for k, name in enumerate(fitted.probes.names):
-        found[name] = {"offset": [_length(one) for one in fitted.probes.offsets[k].tolist()]}
+        data[name] = {
+            "offset": [_length(component) for component in fitted.probes.offsets[k].tolist()]
+        }
         if fitted.probes.free[k].any():
-            found[name] |= {
+            data[name] |= {
                 "estimated": [AXES[axis] for axis in np.flatnonzero(fitted.probes.free[k])],
-                "nominal": [_length(one) for one in fitted.drawn_offsets[k].tolist()],
+                "nominal": [_length(component) for component in fitted.drawn_offsets[k].tolist()],
             }
-    return found
+    return data
 
 
 def _length(value: float) -> str:
@@ -89,12 +91,12 @@ def _length(value: float) -> str:
 
 def checksum_of(head: Mapping[str, Any], covariance: Array, undetermined: Array) -> str:
     """SHA-256 of what a file says, however it is written."""
-    said = {key: value for key, value in head.items() if key not in WORDS}
-    found = hashlib.sha256(json.dumps(said, sort_keys=True).encode())
-    for one in (covariance[np.tril_indices(len(covariance))], undetermined):
-        found.update(repr(one.shape).encode())
-        found.update(np.ascontiguousarray(one, "<f8").tobytes())
-    return found.hexdigest()
+    checked = {key: value for key, value in head.items() if key not in WORDS}
+    digest = hashlib.sha256(json.dumps(checked, sort_keys=True).encode())
+    for array in (covariance[np.tril_indices(len(covariance))], undetermined):
+        digest.update(repr(array.shape).encode())
+        digest.update(np.ascontiguousarray(array, "<f8").tobytes())
+    return digest.hexdigest()
 
 
 def corner_corrections(model: ErrorModel, values: Array, volume: Volume) -> Array:

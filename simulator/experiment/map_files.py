@@ -56,14 +56,17 @@ def map_text(fitted: FittedMap, head: Mapping[str, Any]) -> str:
         if key == "checksum":
             continue
         if isinstance(value, list):
-            lines += [f"{key}:", *(f"- {_json(one)}" for one in value)]
+            lines += [f"{key}:", *(f"- {_json(entry)}" for entry in value)]
         elif key == "probes":
-            lines += [f"{key}:", *(f"  {_json(name)}: {_json(one)}" for name, one in value.items())]
+            lines += [
+                f"{key}:",
+                *(f"  {_json(name)}: {_json(entry)}" for name, entry in value.items()),
+            ]
         else:
             lines.append(f"{key}: {_json(value)}")
     if fitted.undetermined.shape[1]:
         lines.append("undetermined:")
-        lines += [f'- "{_row(one)}"' for one in fitted.undetermined.T]
+        lines += [f'- "{_row(entry)}"' for entry in fitted.undetermined.T]
     lines.append("covariance:")
     lines += [f'- "{_row(row[: k + 1])}"' for k, row in enumerate(fitted.covariance)]
     return "\n".join([*lines, f"checksum: {head['checksum']}", ""])
@@ -88,10 +91,10 @@ def read_map(path: str | os.PathLike[str], trust: Trust = OPENED) -> FittedMap:
     refused_messages: list[Message] = []
     root, arrays = map_tree(source, refused_messages)
     problems = Problems(root)
-    found = map_of_tree(root, arrays, source, problems, trust)
-    if found is None or problems.messages or refused_messages:
+    content = map_of_tree(root, arrays, source, problems, trust)
+    if content is None or problems.messages or refused_messages:
         raise ExperimentError(in_order(problems.messages, refused_messages, source))
-    return found
+    return content
 
 
 def map_tree(source: Path, minor: list[Message]) -> tuple[Node, dict[str, Array]]:
@@ -113,7 +116,7 @@ def _binary(source: Path) -> tuple[Node, dict[str, Array]]:
         with zipfile.ZipFile(io.BytesIO(content)) as archive:
             head = json.loads(str(_array(archive, "map")))
             arrays = {name: _array(archive, name) for name in ("covariance", "undetermined")}
-        if not all(one.dtype == float and one.ndim == 2 for one in arrays.values()):
+        if not all(array.dtype == float and array.ndim == 2 for array in arrays.values()):
             raise ValueError("its arrays are no matrices of doubles")
         root = node_of({**head, "covariance": [""]}, Mark(str(source), 0, 0))
     except (OSError, ValueError, TypeError, KeyError, EOFError, zipfile.BadZipFile) as error:

@@ -160,5 +160,5 @@ class MapSettings(Settings):
 
 def map_schema() -> dict[str, Any]:
     """Return the JSON Schema (draft 2020-12) of a map file in YAML."""
-    found: dict[str, Any] = tidied(MapSettings.model_json_schema())
-    return {"$schema": DRAFT, **found, "title": "ballplate map"}
+    schema: dict[str, Any] = tidied(MapSettings.model_json_schema())
+    return {"$schema": DRAFT, **schema, "title": "ballplate map"}

@@ -277,7 +277,7 @@ class Experiment:
     def earlier_campaigns(self) -> tuple[EarlierCampaign, ...]:
         """The campaigns of all maps that are prior knowledge."""
         shares = (prior.share for prior in self.priors)
-        return tuple(dict.fromkeys(one.campaign for one in shares if one is not None))
+        return tuple(dict.fromkeys(share.campaign for share in shares if share is not None))
 
     def layout_of(self, item: Calibration) -> BallLayout:
         """The layout that an item of calibration names its values by; any where these are of the
@@ -294,7 +294,7 @@ class Experiment:
         """Probes, axes, values and standard uncertainties of offsets that are estimated and have
         any.
         """
-        return [(probe, *one) for probe in self.probes.values() for one in probe.certified]
+        return [(probe, *offset) for probe in self.probes.values() for offset in probe.certified]
 
     @property
     def label(self) -> str:
@@ -307,13 +307,23 @@ class Experiment:
         points.
         """
         candidates = () if self.pool is None else self.pool.candidates
-        offered = [one.item for one in candidates if isinstance(one.item, Position)]
-        read = sum(
-            len(group.ball_indices) for one in (*self.positions, *offered) for group in one.readings
+        offered = [
+            candidate.item for candidate in candidates if isinstance(candidate.item, Position)
+        ]
+        reading_count = sum(
+            len(group.ball_indices)
+            for candidate in (*self.positions, *offered)
+            for group in candidate.readings
         )
-        known = sum(one.size for one in self.calibration)
+        calibration_size = sum(candidate.size for candidate in self.calibration)
         balls = sum(len(layout.names) for layout in self.layouts.values())
-        return balls + read + known + len(self.priors) + len(self.evaluation.points)
+        return (
+            balls
+            + reading_count
+            + calibration_size
+            + len(self.priors)
+            + len(self.evaluation.points)
+        )
 
     def __repr__(self) -> str:
         return f"<Experiment {self.label}: {self.title}>"
@@ -328,12 +338,12 @@ class Experiment:
             ("repeatability", f"{', '.join(sorted(repeatability))} µm"),
             ("error model", self.error_model.kind),
             *(
-                (f"artefact {name}", f"{len(one.names)} balls")
-                for name, one in self.layouts.items()
+                (f"artefact {name}", f"{len(entry.names)} balls")
+                for name, entry in self.layouts.items()
             ),
-            *((f"position {one.name}", _words_of(one)) for one in self.positions),
+            *((f"position {entry.name}", _words_of(entry)) for entry in self.positions),
             ("calibrations", str(len(self.calibration))),
-            ("measuring tasks", ", ".join(one.name for one in self.evaluation.tasks) or "none"),
+            ("measuring tasks", ", ".join(entry.name for entry in self.evaluation.tasks) or "none"),
         ]
         cells = (f"<tr><td>{escape(name)}</td><td>{escape(text)}</td></tr>" for name, text in rows)
         title = escape(f"{self.label}: {self.title}")
@@ -368,20 +378,20 @@ class Experiment:
             changed_tree(self.tree, str(self.source), {**(changes or {}), **sections})
         )
 
-    def with_readings(self, said: Mapping[str, Any]) -> Experiment:
+    def with_readings(self, changes: Mapping[str, Any]) -> Experiment:
         """The experiment with other keys of `readings`; None leaves one as it is, and columns are
         added to those stated.
 
         :raises ExperimentError: they are wrong.
         """
-        given = {key: value for key, value in said.items() if value is not None}
-        if not given:
+        settings_given = {key: value for key, value in changes.items() if value is not None}
+        if not settings_given:
             return self
         old = written(self.tree, "readings")
-        known = {} if old is None else to_python(old)
-        columns = {**known.get("columns", {}), **given.get("columns", {})}
-        both = {**known, **given, **({"columns": columns} if columns else {})}
-        return self.with_(readings=both)
+        settings_before = {} if old is None else to_python(old)
+        columns = {**settings_before.get("columns", {}), **settings_given.get("columns", {})}
+        merged = {**settings_before, **settings_given, **({"columns": columns} if columns else {})}
+        return self.with_(readings=merged)
 
 
 def _words_of(position: Position) -> str:

@@ -36,11 +36,11 @@ def relative(settings: Mapping[str, Any], folder: Path) -> dict[str, Any]:
 
 
 def _placed(settings: Mapping[str, Any], place: Any) -> dict[str, Any]:
-    found, key = dict(settings), PLACES.get(settings["kind"])
+    placed, key = dict(settings), PLACES.get(settings["kind"])
     if key == "folder" and ":" not in settings["object"]:
         # An entry point is found wherever it is installed.
-        return found
-    return found if key is None else found | {key: place(found.get(key, "."))}
+        return placed
+    return placed if key is None else placed | {key: place(placed.get(key, "."))}
 
 
 def model_files(settings: Mapping[str, Any]) -> dict[str, Path]:
@@ -51,7 +51,7 @@ def model_files(settings: Mapping[str, Any]) -> dict[str, Path]:
     if settings["kind"] == "machine":
         path = Path(settings["file"])
         errors = to_python(child(read_tree(path, []), "errors") or read_tree(path, []))
-        named = (one.get("file") for one in errors.values() if isinstance(one, dict))
+        named = (error.get("file") for error in errors.values() if isinstance(error, dict))
         tables = [str(name) for name in named if name is not None]
         return {path.name: path, **{name: path.parent / name for name in tables}}
     if settings["kind"] == "python":

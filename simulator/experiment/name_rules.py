@@ -17,13 +17,13 @@ def check_rule(rule: str) -> str:
 
     :raises ValueError: it has no ball, or a place that there is not or that is there twice.
     """
-    found = PLACE.findall(rule)
-    unknown = [name for name in found if name not in PLACES]
+    place_holders = PLACE.findall(rule)
+    unknown = [name for name in place_holders if name not in PLACES]
     if unknown or "{" in PLACE.sub("", rule) or "}" in PLACE.sub("", rule):
-        told = f'"{shorten(unknown[0])}"' if unknown else "a brace without its other one"
-        raise ValueError(f"{told} in a rule of names; known: {', '.join(PLACES)}, in braces")
-    if "ball" not in found or len(set(found)) < len(found):
+        subject = f'"{shorten(unknown[0])}"' if unknown else "a brace without its other one"
+        raise ValueError(f"{subject} in a rule of names; known: {', '.join(PLACES)}, in braces")
+    if "ball" not in place_holders or len(set(place_holders)) < len(place_holders):
         raise ValueError(f'"{shorten(rule)}" needs {{ball}}, and each place at most once')
-    if "point" in found and not rule.endswith("{point}"):
+    if "point" in place_holders and not rule.endswith("{point}"):
         raise ValueError(f'"{shorten(rule)}": {{point}} comes last')
     return rule

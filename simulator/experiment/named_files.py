@@ -40,16 +40,16 @@ def named_in(nodes: Sequence[tuple[str, Node]], folder: Path) -> list[Path]:
     """Files that nodes at paths of an experiment name, as seen from a folder, those that they name,
     and modules, as far as they are there.
     """
-    found: set[Path] = set()
+    paths: set[Path] = set()
     for key, node in nodes:
         for scalar in path_scalars(node, key):
             text = str(scalar.value)
             named = [Path(text)] if Path(text).is_absolute() else existing_file(folder, text)
             for path in named:
-                found |= {path, *files_of_machine(path)}
+                paths |= {path, *files_of_machine(path)}
     for place, scalar in model_modules(nodes, folder):
-        found |= module_files(place, str(scalar.value).partition(":")[0])
-    return sorted(found)
+        paths |= module_files(place, str(scalar.value).partition(":")[0])
+    return sorted(paths)
 
 
 def _last(path: str) -> str:
@@ -110,9 +110,13 @@ def model_modules(nodes: Sequence[tuple[str, Node]], folder: Path) -> Iterator[t
     """Objects of error models in Python, each with the folder of its module."""
     for path, node in nodes:
         for _, mapping in python_models(node):
-            name, own = mapping.items.get("object"), mapping.items.get("folder")
+            name, object_and_folder = mapping.items.get("object"), mapping.items.get("folder")
             if isinstance(name, Scalar):
-                inner = str(own.value) if isinstance(own, Scalar) and own.value is not None else "."
+                inner = (
+                    str(object_and_folder.value)
+                    if isinstance(object_and_folder, Scalar) and object_and_folder.value is not None
+                    else "."
+                )
                 yield Path(os.path.abspath(folder / inner)), name
         if isinstance(node, Scalar) and _last(path) == "object":
             yield folder, node
@@ -122,7 +126,7 @@ def module_files(folder: Path, module: str) -> set[Path]:
     """Files in a folder that make up a module, and those that it imports from there, by what their
     text says.
     """
-    found: set[Path] = set()
+    paths: set[Path] = set()
     waiting = [module]
     while waiting:
         top = waiting.pop().partition(".")[0]
@@ -132,10 +136,10 @@ def module_files(folder: Path, module: str) -> set[Path]:
         if (folder / top).is_dir():
             files += sorted((folder / top).rglob(f"*{MODULE}"))
         for path in files:
-            if path not in found and path.is_file():
-                found.add(path)
+            if path not in paths and path.is_file():
+                paths.add(path)
                 waiting += _imports(path)
-    return found
+    return paths
 
 
 def _imports(path: Path) -> Iterator[str]:

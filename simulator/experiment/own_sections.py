@@ -19,19 +19,19 @@ def resolve_own_sections(sections: Sections, references: References) -> dict[str
             # One that is installed and cannot be loaded has no name.
             text = "; ".join((text, *registered().complaints))
             references.problems.add(("extensions", i), text)
-    found = {}
+    resolved = {}
     for steps, settings in sections.values.items():
         key = str(steps[0])
         if key not in KEYS:
-            read = getattr(module_with("sections", key), "read", None)
-            found[key] = settings if read is None else read(settings, (key,), references)
-    return found
+            reader = getattr(module_with("sections", key), "read", None)
+            resolved[key] = settings if reader is None else reader(settings, (key,), references)
+    return resolved
 
 
 def needed_extensions(sections: Sections) -> tuple[str, ...]:
     """Names of the extensions that a file states, or has kinds or keys of."""
-    classes = {type(one) for value in sections.values.values() for one in _parts(value)}
-    used = {name for one in classes if (name := owner(one)) is not None}
+    classes = {type(part) for value in sections.values.values() for part in _parts(value)}
+    used = {name for part in classes if (name := owner(part)) is not None}
     return tuple(dict.fromkeys((*(sections.get("extensions") or ()), *sorted(used))))
 
 

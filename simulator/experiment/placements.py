@@ -80,8 +80,8 @@ def _readings(
         _group(group, (*steps, "readings", i), layout, references)
         for i, group in enumerate(settings.readings)
     ]
-    found = tuple(group for group in groups if group is not None)
-    return found if complete and len(found) == len(groups) else None
+    resolved = tuple(group for group in groups if group is not None)
+    return resolved if complete and len(resolved) == len(groups) else None
 
 
 def _group(
@@ -144,12 +144,12 @@ def _placement(
     if plane is None:
         return None
     anchor: Literal["corner", "centre"] = "centre" if settings.corner is None else "corner"
-    at = _in_plane(getattr(settings, anchor), plane, (*steps, anchor), references)
+    point = _in_plane(getattr(settings, anchor), plane, (*steps, anchor), references)
     turns = settings.quarter_turns or 0
     is_right &= check_turns(turns, (*steps, "quarter_turns"), references)
-    if at is None or not is_right:
+    if point is None or not is_right:
         return None
-    return PlanePlacement(plane, settings.level or 0.0, anchor, at, turns)
+    return PlanePlacement(plane, settings.level or 0.0, anchor, point, turns)
 
 
 def check_turns(turns: int, steps: Steps, references: References) -> bool:

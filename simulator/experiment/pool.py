@@ -30,13 +30,17 @@ def placed_only(experiment: Experiment) -> Experiment:
     names = {position.name for position in experiment.positions}
     return replace(
         experiment,
-        artefacts={name: one for name, one in experiment.artefacts.items() if name in placed},
-        layouts={name: one for name, one in experiment.layouts.items() if name in placed},
+        artefacts={name: prior for name, prior in experiment.artefacts.items() if name in placed},
+        layouts={name: prior for name, prior in experiment.layouts.items() if name in placed},
         calibration=tuple(
-            one for one in experiment.calibration if not one.artefact or one.artefact in placed
+            prior
+            for prior in experiment.calibration
+            if not prior.artefact or prior.artefact in placed
         ),
         priors=tuple(
-            one for one in experiment.priors if one.position is None or one.position in names
+            prior
+            for prior in experiment.priors
+            if prior.position is None or prior.position in names
         ),
         pool=None,
     )

@@ -132,14 +132,14 @@ def generate(
         for turn in dict.fromkeys(group.turns)
         for k, balls in enumerate(group.balls)
     }
-    read = sum(
+    candidate_count = sum(
         sum(reason == "" for reason in reasons[plane, turn, k][probes])
         * len(probes)
         * len(balls.indices)
         for plane, turn, (k, balls) in product(group.planes, group.turns, enumerate(group.balls))
         for probes in group.probes[plane]
     )
-    if not references.count_readings(read * group.repeats, steps):
+    if not references.count_readings(candidate_count * group.repeats, steps):
         return None
     return list(_candidates(group, reasons, references.dimension or 3))
 
@@ -153,15 +153,16 @@ def outline(pose: Pose, layout: BallLayout, edge: float) -> Floats:
     """Return the lowest and the highest co-ordinates (2, d) of a plate with so much material beyond
     its balls.
     """
-    (left, low), (right, high) = bounding_rectangle(layout) + [[-edge], [edge]]
-    around = np.array([(x, y, 0.0) for x in (left, right) for y in (low, high)])
+    (corners_beyond, low), (right, high) = bounding_rectangle(layout) + [[-edge], [edge]]
+    around = np.array([(x, y, 0.0) for x in (corners_beyond, right) for y in (low, high)])
     return extent(around[:, : len(pose.origin)] @ pose.rotation.T + pose.origin)
 
 
-def is_within(found: Floats, lower: Floats, upper: Floats) -> Any:
+def is_within(indices: Floats, lower: Floats, upper: Floats) -> Any:
     """Tell whether extents (…, 2, d) are within limits (d,)."""
     return np.all(
-        (found[..., 0, :] >= lower - TOLERANCE) & (found[..., 1, :] <= upper + TOLERANCE), axis=-1
+        (indices[..., 0, :] >= lower - TOLERANCE) & (indices[..., 1, :] <= upper + TOLERANCE),
+        axis=-1,
     )
 
 
@@ -176,28 +177,32 @@ def _reasons(
         PlanePlacement(plane, 0.0, group.anchor, (0.0, 0.0), turn), group.layout, d
     )
     shifts = np.zeros((len(group.levels[plane]) * len(group.places[plane]), d))
-    both = list(product(group.levels[plane], group.places[plane]))
+    pairs = list(product(group.levels[plane], group.places[plane]))
     first, second = (AXIS_INDEX[axis] for axis in IN_PLANE_AXES[plane])
-    shifts[:, [first, second]] = [place for _, place in both]
+    shifts[:, [first, second]] = [place for _, place in pairs]
     if d == 3:
-        shifts[:, AXIS_INDEX[plane]] = [level for level, _ in both]
-    read = extent(ball_coordinates(at_zero, group.layout)[balls.indices]) + shifts[:, None, :]
-    found = np.full(len(shifts), "", dtype=object)
+        shifts[:, AXIS_INDEX[plane]] = [level for level, _ in pairs]
+    extents = extent(ball_coordinates(at_zero, group.layout)[balls.indices]) + shifts[:, None, :]
+    reasons = np.full(len(shifts), "", dtype=object)
     if bounds.edge is not None and references.artefacts[group.artefact].role == "plate":
         around = outline(at_zero, group.layout, bounds.edge) + shifts[:, None, :]
         beyond = ~is_within(around, bounds.volume.lower, bounds.volume.upper)
-        found[beyond] = "edge outside the volume"
+        reasons[beyond] = "edge outside the volume"
     by_probes = {}
     for probes in group.probes[plane]:
-        one = found.copy()
-        for offset in (bounds.probes[one].offset for one in probes if one in bounds.probes):
-            one[~is_within(read - offset, *bounds.volume.of_readings)] = "outside the volume"
+        of_probe = reasons.copy()
+        for offset in (
+            bounds.probes[of_probe].offset for of_probe in probes if of_probe in bounds.probes
+        ):
+            of_probe[~is_within(extents - offset, *bounds.volume.of_readings)] = (
+                "outside the volume"
+            )
         for probe in probes:
             if probe in bounds.reach:
-                one[(one == "") & ~is_within(read, *bounds.reach[probe])] = (
+                of_probe[(of_probe == "") & ~is_within(extents, *bounds.reach[probe])] = (
                     f"out of reach of probe {probe}"
                 )
-        by_probes[probes] = one.tolist()
+        by_probes[probes] = of_probe.tolist()
     return by_probes
 
 
@@ -217,15 +222,15 @@ def _candidates(
     for plane in group.planes:
         axes = IN_PLANE_AXES[plane]
         for row, (level, place) in enumerate(product(group.levels[plane], group.places[plane])):
-            at = {axis: length for axis, length in sorted(zip(axes, place, strict=True))}
-            where = f"{'at' if group.anchor == 'corner' else 'about'} {_both(*at.values())}"
+            at_axis = {axis: length for axis, length in sorted(zip(axes, place, strict=True))}
+            where = f"{'at' if group.anchor == 'corner' else 'about'} {_both(*at_axis.values())}"
             name = (
                 f"{group.prefix}{where}"
                 if d == 2
                 else f"{group.prefix}{plane} {typed_length(level)} {where}"
             )
             placed: dict[str, Any] = {} if d == 2 else {"plane": plane, "level": length_text(level)}
-            placed[group.anchor] = {axis: length_text(length) for axis, length in at.items()}
+            placed[group.anchor] = {axis: length_text(length) for axis, length in at_axis.items()}
             for turn in group.turns:
                 pose = None
                 turned = f"{name} turn {turn}" if len(set(group.turns)) > 1 else name
@@ -242,20 +247,20 @@ def _candidates(
                         PlanePlacement(plane, level, group.anchor, place, turn), group.layout, d
                     )
                     position = Position(full, group.artefact, pose, readings[probes, k])
-                    stated: dict[str, Any] = {"name": full}
-                    stated |= {"artefact": group.artefact} if group.names_artefact else {}
-                    stated |= placed
-                    stated |= {"quarter_turns": turn} if turn else {}
-                    stated |= {"probes": list(probes)} if group.names_probes else {}
-                    stated |= {"balls": balls.written} if balls.written != "all" else {}
-                    stated |= group.written
-                    yield Generated(full, position, "" if d == 2 else plane, stated, "")
+                    settings: dict[str, Any] = {"name": full}
+                    settings |= {"artefact": group.artefact} if group.names_artefact else {}
+                    settings |= placed
+                    settings |= {"quarter_turns": turn} if turn else {}
+                    settings |= {"probes": list(probes)} if group.names_probes else {}
+                    settings |= {"balls": balls.written} if balls.written != "all" else {}
+                    settings |= group.written
+                    yield Generated(full, position, "" if d == 2 else plane, settings, "")
 
 
 def _both(first: float, second: float) -> str:
-    one, other = typed_length(first), typed_length(second)
-    number, _, unit = one.partition(" ")
-    return f"{number if other.endswith(f' {unit}') else one}, {other}"
+    first_length, second_length = typed_length(first), typed_length(second)
+    number, _, unit = first_length.partition(" ")
+    return f"{number if second_length.endswith(f' {unit}') else first_length}, {second_length}"
 
 
 def _resolve(settings: GroupSettings, steps: Steps, references: References) -> _Group | None:
@@ -290,11 +295,11 @@ def _resolve(settings: GroupSettings, steps: Steps, references: References) -> _
         check_turns(turn, (*steps, "quarter_turns", *((k,) if is_list else ())), references)
     if len(references.problems.messages) > before:
         return None
-    kept: dict[str, Any] = {"repeats": settings.repeats} if settings.repeats != 1 else {}
+    repeats: dict[str, Any] = {"repeats": settings.repeats} if settings.repeats != 1 else {}
     if uncertainty is not None:
         node = written(references.problems.root, *steps, "standard_uncertainty")
         assert node is not None
-        kept["standard_uncertainty"] = to_python(node)
+        repeats["standard_uncertainty"] = to_python(node)
     prefix = "" if settings.name is None else f"{settings.name} "
     return _Group(
         artefact,
@@ -311,7 +316,7 @@ def _resolve(settings: GroupSettings, steps: Steps, references: References) -> _
         uncertainty,
         len(references.artefact_names) > 1,
         written(references.problems.root, "probes") is not None,
-        kept,
+        repeats,
     )
 
 
@@ -348,43 +353,45 @@ def _places(
     lengths: LengthsByAxisSettings, planes: Sequence[Axis], steps: Steps, references: References
 ) -> dict[str, tuple[tuple[float, float], ...]]:
     axes = sorted({axis for plane in planes for axis in IN_PLANE_AXES[plane]})
-    found = _by_axis(lengths, axes, "an axis of the planes", steps, references)
-    if set(found) != set(axes):
+    places_by_axis = _by_axis(lengths, axes, "an axis of the planes", steps, references)
+    if set(places_by_axis) != set(axes):
         return {}
     result: dict[str, tuple[tuple[float, float], ...]] = {}
     for plane in planes:
         first, second = IN_PLANE_AXES[plane]
         # A grid so fine that it is refused need not be made.
-        count = len(found[first]) * len(found[second])
+        count = len(places_by_axis[first]) * len(places_by_axis[second])
         if count > MOST_CANDIDATES:
             text = f"{count} places are too many; at most {MOST_CANDIDATES} are possible"
             references.problems.add(steps, text)
             return {}
-        result[plane] = tuple(product(found[first], found[second]))
+        result[plane] = tuple(product(places_by_axis[first], places_by_axis[second]))
         if first > second:
-            result[plane] = tuple((a, b) for b, a in product(found[second], found[first]))
+            result[plane] = tuple(
+                (a, b) for b, a in product(places_by_axis[second], places_by_axis[first])
+            )
     return result
 
 
 def _by_axis(
     lengths: LengthsByAxisSettings,
     axes: Sequence[str],
-    what: str,
+    noun: str,
     steps: Steps,
     references: References,
 ) -> dict[str, tuple[float, ...]]:
-    found = {}
+    by_axis = {}
     for axis in AXIS_INDEX:
         value = getattr(lengths, axis)
         if value is not None and axis not in axes:
             references.problems.add(
-                (*steps, axis), f"is not {what}; remove it, or add to planes", of_key=True
+                (*steps, axis), f"is not {noun}; remove it, or add to planes", of_key=True
             )
         elif value is not None:
-            found[axis] = _values(value)
+            by_axis[axis] = _values(value)
         elif axis in axes:
             references.problems.add((*steps, axis), f'missing; add "{axis}"')
-    return found
+    return by_axis
 
 
 def _values(lengths: Any) -> tuple[float, ...]:
@@ -399,49 +406,51 @@ def _values(lengths: Any) -> tuple[float, ...]:
 def _probes(
     settings: GroupSettings, planes: Sequence[Axis], steps: Steps, references: References
 ) -> dict[str, tuple[tuple[str, ...], ...]]:
-    stated, where = settings.probes, (*steps, "probes")
-    if stated is None:
+    names_and_path, where = settings.probes, (*steps, "probes")
+    if names_and_path is None:
         names = references.probe_names(None, steps)
         return {} if names is None else dict.fromkeys(planes, (names,))
-    if not isinstance(stated, ProbesByPlaneSettings):
-        return dict.fromkeys(planes, _sets(stated, where, references))
+    if not isinstance(names_and_path, ProbesByPlaneSettings):
+        return dict.fromkeys(planes, _sets(names_and_path, where, references))
     if references.dimension == 2:
         references.problems.add(where, "has no planes in two dimensions; list the probes")
         return {}
-    found = {}
+    sets = {}
     for plane in AXIS_INDEX:
-        value = getattr(stated, plane)
+        value = getattr(names_and_path, plane)
         if value is not None and plane not in planes:
             text = "is not among the planes; remove it, or add it to planes"
             references.problems.add((*where, plane), text, of_key=True)
         elif value is not None:
-            found[plane] = _sets(value, (*where, plane), references)
+            sets[plane] = _sets(value, (*where, plane), references)
         elif plane in planes:
             references.problems.add((*where, plane), f'missing; add "{plane}"')
-    return found
+    return sets
 
 
-def _sets(stated: Any, steps: Steps, references: References) -> tuple[tuple[str, ...], ...]:
-    if isinstance(stated[0], str):
-        references.are_probes(stated, steps)
-        return (stated,)
-    for k, names in enumerate(stated):
+def _sets(value: Any, steps: Steps, references: References) -> tuple[tuple[str, ...], ...]:
+    if isinstance(value[0], str):
+        references.are_probes(value, steps)
+        return (value,)
+    for k, names in enumerate(value):
         references.are_probes(names, (*steps, k))
-    return tuple(stated)
+    return tuple(value)
 
 
 def _balls(
     settings: GroupSettings, layout: BallLayout, steps: Steps, references: References
 ) -> tuple[_Balls, ...]:
-    stated: Any = settings.balls
-    is_several = form_of_balls(stated) == "<sets>"
-    found = []
-    for k, one in enumerate(stated if is_several else (stated,)):
+    entries: Any = settings.balls
+    is_several = form_of_balls(entries) == "<sets>"
+    ball_sets = []
+    for k, entry in enumerate(entries if is_several else (entries,)):
         where = (*steps, k) if is_several else steps
-        indices = references.balls(one, layout, where)
+        indices = references.balls(entry, layout, where)
         if indices is None:
             continue
         names = tuple(layout.names[i] for i in indices)
-        word = "all balls" if one == "all" else "corners" if one == "corners" else f"set {k + 1}"
-        found.append(_Balls(word, names, indices, "all" if one == "all" else list(names)))
-    return tuple(found)
+        word = (
+            "all balls" if entry == "all" else "corners" if entry == "corners" else f"set {k + 1}"
+        )
+        ball_sets.append(_Balls(word, names, indices, "all" if entry == "all" else list(names)))
+    return tuple(ball_sets)

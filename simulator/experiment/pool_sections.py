@@ -86,7 +86,7 @@ def _form_of_sets(value: Any) -> str:
         return "<planes>"
     return (
         "<sets>"
-        if isinstance(value, tuple) and any(isinstance(one, tuple) for one in value)
+        if isinstance(value, tuple) and any(isinstance(item, tuple) for item in value)
         else "<list>"
     )
 
@@ -115,7 +115,7 @@ def form_of_balls(value: Any) -> str:
         return "<one>"
     return (
         "<sets>"
-        if any(isinstance(one, tuple) or one in ("all", "corners") for one in value)
+        if any(isinstance(item, tuple) or item in ("all", "corners") for item in value)
         else "<list>"
     )
 

@@ -82,7 +82,9 @@ class Candidates:
     @property
     def positions(self) -> tuple[Position, ...]:
         """The candidates that are positions."""
-        return tuple(one.item for one in self.found if isinstance(one.item, Position))
+        return tuple(
+            candidate.item for candidate in self.found if isinstance(candidate.item, Position)
+        )
 
 
 # In one piece: candidates are counted, completed and refused in the order of the file.
@@ -118,15 +120,19 @@ def resolve_candidates(
     result.complete = is_known and is_list and names_differ and all_drawn
     for i, position in positions.items():
         settings = sections.get("positions", i)
-        stated = to_python(written(root, "positions", i))  # type: ignore[arg-type]
-        own = (times.positions or {}).get(position.name)
-        result.add(_candidate(position, settings.plane, "", True, stated, times, own, references))
+        item_settings = to_python(written(root, "positions", i))  # type: ignore[arg-type]
+        own_times = (times.positions or {}).get(position.name)
+        result.add(
+            _candidate(
+                position, settings.plane, "", True, item_settings, times, own_times, references
+            )
+        )
         references.count_readings(result.found[-1].readings, ("positions", i))
         if bounds is not None:
             _check_bounds(position, ("positions", i), bounds, references)
-    known = {position.name for position in positions.values()}
+    position_names = {position.name for position in positions.values()}
     for name in (times.positions or {}) if all_drawn else ():
-        references.is_position(name, known, ("pool", "times", "positions", name))
+        references.is_position(name, position_names, ("pool", "times", "positions", name))
     count = len(positions)
     for i in range(written_count(root, "pool", "candidates")):
         steps: Steps = ("pool", "candidates", i)
@@ -146,14 +152,14 @@ def resolve_candidates(
                 check_inside(listed, steps, bounds.volume, probes, references)
                 if len(problems.messages) == before:
                     _check_bounds(listed, steps, bounds, references)
-            stated = to_python(written(root, *steps))  # type: ignore[arg-type]
+            item_settings = to_python(written(root, *steps))  # type: ignore[arg-type]
             result.add(
                 _candidate(
                     listed,
                     settings.plane,
                     settings.name,
                     False,
-                    stated,
+                    item_settings,
                     times,
                     settings.times,
                     references,
@@ -166,17 +172,17 @@ def resolve_candidates(
                 continue
             count += len(generated)
             group = settings.name or format_path(steps[1:])
-            for one in generated:
-                if one.position is None:
-                    result.drop(one.reason)
+            for candidate in generated:
+                if candidate.position is None:
+                    result.drop(candidate.reason)
                     continue
                 result.add(
                     _candidate(
-                        one.position,
-                        one.plane,
+                        candidate.position,
+                        candidate.plane,
                         group,
                         False,
-                        one.settings,
+                        candidate.settings,
                         times,
                         settings.times,
                         references,
@@ -207,14 +213,16 @@ def resolve_pool(
     root = problems.root
     if ("pool", "times") not in sections.values:
         return None
-    found, complete = list(candidates.found), candidates.complete
+    candidates_and_complete, complete = list(candidates.found), candidates.complete
     at_most: list[AtMost] = []
     radii: dict[str, list[int]] = {}
     fixed = {
-        one.artefact: i for i, one in calibrations.items() if isinstance(one, RadiusCalibration)
+        calibration.artefact: i
+        for i, calibration in calibrations.items()
+        if isinstance(calibration, RadiusCalibration)
     }
     by_steps: dict[Steps, Calibration] = {
-        ("calibration", i): one for i, one in calibrations.items()
+        ("calibration", i): calibration for i, calibration in calibrations.items()
     }
     for i in range(written_count(root, "pool", "calibration")):
         steps: Steps = ("pool", "calibration", i)
@@ -234,21 +242,27 @@ def resolve_pool(
                     "; "
                 )
                 problems.add(steps, f"{text}remove one of the two")
-            radii.setdefault(item.artefact, []).append(len(found))
-        stated = to_python(written(root, *steps))  # type: ignore[arg-type]
-        stated = {key: value for key, value in stated.items() if key not in ("name", "price")}
-        found.append(
-            Candidate(settings.name, item, settings.price, "", settings.name, False, stated)
+            radii.setdefault(item.artefact, []).append(len(candidates_and_complete))
+        item_settings = to_python(written(root, *steps))  # type: ignore[arg-type]
+        item_settings = {
+            key: value for key, value in item_settings.items() if key not in ("name", "price")
+        }
+        candidates_and_complete.append(
+            Candidate(settings.name, item, settings.price, "", settings.name, False, item_settings)
         )
     if complete:
         check_lengths(by_steps, candidates.positions, references)
     at_most += [AtMost(tuple(members), 1) for members in radii.values() if len(members) > 1]
-    must, limited = _limits(sections.get("pool", "limits"), found, complete, references)
+    must, limited = _limits(
+        sections.get("pool", "limits"), candidates_and_complete, complete, references
+    )
     times: TimesSettings = sections.get("pool", "times")
     changes = ChangeTimes(
         _or(times.probe_change, PROBE_CHANGE), _or(times.plane_change, PLANE_CHANGE)
     )
-    return Pool(tuple(found), changes, must, (*at_most, *limited), candidates.dropped)
+    return Pool(
+        tuple(candidates_and_complete), changes, must, (*at_most, *limited), candidates.dropped
+    )
 
 
 def _candidate(
@@ -256,19 +270,19 @@ def _candidate(
     plane: str | None,
     group: str,
     drawn: bool,
-    stated: AnyMapping[str, Any],
+    item_settings: AnyMapping[str, Any],
     times: TimesSettings,
-    own: OwnTimesSettings | None,
+    own_times: OwnTimesSettings | None,
     references: References,
 ) -> Candidate:
     set_up, reading = (
-        _or(getattr(own, key, None), _or(getattr(times, key), default))
+        _or(getattr(own_times, key, None), _or(getattr(times, key), default))
         for key, default in (("set_up", SET_UP), ("reading", READING))
     )
     seconds = seconds_of(position, set_up, reading, _or(times.probe_change, PROBE_CHANGE))
     across = "" if plane is None or references.dimension == 2 else plane
-    stated = {key: value for key, value in stated.items() if key != "times"}
-    return Candidate(position.name, position, seconds, across, group, drawn, stated, reading)
+    item_settings = {key: value for key, value in item_settings.items() if key != "times"}
+    return Candidate(position.name, position, seconds, across, group, drawn, item_settings, reading)
 
 
 def seconds_of(
@@ -293,16 +307,18 @@ def _identity(position: Position) -> Any:
         tuple(np.rint(1e9 * pose).tolist()),
         tuple(
             (
-                frozenset(one.probes),
+                frozenset(reading.probes),
                 (
-                    one.ball_indices.tobytes()
-                    if len(one.balls) < 2
-                    else np.sort(one.ball_indices).tobytes()
+                    reading.ball_indices.tobytes()
+                    if len(reading.balls) < 2
+                    else np.sort(reading.ball_indices).tobytes()
                 ),
-                one.repeats,
-                None if one.standard_uncertainty is None else one.standard_uncertainty.tobytes(),
+                reading.repeats,
+                None
+                if reading.standard_uncertainty is None
+                else reading.standard_uncertainty.tobytes(),
             )
-            for one in position.readings
+            for reading in position.readings
         ),
     )
 
@@ -330,7 +346,7 @@ def _check_names(references: References) -> bool:
 
 def _reach(limits: LimitsSettings, references: References) -> dict[str, Floats]:
     """Lower and upper ends (2, d) of where balls can be read, by probe."""
-    problems, found = references.problems, {}
+    problems, problems_and_reach = references.problems, {}
     for name, region in limits.reach.items():
         steps: Steps = ("pool", "limits", "reach", name)
         if name not in references.probes:
@@ -339,15 +355,15 @@ def _reach(limits: LimitsSettings, references: References) -> dict[str, Floats]:
             )
             continue
         ends = np.array([[-np.inf] * 3, [np.inf] * 3])
-        for axis, stated in region.stated.items():
+        for axis, axis_lengths in region.stated.items():
             k = AXIS_INDEX[axis]
-            if stated[0] >= stated[1]:
+            if axis_lengths[0] >= axis_lengths[1]:
                 problems.add((*steps, axis), "the lower end must be below the upper; correct them")
             if k >= (references.dimension or 3):
                 references.refuse_in_plane(*steps, axis)
-            ends[:, k] = stated
-        found[name] = frozen(ends[:, : references.dimension or 3])
-    return found
+            ends[:, k] = axis_lengths
+        problems_and_reach[name] = frozen(ends[:, : references.dimension or 3])
+    return problems_and_reach
 
 
 def _check_bounds(position: Position, steps: Steps, bounds: Bounds, references: References) -> None:
@@ -428,10 +444,11 @@ def _limits(
         if members:
             at_most.append((AtMost(tuple(members), limit.count), (*place, "at_most", k)))
     for one, steps in at_most:
-        kept = [candidates[i].name for i in sorted(set(must) & set(one.members))]
-        if len(kept) > one.count and len(problems.messages) == before:
+        required_names = [candidates[i].name for i in sorted(set(must) & set(one.members))]
+        if len(required_names) > one.count and len(problems.messages) == before:
             text = (
-                f"at most {one.count} of these are allowed, but {listing(kept)} are to be kept;"
+                f"at most {one.count} of these are allowed, but {listing(required_names)} are to"
+                " be kept;"
                 " correct pool.limits"
             )
             problems.add(steps, text)
@@ -439,7 +456,7 @@ def _limits(
 
 
 def _selected(
-    of: SelectorSettings,
+    selector: SelectorSettings,
     candidates: AnySequence[Candidate],
     complete: bool,
     steps: Steps,
@@ -447,35 +464,41 @@ def _selected(
 ) -> list[int]:
     """Indices of the candidates to which everything applies that a selector states."""
     root = references.problems.root
-    groups = {one.group for one in candidates if one.group} | set(_group_names(root))
-    known: dict[str, Any] = {
+    groups = {candidate.group for candidate in candidates if candidate.group} | set(
+        _group_names(root)
+    )
+    names_by_selector: dict[str, Any] = {
         "group": groups,
         "artefact": references.artefact_names,
         "probe": references.probes,
     }
-    for key, names in known.items():
-        name = getattr(of, key)
+    for key, names in names_by_selector.items():
+        name = getattr(selector, key)
         if name is not None and name not in names:
             text = f'unknown {key} "{name}"; {hint(name, sorted(names))}'
             references.problems.add((*steps, key), text)
             return []
     tests: list[Callable[[Candidate], bool]] = []
-    if of.name is not None:
-        pattern = of.name
-        tests.append(lambda one: fnmatchcase(one.name, pattern))
-        if complete and not any(fnmatchcase(one.name, pattern) for one in candidates):
+    if selector.name is not None:
+        pattern = selector.name
+        tests.append(lambda candidate: fnmatchcase(candidate.name, pattern))
+        if complete and not any(fnmatchcase(candidate.name, pattern) for candidate in candidates):
             references.problems.add(
                 (*steps, "name"), f'no candidate has a name such as "{pattern}"; correct it'
             )
-    if of.group is not None:
-        tests.append(lambda one: one.group == of.group)
-    if of.plane is not None:
-        tests.append(lambda one: one.plane == of.plane)
-    if of.artefact is not None:
-        tests.append(lambda one: one.item.artefact == of.artefact)
-    if of.probe is not None:
-        tests.append(lambda one: isinstance(one.item, Position) and of.probe in one.item.probes)
-    return [i for i, one in enumerate(candidates) if all(test(one) for test in tests)]
+    if selector.group is not None:
+        tests.append(lambda candidate: candidate.group == selector.group)
+    if selector.plane is not None:
+        tests.append(lambda candidate: candidate.plane == selector.plane)
+    if selector.artefact is not None:
+        tests.append(lambda candidate: candidate.item.artefact == selector.artefact)
+    if selector.probe is not None:
+        tests.append(
+            lambda candidate: (
+                isinstance(candidate.item, Position) and selector.probe in candidate.item.probes
+            )
+        )
+    return [i for i, candidate in enumerate(candidates) if all(test(candidate) for test in tests)]
 
 
 def _group_names(root: Any) -> list[str]:

@@ -43,25 +43,25 @@ def resolve_priors(
     except CustomModelError:
         # Told already, with the error model.
         return ()
-    known = _known(model, positions, references)
-    found: list[Prior] = []
+    known_quantities = _known(model, positions, references)
+    priors: list[Prior] = []
     for i, entry in entries.items():
         steps: Steps = ("priors", int(i))
         if isinstance(entry, MapPriorSettings):
             # Loaded where a map is named: few experiments have any.
             from .used_maps import resolve_map_prior
 
-            found += resolve_map_prior(entry, steps, model, machine, references, probes)
+            priors += resolve_map_prior(entry, steps, model, machine, references, probes)
         else:
-            found += _prior(entry, steps, known, references)
-        if len(found) > MOST_PRIORS:
+            priors += _prior(entry, steps, known_quantities, references)
+        if len(priors) > MOST_PRIORS:
             text = (
-                f"there are {len(found)} priors up to here, coefficients counted; at most"
+                f"there are {len(priors)} priors up to here, coefficients counted; at most"
                 f" {MOST_PRIORS} are possible"
             )
             references.problems.add(("priors", int(i)), text)
             break
-    return tuple(found)
+    return tuple(priors)
 
 
 # What a name stands for: name of the parameter, position, probe, component, row over the model,
@@ -73,19 +73,22 @@ def _known(
     model: ErrorModel, positions: dict[int, Position], references: References
 ) -> dict[str, tuple[_Known, ...]]:
     """Every name that a prior may have, and the parameters it stands for."""
-    known: dict[str, tuple[_Known, ...]] = {}
-    own = np.eye(len(model.parameters))
-    for row, parameter in zip(own, model.parameters, strict=True):
-        one: _Known = (parameter.name, None, None, -1, row, parameter.unit, 0.0)
-        known[parameter.name] = (one,)
+    known_quantities: dict[str, tuple[_Known, ...]] = {}
+    unit_rows = np.eye(len(model.parameters))
+    for row, parameter in zip(unit_rows, model.parameters, strict=True):
+        quantity: _Known = (parameter.name, None, None, -1, row, parameter.unit, 0.0)
+        known_quantities[parameter.name] = (quantity,)
         if parameter.function != parameter.name:
-            known[parameter.function] = (*known.get(parameter.function, ()), one)
+            known_quantities[parameter.function] = (
+                *known_quantities.get(parameter.function, ()),
+                quantity,
+            )
     reported = model.reported()
     for name, k in reported.known_names().items():
-        known.setdefault(
+        known_quantities.setdefault(
             name, ((reported.names[k], None, None, -1, reported.matrix[k], reported.units[k], 0.0),)
         )
-    of_no_error = np.zeros(len(own))
+    of_no_error = np.zeros(len(unit_rows))
     for position in positions.values():
         artefact = references.artefacts[position.artefact]
         words = pose_parameter_names(model.dimension)
@@ -100,19 +103,19 @@ def _known(
             unit, nominal = (
                 ("m", float(position.pose.origin[k])) if k < model.dimension else ("rad", 0.0)
             )
-            known[name] = ((name, position.name, None, k, of_no_error, unit, nominal),)
-    return known
+            known_quantities[name] = ((name, position.name, None, k, of_no_error, unit, nominal),)
+    return known_quantities
 
 
 def _prior(
     settings: PriorSettings,
     steps: Steps,
-    known: dict[str, tuple[_Known, ...]],
+    known_quantities: dict[str, tuple[_Known, ...]],
     references: References,
 ) -> list[Prior]:
     problems, name = references.problems, settings.parameter
-    if name not in known:
-        advice = hint(name, known)
+    if name not in known_quantities:
+        advice = hint(name, known_quantities)
         if ": " in name and name.endswith(tuple(f": {axis}" for axis in AXIS_NAMES)):
             advice = "of ball co-ordinates state a calibration of kind: coordinates"
         elif name.startswith("probe "):
@@ -120,8 +123,8 @@ def _prior(
         problems.add((*steps, "parameter"), f'unknown parameter "{shorten(name)}"; {advice}')
         return []
     mark, place = mark_of(problems.root, (*steps, "parameter")), format_path((*steps, "parameter"))
-    found = []
-    for full, position, probe, component, row, unit, nominal in known[name]:
+    priors = []
+    for full, position, probe, component, row, unit, nominal in known_quantities[name]:
         parse, values = PARSERS[unit], []
         for key, text in (
             ("value", settings.value),
@@ -138,7 +141,7 @@ def _prior(
                     "must be above zero; correct it, or remove the prior",
                 )
             by_model = np.array(row)
-            found.append(
+            priors.append(
                 Prior(
                     full,
                     position,
@@ -152,4 +155,4 @@ def _prior(
                     unit,
                 )
             )
-    return found
+    return priors

@@ -36,7 +36,7 @@ def resolve_probes(sections: Sections, references: References) -> dict[str, Prob
             return {}
         at_reference = Probe(DEFAULT_PROBE, frozen(np.zeros(dimension or 0)))
         return {DEFAULT_PROBE: at_reference} if dimension == 2 else {}
-    tilts = [getattr(one, "a", None) for one in sections.entries("probes").values()]
+    tilts = [getattr(entry, "a", None) for entry in sections.entries("probes").values()]
     if sections.get("head") is not None and set(tilts) <= {None}:
         problems.doubt(("head",), "no probe states an angle A; the head has no effect")
     members = _star_members(sections, references)
@@ -56,8 +56,8 @@ def resolve_probes(sections: Sections, references: References) -> dict[str, Prob
         if name in members:
             uncertainty = frozen([np.inf] * (dimension or 0))
         if offset is not None and references.has_dimension(offset, steps):
-            known = None if name == reference else uncertainty
-            probes[name] = Probe(name, frozen(offset), known, angles)
+            offset_uncertainty = None if name == reference else uncertainty
+            probes[name] = Probe(name, frozen(offset), offset_uncertainty, angles)
     return probes
 
 
@@ -125,10 +125,10 @@ def resolve_stars(
         steps: Steps = ("stars", int(i))
         coordinates = np.array([probes[name].offset for name in names])
         if settings.values is not None:
-            found = _star_values(settings, names, (*steps, "values"), references)
-            if found is None:
+            values = _star_values(settings, names, (*steps, "values"), references)
+            if values is None:
                 continue
-            coordinates = found
+            coordinates = values
         has_place = settings.place == "stated"
         star = Star(names, frozen(coordinates), settings.standard_uncertainty, has_place)
         if settings.values is not None:
@@ -149,23 +149,23 @@ def _star_values(
     except ExperimentError as error:
         references.problems.take(error, steps)
         return None
-    before, found = len(references.problems.messages), dict[str, tuple[float, ...]]()
+    before, messages_and_values = len(references.problems.messages), dict[str, tuple[float, ...]]()
     for row in rows:
         name = row.texts[0]
         if name not in names:
             text = f'unknown probe "{name}"; {hint(name, names)}'
             references.problems.add_at(row.mark, steps, text)
-        elif name in found:
+        elif name in messages_and_values:
             text = f'probe "{name}" is listed twice; remove one of the two lines'
             references.problems.add_at(row.mark, steps, text)
-        found[name] = row.lengths
-    missing = [name for name in names if name not in found]
+        messages_and_values[name] = row.lengths
+    missing = [name for name in names if name not in messages_and_values]
     if missing and len(references.problems.messages) == before:
         text = f"no co-ordinates for {listing(missing)}; add them, or leave them out of probes"
         references.problems.add(steps, text)
     if len(references.problems.messages) > before:
         return None
-    return np.array([found[name] for name in names])
+    return np.array([messages_and_values[name] for name in names])
 
 
 def _reference_probe(sections: Sections, references: References) -> str:

@@ -70,11 +70,11 @@ def is_text_encoding(name: str) -> bool:
     (True, False, False)
     """
     try:
-        found = codecs.lookup(name)
+        codec = codecs.lookup(name)
         "".encode(name)
     except (LookupError, UnicodeError, ValueError):
         return False
-    return found.name not in ("idna", "punycode", "undefined", "unicode_escape")
+    return codec.name not in ("idna", "punycode", "undefined", "unicode_escape")
 
 
 def _check_probes(names: list[str], steps: Steps, references: References) -> None:

@@ -108,8 +108,8 @@ class MapPriorSettings(Settings):
 
 
 def _form_of_prior(value: Any) -> str:
-    said = value if isinstance(value, dict) else {}
-    return "<map>" if {"kind", "file"} & said.keys() else "<parameter>"
+    settings = value if isinstance(value, dict) else {}
+    return "<map>" if {"kind", "file"} & settings.keys() else "<parameter>"
 
 
 AnyPrior = Annotated[

@@ -35,17 +35,21 @@ def doubt_of_table(star: Star, offsets: Array) -> str:
         return ""
     exchanged = _exchange(star, offsets) if len(offsets) <= MOST_TIPS else None
     if exchanged is not None:
-        (i, j), left = exchanged
-        if left * CLEARLY < worst:
+        (i, j), remaining = exchanged
+        if remaining * CLEARLY < worst:
             return (
                 f"its tips are up to {_length(worst)} from the stated offsets, however it is"
-                f' turned, and within {_length(left)} if "{star.probes[i]}" and'
+                f' turned, and within {_length(remaining)} if "{star.probes[i]}" and'
                 f' "{star.probes[j]}" are exchanged; check which is which, in the table and among'
                 " the probes"
             )
     if worst <= max(NOMINAL, possible):
         return ""
-    far = [f'"{name}"' for name, own in zip(star.probes, misfit, strict=True) if own > 0.5 * worst]
+    far = [
+        f'"{name}"'
+        for name, misfit_of_probe in zip(star.probes, misfit, strict=True)
+        if misfit_of_probe > 0.5 * worst
+    ]
     return (
         f"its tips are up to {_length(worst)} from the stated offsets, however it is turned, most"
         f" of all {listing(far)}; correct the table or the offsets"
@@ -67,19 +71,19 @@ def _exchange(star: Star, offsets: Array) -> tuple[tuple[int, int], float]:
     Exchanges in a symmetric star differ by a turn: of those that leave as little, that with the
     least turn is likeliest, as tables are mostly made in axes like the machine's.
     """
-    found: list[tuple[float, float, tuple[int, int]]] = []
+    exchanges: list[tuple[float, float, tuple[int, int]]] = []
     for i in range(len(offsets) - 1):
-        others = np.arange(i + 1, len(offsets))
-        tried = np.repeat(offsets[None], len(others), axis=0)
-        tried[:, i] = offsets[others]
-        tried[np.arange(len(others)), others] = offsets[i]
-        left = _misfit(star, tried).max(axis=-1)
+        later = np.arange(i + 1, len(offsets))
+        tried = np.repeat(offsets[None], len(later), axis=0)
+        tried[:, i] = offsets[later]
+        tried[np.arange(len(later)), later] = offsets[i]
+        misfits = _misfit(star, tried).max(axis=-1)
         turns = np.trace(star.rotation(tried), axis1=-2, axis2=-1)
-        for j, own, turn in zip(others.tolist(), left.tolist(), turns.tolist(), strict=True):
-            found.append((own, -round(turn, 3), (i, j)))
-    least = min(own for own, _, _ in found)
-    alike = [one for one in found if one[0] <= least + EXCHANGED]
-    left_over, _, pair = min(alike, key=lambda one: (one[1], one[2]))
+        for j, misfit, turn in zip(later.tolist(), misfits.tolist(), turns.tolist(), strict=True):
+            exchanges.append((misfit, -round(turn, 3), (i, j)))
+    least = min(misfit for misfit, _, _ in exchanges)
+    alike = [exchange for exchange in exchanges if exchange[0] <= least + EXCHANGED]
+    left_over, _, pair = min(alike, key=lambda exchange: (exchange[1], exchange[2]))
     return pair, left_over
 
 

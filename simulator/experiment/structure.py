@@ -92,9 +92,9 @@ def validate_sections(root: Node, problems: Problems, planning: bool = False) ->
         text = f"expected a mapping that begins with title: …, found {describe(to_python(root))}"
         problems.add((), text)
         return Sections(values)
-    other = next((text for key, text in OTHER_FILES.items() if key in root.items), None)
-    if other is not None and "machine" not in root.items:
-        problems.add((), other)
+    other_kind = next((text for key, text in OTHER_FILES.items() if key in root.items), None)
+    if other_kind is not None and "machine" not in root.items:
+        problems.add((), other_kind)
         return Sections(values)
     problems.add_empty()
     absent = [name for name in fields if name not in root.items]
@@ -171,8 +171,8 @@ def _validate_pool(node: Node, problems: Problems) -> dict[Steps, Any]:
     if not isinstance(node, Mapping):
         return _validate([_adapter("pool")], node, ("pool",), problems)
     values: dict[Steps, Any] = {("pool",): None}
-    rest = {key: item for key, item in node.items.items() if key not in POOL_ENTRIES}
-    whole = _validate([_adapter("pool")], replace(node, items=rest), ("pool",), problems).get(
+    further = {key: item for key, item in node.items.items() if key not in POOL_ENTRIES}
+    whole = _validate([_adapter("pool")], replace(node, items=further), ("pool",), problems).get(
         ("pool",)
     )
     whole = whole or PoolSettings.model_validate({})
@@ -184,9 +184,9 @@ def _validate_pool(node: Node, problems: Problems) -> dict[Steps, Any]:
                 adapter = type_adapter(kind_of(item))
                 values |= _validate([adapter], item, ("pool", key, i), problems)
         elif entries is not None and not (isinstance(entries, Scalar) and entries.value is None):
-            found = describe(to_python(entries) if isinstance(entries, Scalar) else {})
+            form = describe(to_python(entries) if isinstance(entries, Scalar) else {})
             description = PoolSettings.model_fields[key].description
-            text = f"expected a list, each entry beginning with “- ”, found {found} ({description})"
+            text = f"expected a list, each entry beginning with “- ”, found {form} ({description})"
             problems.add(("pool", key), text)
     return values
 
@@ -212,13 +212,13 @@ def _validate(
     """The value of a node by the first of some adapters that takes it; the last says what is
     wrong.
     """
-    known = {} if steps[0] in COMPLETED_LATER else _VALID.setdefault(node, {})
+    valid = {} if steps[0] in COMPLETED_LATER else _VALID.setdefault(node, {})
     for adapter in adapters:
-        if adapter in known:
-            return {steps: known[adapter]}
+        if adapter in valid:
+            return {steps: valid[adapter]}
         try:
-            known[adapter] = adapter.validate_python(to_python(node))
-            return {steps: known[adapter]}
+            valid[adapter] = adapter.validate_python(to_python(node))
+            return {steps: valid[adapter]}
         except ValidationError as error:
             refusal = error
     explain_in(problems, refusal, adapter, node, steps)
@@ -231,11 +231,11 @@ def _adapters(key: str, node: Node) -> Iterator[TypeAdapter[Any]]:
     The form of one kind is made in a fraction of the time that those of all kinds take, which are
     needed to say what would be right.
     """
-    said = node.items.get("kind") if isinstance(node, Mapping) else None
-    if isinstance(said, Scalar) and isinstance(said.value, str):
-        own = _kinds(key).get(said.value)
-        if own is not None:
-            yield type_adapter(own)
+    kind = node.items.get("kind") if isinstance(node, Mapping) else None
+    if isinstance(kind, Scalar) and isinstance(kind.value, str):
+        adapter = _kinds(key).get(kind.value)
+        if adapter is not None:
+            yield type_adapter(adapter)
     yield _adapter(key)
 
 
@@ -243,13 +243,13 @@ def _adapters(key: str, node: Node) -> Iterator[TypeAdapter[Any]]:
 def _kinds(key: str) -> dict[str, type[Settings]]:
     """The classes among which the word `kind` chooses in a section or its entries, by that word."""
     union, *about = get_args(_form(key)) or (None,)
-    about += [one for field in about for one in getattr(field, "metadata", ())]
-    if not any(getattr(one, "discriminator", None) == "kind" for one in about):
+    about += [annotation for field in about for annotation in getattr(field, "metadata", ())]
+    if not any(getattr(annotation, "discriminator", None) == "kind" for annotation in about):
         return {}
     return {
-        word: one
-        for one in get_args(union)
-        for word in get_args(one.model_fields["kind"].annotation)
+        word: annotation
+        for annotation in get_args(union)
+        for word in get_args(annotation.model_fields["kind"].annotation)
     }
 
 

@@ -35,29 +35,30 @@ SAME, SAME_PART = 1e-12, 1e-9
 def read_true_map(truth: TrueMapSettings, machine: Machine | None, references: References) -> None:
     """Let the true machine be that of its map, or report what is wrong with it."""
     steps: Steps = ("true_machine", "file")
-    found = _read(truth.file, steps, references)
-    if found is None:
+    true_map = _read(truth.file, steps, references)
+    if true_map is None:
         return
-    a = found.values
+    a = true_map.values
     if truth.draw is not None:
         generator = np.random.default_rng(np.random.SeedSequence(truth.draw))
-        root = found.root
+        root = true_map.root
         a = a + (root @ generator.standard_normal(root.shape[1]))[: len(a)]
     content = hashlib.sha256(read_bytes(references.file(truth.file))).hexdigest()
-    truth.set_machine(TrueMachine(found.model, a), content)
-    if found.undetermined.shape[1]:
+    truth.set_machine(TrueMachine(true_map.model, a), content)
+    if true_map.undetermined.shape[1]:
         text = (
-            f"has {found.undetermined.shape[1]} undetermined directions, in which the true machine"
+            f"has {true_map.undetermined.shape[1]} undetermined directions, in which the true"
+            " machine"
             " is as the fit happened to leave it"
         )
         references.problems.doubt(steps, text)
     if machine is None:
         return
-    if machine.dimension != found.dimension:
-        text = f"is of {found.dimension} axes, but machine.volume of {machine.dimension}"
+    if machine.dimension != true_map.dimension:
+        text = f"is of {true_map.dimension} axes, but machine.volume of {machine.dimension}"
         references.problems.add(steps, f"{text}; name another map")
         return
-    _check_ends(found, machine, steps, references, outside_only=True)
+    _check_ends(true_map, machine, steps, references, outside_only=True)
 
 
 def resolve_map_prior(
@@ -83,7 +84,7 @@ def resolve_map_prior(
         text = "was converted from another error model, and holds what no readings were asked for"
         problems.add(of_file, f"{text}; use the map that fit wrote")
         return []
-    kept = np.arange(len(fitted.values))
+    kept_indices = np.arange(len(fitted.values))
     free = [
         (name, axis)
         for k, name in enumerate(fitted.probes.names)
@@ -95,10 +96,10 @@ def resolve_map_prior(
         for j, (name, axis) in enumerate(free)
         if settings.offsets and name in probes and probes[name].is_estimated
     ]
-    kept = np.concatenate([kept, len(fitted.values) + np.array(shared, np.int64)])
+    kept_indices = np.concatenate([kept_indices, len(fitted.values) + np.array(shared, np.int64)])
     drift = (settings.drift_per_year or 0.0) * years
-    found = determined_combinations(marginal_of(fitted, kept))
-    if fitted.without_scatter or not fitted.sigma > 0.0 or not (found[2] > 0.0).all():
+    combinations = determined_combinations(marginal_of(fitted, kept_indices))
+    if fitted.without_scatter or not fitted.sigma > 0.0 or not (combinations[2] > 0.0).all():
         text = (
             "states no uncertainty, as that of readings without scatter does; use the map of real"
             " readings"
@@ -107,17 +108,17 @@ def resolve_map_prior(
         return []
     mark, campaign = mark_of(problems.root, of_file), campaign_of(fitted, settings.file)
     priors = []
-    for k, (row, value, uncertainty) in enumerate(zip(*found, strict=True)):
+    for k, (row, value, uncertainty) in enumerate(zip(*combinations, strict=True)):
         by_offset: dict[str, np.ndarray] = {}
         for coefficient, j in zip(row[len(fitted.values) :].tolist(), shared, strict=True):
             name, axis = free[j]
             by_offset.setdefault(name, np.zeros(fitted.dimension))[axis] = coefficient
         share = MapShare(campaign, settings.inflation * float(uncertainty) / fitted.sigma, drift)
-        largest = int(np.abs(row * fitted.scale[kept]).argmax())
+        largest = int(np.abs(row * fitted.scale[kept_indices]).argmax())
         label = f"{settings.file}, combination {k + 1}, mostly"
         priors.append(
             Prior(
-                f"{label} {fitted.parameters[int(kept[largest])].name}",
+                f"{label} {fitted.parameters[int(kept_indices[largest])].name}",
                 None,
                 None,
                 -1,
@@ -184,10 +185,10 @@ def _is_same(
         return False
     if not _check_ends(fitted, machine, steps, references, outside_only=False):
         return False
-    own = [(one.name, one.unit) for one in model.parameters]
-    known = [(one.name, one.unit) for one in fitted.model.parameters]
-    if own != known:
-        differ = [name for name, _ in set(own) ^ set(known)]
+    model_parameters = [(parameter.name, parameter.unit) for parameter in model.parameters]
+    map_parameters = [(parameter.name, parameter.unit) for parameter in fitted.model.parameters]
+    if model_parameters != map_parameters:
+        differ = [name for name, _ in set(model_parameters) ^ set(map_parameters)]
         text = (
             f"is of another error model (parameters differ: {listing(sorted(differ), 4)}); fit with"
             " the same model, or convert the map"
@@ -210,20 +211,20 @@ def _check_ends(
     fitted: FittedMap, machine: Machine, steps: Steps, references: References, outside_only: bool
 ) -> bool:
     """Whether the volume is that of the map, or within it where `outside_only`; says where not."""
-    own, volume, is_right = fitted.volume, machine.volume, True
+    volumes, volume, is_right = fitted.volume, machine.volume, True
     for k, axis in enumerate(AXES[: fitted.dimension]):
-        ends = float(own.lower[k]), float(own.upper[k])
+        ends = float(volumes.lower[k]), float(volumes.upper[k])
         low, high = float(volume.lower[k]), float(volume.upper[k])
         if outside_only:
             is_wrong = low < ends[0] - TOLERANCE or high > ends[1] + TOLERANCE
         else:
             is_wrong = abs(low - ends[0]) > TOLERANCE or abs(high - ends[1]) > TOLERANCE
         if is_wrong:
-            what = "stay within it" if outside_only else "make them the same, or convert the map"
+            remedy = "stay within it" if outside_only else "make them the same, or convert the map"
             text = (
                 f"its volume goes from {format_length(ends[0])} to {format_length(ends[1])} in"
                 f" {axis}, but machine.volume from {format_length(low)} to {format_length(high)};"
-                f" {what}"
+                f" {remedy}"
             )
             references.problems.add(steps, text)
             is_right = False

@@ -70,8 +70,8 @@ def variant_trees(root: Node, problems: Problems) -> dict[str, Node]:
     if section is None or not isinstance(root, Mapping):
         return trees
     if not isinstance(section, Mapping) or not section.items:
-        found = "nothing" if isinstance(section, Mapping) else describe(_shallow(section))
-        problems.add(("variants",), f"expected a mapping, name: {{path: new value}}, found {found}")
+        form = "nothing" if isinstance(section, Mapping) else describe(_shallow(section))
+        problems.add(("variants",), f"expected a mapping, name: {{path: new value}}, found {form}")
         return trees
     if len(section.items) > MOST_VARIANTS:
         text = f"{len(section.items)} variants are too many; at most {MOST_VARIANTS} are possible"
@@ -95,9 +95,13 @@ def variant_trees(root: Node, problems: Problems) -> dict[str, Node]:
         for path, node in overrides.items.items():
             try:
                 place = place_of(base, path)
-                other = next((p for p, steps in places.items() if _overlap(steps, place)), None)
-                if other is not None:
-                    raise ValueError(f'is part of the same place as "{other}"; replace it once')
+                overlapping = next(
+                    (p for p, steps in places.items() if _overlap(steps, place)), None
+                )
+                if overlapping is not None:
+                    raise ValueError(
+                        f'is part of the same place as "{overlapping}"; replace it once'
+                    )
                 places[path] = place
                 tree = override(tree, path, node, overrides.key_marks[path])
             except ValueError as error:
@@ -118,12 +122,12 @@ def node_at(root: Node, path: str) -> Node | None:
     return node
 
 
-def is_same_place(root: Node, path: str, other: str) -> bool:
+def is_same_place(root: Node, path: str, second: str) -> bool:
     """Tell whether one of two paths leads to the other's place, or into it.
 
     :raises ValueError: as ``node_at``.
     """
-    return _overlap(place_of(root, path), place_of(root, other))
+    return _overlap(place_of(root, path), place_of(root, second))
 
 
 def override(root: Node, path: str, value: Node, mark: Mark) -> Node:
@@ -138,8 +142,10 @@ def override(root: Node, path: str, value: Node, mark: Mark) -> Node:
         and provider("sections", str(steps[0])) is None
         or steps[0] == "variants"
     ):
-        known = [key for key in ExperimentSettings.model_fields if key != "variants"]
-        raise ValueError(f'"{steps[0]}" cannot be replaced in a variant; {hint(steps[0], known)}')
+        section_names = [key for key in ExperimentSettings.model_fields if key != "variants"]
+        raise ValueError(
+            f'"{steps[0]}" cannot be replaced in a variant; {hint(steps[0], section_names)}'
+        )
     return _replaced(root, steps, with_present_keys(value, tuple(steps)), mark, ())
 
 
@@ -152,20 +158,20 @@ def removed(root: Node, path: str) -> Node:
 
 
 def _less(node: Node, steps: list[str], above: tuple[str, ...]) -> Node:
-    step, rest = steps[0], steps[1:]
+    step, deeper = steps[0], steps[1:]
     here = (*above, step)
     key: str | int = int(step) if isinstance(node, Sequence) else step
     below = child(node, key)
     if below is None:
-        known = node.items if isinstance(node, Mapping) else ()
-        raise ValueError(f"there is no {format_path(here)}; {hint(step, known)}")
+        items = node.items if isinstance(node, Mapping) else ()
+        raise ValueError(f"there is no {format_path(here)}; {hint(step, items)}")
     if isinstance(node, Sequence):
         i = int(step)
-        kept = (_less(below, rest, here),) if rest else ()
-        return replace(node, items=(*node.items[:i], *kept, *node.items[i + 1 :]))
+        kept_below = (_less(below, deeper, here),) if deeper else ()
+        return replace(node, items=(*node.items[:i], *kept_below, *node.items[i + 1 :]))
     assert isinstance(node, Mapping)
-    if rest:
-        return replace(node, items={**node.items, step: _less(below, rest, here)})
+    if deeper:
+        return replace(node, items={**node.items, step: _less(below, deeper, here)})
     return replace(node, items={name: item for name, item in node.items.items() if name != step})
 
 
@@ -190,20 +196,20 @@ def place_of(root: Node, path: str) -> tuple[str, ...]:
     :raises ValueError: the path is malformed, or an entry of a list does not exist.
     """
     node: Node | None = root
-    found: list[str] = []
+    parts: list[str] = []
     for step in steps_of(path):
         if isinstance(node, Sequence):
-            i = _index(node, step, tuple(found))
+            i = _index(node, step, tuple(parts))
             node, step = node.items[i], str(i)
         else:
             node = child(node, step) if node is not None else None
-        found.append(step)
-    return tuple(found)
+        parts.append(step)
+    return tuple(parts)
 
 
-def _overlap(one: tuple[str, ...], other: tuple[str, ...]) -> bool:
-    shorter = min(len(one), len(other))
-    return one[:shorter] == other[:shorter]
+def _overlap(first: tuple[str, ...], second: tuple[str, ...]) -> bool:
+    shorter = min(len(first), len(second))
+    return first[:shorter] == second[:shorter]
 
 
 def _replaced(
@@ -211,16 +217,16 @@ def _replaced(
 ) -> Node:
     if not steps:
         return value
-    step, rest, here = steps[0], steps[1:], (*above, steps[0])
+    step, deeper, here = steps[0], steps[1:], (*above, steps[0])
     if isinstance(node, Mapping):
-        if step not in node.items and rest:
+        if step not in node.items and deeper:
             raise ValueError(f"there is no {format_path(here)}; {hint(step, node.items)}")
-        below = _replaced(node.items[step], rest, value, mark, here) if rest else value
-        marks = node.key_marks if rest else {**node.key_marks, step: mark}
+        below = _replaced(node.items[step], deeper, value, mark, here) if deeper else value
+        marks = node.key_marks if deeper else {**node.key_marks, step: mark}
         return replace(node, items={**node.items, step: below}, key_marks=marks)
     if isinstance(node, Sequence):
         i = _index(node, step, above)
-        below = _replaced(node.items[i], rest, value, mark, here)
+        below = _replaced(node.items[i], deeper, value, mark, here)
         return replace(node, items=(*node.items[:i], below, *node.items[i + 1 :]))
     named = format_path(above) or "the experiment"
     raise ValueError(
@@ -244,8 +250,8 @@ def _index(node: Sequence, step: str, above: tuple[str, ...]) -> int:
         raise ValueError(
             f'several entries of {format_path(above)} are named "{step}"; use an index'
         )
-    known = [name for name in names if name is not None]
-    advice = hint(step, known) if known else f"use an index, 0 to {len(names) - 1}"
+    known_names = [name for name in names if name is not None]
+    advice = hint(step, known_names) if known_names else f"use an index, 0 to {len(names) - 1}"
     raise ValueError(f'there is no "{step}" in {format_path(above)}; {advice}')
 
 
@@ -270,11 +276,18 @@ def in_variants(names: list[str], all_names: list[str]) -> str:
 
 
 def unknown_variants(
-    files: AnySequence[Path], wanted: AnySequence[str], found: Collection[str | None]
+    files: AnySequence[Path], wanted: AnySequence[str], variant_names: Collection[str | None]
 ) -> tuple[Message, ...]:
     """Messages about variants that none of the files has; `found` are names of those that they
     have.
     """
-    every, known = ", ".join(map(str, files)), sorted(name for name in found if name is not None)
-    texts = [f'no variant "{name}"; {hint(name, known)}' for name in wanted if name not in known]
+    every, known_variants = (
+        ", ".join(map(str, files)),
+        sorted(name for name in variant_names if name is not None),
+    )
+    texts = [
+        f'no variant "{name}"; {hint(name, known_variants)}'
+        for name in wanted
+        if name not in known_variants
+    ]
     return tuple(Message(every, 0, 0, "", text) for text in texts)
