@@ -1,4 +1,4 @@
-"""ballplate from Python: what the commands do, with results in place of text.
+"""ballplate from Python: what the commands do, with results instead of text.
 
 Wherever an experiment is taken, so is the path of a file with one; wherever a table, the path of a
 CSV file or a data frame. Values in results are in metres, radians and ratios. `report` receives
@@ -93,7 +93,7 @@ def check(
     share: float | None = None,
     suggest: bool = False,
 ) -> Prediction:
-    """Whether a design determines all its parameters and, if not, which changes it leaves
+    """True if a design determines all its parameters and, if not, which changes it leaves
     undetermined.
 
     `goals` are what it is to reach, too, as in `reach`, with the `share` of lengths that are to be
@@ -262,12 +262,12 @@ def fit(
     """The estimate from readings: a table or several, or those that the experiment's file names;
     also reports of measuring programs, as `read_report` reads them.
 
-    `columns`, `unit` and `coordinates` say how tables are written, in place of the experiment's
-    section `readings`: columns by role, the unit of those that state none, and whether co-ordinates
-    are scale readings, ball centres or those of a part. `names` is the rule of names in reports;
-    with `swap_names` those of two balls are swapped where readings show that they are.
+    `columns`, `unit` and `coordinates` say how tables are written, instead of the experiment's
+    section `readings`: columns by role, the unit of those that state none, and whether
+    co-ordinates are scale readings, ball centres or those of a part. `names` is the rule of names
+    in reports; with `swap_names` those of two balls are swapped where readings show that they are.
     `sigma` overrides what the experiment says; with `monomials` the machine's parameters are the
-    coefficients of t, t^2, ... on [0, 1]. A `certificate` has values in place of the experiment's
+    coefficients of t, t^2, ... on [0, 1]. A `certificate` has values instead of the experiment's
     own. Of the `ballplate.ESTIMATORS` those of distances take `pairs` of balls, also
     `across_probes`, and reversal takes the axis that has the `scale` difference, and whether
     `offsets` between its positions are estimated. With `components`, one of the

@@ -33,7 +33,7 @@ SIGMAS = ("estimated", "given")
 def load(path: PathLike, variant: str | None = None) -> Experiment:
     """The experiment of a file, or one of its variants.
 
-    :raises ExperimentError: the file is wrong, or has several variants and none was chosen.
+    :raises ExperimentError: the file is invalid, or has several variants and none was chosen.
 
     >>> load("designs/quickstart.yaml")
     <Experiment quickstart: 5 x 5 ball plate in six positions>

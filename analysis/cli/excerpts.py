@@ -27,7 +27,7 @@ RED, PLAIN = "\x1b[31m", "\x1b[0m"
 
 
 def has_colour(stream: TextIO, environment: Mapping[str, str] = os.environ) -> bool:
-    """Whether colour is wanted: by NO_COLOR and FORCE_COLOR where one is not empty, else on a
+    """True if colour is wanted: by NO_COLOR and FORCE_COLOR where one is not empty, else on a
     terminal that has it.
 
     Not every console of Windows knows the sequences, and there it has to be asked for.

@@ -36,5 +36,5 @@ def matching_files(patterns: Sequence[Path]) -> list[Path]:
 
 
 def is_pattern(path: Path) -> bool:
-    """Whether a path is a pattern, and not the name of a file."""
+    """True if a path is a pattern, and not the name of a file."""
     return glob.has_magic(str(path)) and not path.exists()

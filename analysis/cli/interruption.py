@@ -53,7 +53,7 @@ def named_paths(options: Namespace) -> Iterator[tuple[str, Path]]:
 
 
 def signatures(paths: Iterable[Path]) -> dict[Path, Signature | None]:
-    """Whether files are there, and what tells that one was written to."""
+    """True if files are there, and what tells that one was written to."""
     return {path: _signature(path) for path in paths}
 
 

@@ -75,7 +75,7 @@ class Needed:
 
     @property
     def is_missing(self) -> bool:
-        """Whether one of the modules is not installed."""
+        """True if one of the modules is not installed."""
         return any(importlib.util.find_spec(name) is None for name in self.modules)
 
 
@@ -96,7 +96,7 @@ class Output:
 
     @property
     def is_screen(self) -> bool:
-        """Whether standard output is meant."""
+        """True if standard output is meant."""
         return self.takes_screen and str(self.path) == "-"
 
 

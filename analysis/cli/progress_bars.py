@@ -90,7 +90,7 @@ def progress(options: Namespace) -> Iterator[ProgressDisplay]:
 
 
 def duration(seconds: float) -> str:
-    """A time to wait in words.
+    """A time to wait as text.
 
     >>> duration(3.2), duration(200), duration(9000)
     ('3 s', '3 min 20 s', '2 h 30 min')

@@ -91,7 +91,8 @@ def observed_readings(options: Namespace) -> tuple[Experiment, ObservedReadings]
     """The experiment that the options choose and its readings; says what is to be said of these.
 
     :raises UsageError: the readings come first, and the experiment file after them.
-    :raises ExperimentError: one of the files is wrong.
+
+    :raises ExperimentError: one of the files is invalid.
     """
     from ballplate.simulator.inputs.extensions import service
 

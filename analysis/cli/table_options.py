@@ -15,7 +15,7 @@ KEYS = ("columns", "unit", "decimal", "coordinates", "names", "swap_names")
 
 
 def add_tables(parser: ArgumentParser) -> None:
-    """Add what can be said of tables of readings in place of the experiment file."""
+    """Add what can be said of tables of readings instead of the experiment file."""
     parser.add_argument(
         "--columns",
         metavar="NAME=COLUMN,…",
@@ -85,7 +85,7 @@ def columns(text: str) -> dict[str, str]:
 def with_options(options: Namespace, experiment: Experiment) -> Experiment:
     """The experiment with what the options say of tables of readings.
 
-    :raises ExperimentError: they are wrong.
+    :raises ExperimentError: they are invalid.
     """
     return experiment.with_readings({key: getattr(options, key) for key in KEYS})
 

@@ -1,7 +1,7 @@
 """Comparisons and printed digits that rounding cannot change.
 
 Linear algebra kernels differ in the order of their sums, and so in the last digits of a result.
-Numbers that are equal but for rounding, as those of a symmetrical design, are made equal to the bit
+Numbers that are equal except rounding, as those of a symmetrical design, are made equal to the bit
 before they are compared, sorted or chosen from; of equal ones the first is taken then.
 """
 
@@ -45,8 +45,8 @@ def comparable(values: ArrayLike, digits: int = DIGITS, axis: int | None = None)
 
 
 def first_largest(values: Array) -> int:
-    """Index of the largest of values (m,), one at least of which is no NaN: of those that are equal
-    but for rounding the first.
+    """Index of the largest of values (m,), one at least of which is no NaN: of those that are
+    equal except rounding the first.
 
     >>> first_largest(np.array([np.nan, 0.3, 0.1 + 0.2, 0.2]))
     1

@@ -191,7 +191,7 @@ def reading_uncertainties(design: Design, readings: Readings) -> Array:
 
 
 def measured(design: Design, readings: Readings) -> Flags:
-    """Which co-ordinates (m, d) are read: all but those across artefacts that are read in their
+    """Which co-ordinates (m, d) are read: almost those across artefacts that are read in their
     plane.
     """
     shape = (len(readings), design.dimension)
@@ -207,7 +207,7 @@ def reading_noise(design: Design, readings: Readings) -> Array:
 
 
 def nominal_state(design: Design) -> State:
-    """The design as drawn, on a machine without errors."""
+    """The design nominal, on a machine without errors."""
     return State(
         design.balls.places,
         design.positions.rotations,
@@ -332,8 +332,8 @@ class Observations(ABC):
 
     `word` is what one of them is called. Where `scales`, values are lengths that a certificate has
     too long by one ratio where its scale is wrong; where they are `is_joint`, a row is a
-    combination of several values. `words` tell what is wrong with a wrong one.
-    Values are in `measured_in`, unless `unit` says otherwise of each.
+    combination of several values. `words` tell faults of a wrong one. Values are in `measured_in`,
+    unless `unit` says otherwise of each.
     """
 
     word: ClassVar[str]

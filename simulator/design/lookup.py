@@ -39,7 +39,7 @@ class References:
 
     ``probes`` and ``artefact_names`` are names as written, also of entries that are wrong in
     themselves; ``artefacts`` and ``layouts`` have only right ones. ``dimension`` is None where the
-    file does not tell it, and so is the ``volume`` where it is wrong.
+    file does not tell it, and so is the ``volume`` where it is invalid.
     """
 
     problems: Problems
@@ -75,8 +75,8 @@ class References:
         return self.tally.readings <= MOST_READINGS
 
     def artefact(self, name: str | None, steps: Steps) -> str | None:
-        """Return the artefact that a position or calibration is about, or None after saying what is
-        wrong.
+        """Return the artefact that a position or calibration is about, or None after reporting
+        faults.
         """
         if name is None:
             if len(self.artefact_names) > 1:
@@ -107,7 +107,7 @@ class References:
                 )
 
     def probe_names(self, names: tuple[str, ...] | None, steps: Steps) -> tuple[str, ...] | None:
-        """Return the probes of a reading, or None after saying what is wrong."""
+        """Return the probes of a reading, or None after reporting faults."""
         if names is None:
             if len(self.probes) > 1:
                 choice = listing(self.probes)
@@ -116,7 +116,7 @@ class References:
         return names if self._known_once("probe", self.probes, names, (*steps, "probes")) else None
 
     def is_not_negative(self, uncertainty: float | None, steps: Steps) -> bool:
-        """Whether an uncertainty is zero or above, or none is stated; otherwise a message."""
+        """True if an uncertainty is zero or above, or none is stated; otherwise a message."""
         return self.require(
             uncertainty is None or uncertainty >= 0.0,
             steps,
@@ -124,7 +124,7 @@ class References:
         )
 
     def has_axes(self, setting: object, steps: Steps) -> bool:
-        """Whether what is stated, if it is a list, has one for each axis; otherwise a message."""
+        """True if what is stated, if it is a list, has one for each axis; otherwise a message."""
         count = len(setting) if isinstance(setting, tuple) else self.dimension
         return self.require(
             self.dimension in (None, count),
@@ -133,20 +133,18 @@ class References:
         )
 
     def is_position(self, name: str, positions: Collection[str], steps: Steps) -> bool:
-        """Whether a name is of a position; otherwise a message."""
+        """True if a name is of a position; otherwise a message."""
         return self.require(
             name in positions, steps, f'unknown position "{name}"; {hint(name, positions)}'
         )
 
     def are_probes(self, names: Sequence[str], steps: Steps) -> bool:
-        """Tell whether names listed at a path are of probes, each once, after saying what is
-        wrong.
-        """
+        """True if names listed at a path are of probes, each once, after reporting faults."""
         return self._known_once("probe", self.probes, names, steps)
 
     def balls(self, chosen: Sequence[str], layout: BallLayout, steps: Steps) -> Indices | None:
-        """Return the indices of balls, all, the corners or listed ones, or None after saying what
-        is wrong.
+        """Return the indices of balls, all, the corners or listed ones, or None after reporting
+        faults.
         """
         index = {name: i for i, name in enumerate(layout.names)}
         if chosen == "all":
@@ -165,9 +163,7 @@ class References:
         return indices
 
     def has_dimension(self, point: Sequence[float], steps: Steps) -> bool:
-        """Tell whether a point has as many co-ordinates as the experiment, after saying where
-        not.
-        """
+        """True if a point has as many co-ordinates as the experiment, after saying where not."""
         return self.require(
             self.dimension in (None, len(point)),
             steps,
@@ -176,8 +172,8 @@ class References:
         )
 
     def is_in_volume(self, point: Sequence[float], steps: Steps) -> bool:
-        """Tell whether a point has the right number of co-ordinates and lies in the measuring
-        volume, after saying where not.
+        """True if a point has the right number of co-ordinates and lies in the measuring volume,
+        after saying where not.
         """
         if not self.has_dimension(point, steps):
             return False

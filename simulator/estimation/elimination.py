@@ -182,7 +182,7 @@ def _eliminate_alike(design: Design, layout: SharedLayout, state: State, x: Arra
 
 
 def _differ(design: Design, state: State) -> bool:
-    """Whether the weights of a design's rows differ by more than `ALIKE`."""
+    """True if the weights of a design's rows differ by more than `ALIKE`."""
     weights = [
         reading_weights(design, design.readings.select(design.plate_readings)),
         *(
@@ -325,7 +325,7 @@ def _absorbed(triangle: Array, rows: Array) -> Array:
 
 
 def _with_rows(triangle: Array, rows: Array) -> Array:
-    """Triangular factor of a square `triangle` with `rows` below it, in place of both where they
+    """Triangular factor of a square `triangle` with `rows` below it, instead of both where they
     are large.
     """
     if len(triangle) < SMALL:
@@ -334,8 +334,8 @@ def _with_rows(triangle: Array, rows: Array) -> Array:
 
 
 def _by_panels(triangle: Array, rows: Array, panel: int) -> Array:
-    """Triangular factor of a square `triangle` with `rows` below it, both in Fortran's order and in
-    place of both.
+    """Triangular factor of a square `triangle` with `rows` below it, both in Fortran's order and
+    instead of both.
     """
     reduced: Array
     dtpqrt = scipy_linalg().lapack.dtpqrt

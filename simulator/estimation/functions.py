@@ -195,9 +195,8 @@ def displacements(
 ) -> Displacements:
     """Displacements of places, in units of the standard deviation of a unit-weight observation.
 
-    With `narrow` those of points have variables of their own, no more than there are parameters
-    that move points; otherwise those of the linearisation, which balls and observations have in
-    common.
+    With `narrow` those of points have variables of their own, at most there are parameters that
+    move points; otherwise those of the linearisation, which balls and observations have in common.
     """
     design, drawn = linearisation.design, linearisation.as_drawn.state
     if isinstance(places, BallPlaces):

@@ -116,11 +116,11 @@ def gauss_newton(
 def estimate(design: Design, x: Array, settings: GaussNewtonSettings | None = None) -> Solution:
     """The estimate from scale readings `x` (readings, d) and starting values of their own.
 
-    What is open as drawn is held, since noise alone would lead far along it, and the square of such
+    What is open nominal is held, since noise alone would lead far along it, and the square of such
     a way would falsify what is determined. Of plates it is followed, as in NPL Report CISE 15/98,
     section 5.4, where the readings tell something of it, see `_tells_of_open`, without leaving the
     neighbourhood: poses a little off their nominal ones call for steps of metres. Rank and null
-    space of the solution are those of the design as drawn in any case.
+    space of the solution are those of the design nominal in any case.
     """
     start = initial_state(design, x)
     drawn = as_drawn(design)
@@ -141,7 +141,7 @@ def estimate(design: Design, x: Array, settings: GaussNewtonSettings | None = No
 def _tells_of_open(
     design: Design, held_solution: Solution, followed: Solution, deficiency: int
 ) -> bool:
-    """Whether S^2 falls by more than noise explains where what is open as drawn is followed: an
+    """True if S^2 falls by more than noise explains where what is open nominal is followed: an
     F-test with the scatter of the readings themselves.
     """
     from scipy.special import fdtrc
@@ -159,7 +159,7 @@ def as_drawn(design: Design) -> Spectrum:
     """The spectrum of a design in its nominal poses on a machine without errors: rank and null
     space are those here.
 
-    With errors, noise and poses that are not quite as drawn the same readings seem to tell a little
+    With errors, noise and poses that are not quite nominal the same readings seem to tell a little
     of what they leave open. To follow that may lead far astray: where no length is known, S^2 is
     least when all lengths are zero.
     """
@@ -167,7 +167,7 @@ def as_drawn(design: Design) -> Spectrum:
 
 
 def linearised_fit(design: Design, solution: Solution) -> Linearisation:
-    """The linearisation at an estimate; what is undetermined is what the design as drawn leaves
+    """The linearisation at an estimate; what is undetermined is what the design nominal leaves
     open.
     """
     drawn = linearise(design) if solution.spectrum.deficiency else None

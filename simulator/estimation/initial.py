@@ -216,7 +216,7 @@ def _with_held(
     turn: Array,
     shift: Array,
 ) -> tuple[Array, Array]:
-    """The motion into an artefact's frame that leaves what is held of its first pose as drawn,
+    """The motion into an artefact's frame that leaves what is held of its first pose nominal,
     where calibrated co-ordinates fix the rest of the frame.
 
     Nothing moves later what is held: the readings do not show it.

@@ -19,8 +19,8 @@ from .elimination import Factor, eliminate
 @dataclass(frozen=True, eq=False)
 class LinearFunctions:
     """Derivatives of m functions: `shared` (m, s) by the shared parameters, `balls` (m, n, d) by
-    those of all balls, None where no ball has a part in them; `drawn` are the same at the design as
-    drawn, None where these are.
+    those of all balls, None where no ball has a part in them; `drawn` are the same at the design
+    nominal, None where these are.
     """
 
     shared: Array
@@ -89,7 +89,7 @@ class Linearisation:
         """Standard deviations (m,) of `rows` (m, s) applied to the shared parameters; NaN where
         open.
 
-        `drawn` (m, s) are the same functions linearised as drawn, if they are others there.
+        `drawn` (m, s) are the same functions linearised nominal, if they are others there.
         """
         result = np.sqrt(((rows @ self.shared) ** 2).sum(axis=1))
         rows = rows if drawn is None else drawn
@@ -138,9 +138,8 @@ def linearise(
     x: Array | None = None,
     drawn: Spectrum | None = None,
 ) -> Linearisation:
-    """Linearise a design at a `state`, as drawn by default, with scale readings `x`
-    (readings, d) or error-free ones. With a spectrum `drawn` rank and null space are those, see
-    `spectrum`.
+    """Linearise a design at a `state`, nominal by default, with scale readings `x` (readings, d)
+    or error-free ones. With a spectrum `drawn` rank and null space are those, see `spectrum`.
 
     >>> import ballplate as bp
     >>> linearise(bp.lay_out(bp.quickstart())).rank

@@ -119,7 +119,7 @@ def _machine_of_file(
 def _true_machine_of_file(
     truth: TrueMachineFileSettings, machine: Machine | None, references: References
 ) -> None:
-    """Let the true machine be that of its file, or report what is wrong with it."""
+    """Let the true machine be that of its file, or report its faults."""
     from ..machines.description import random_part
 
     steps: Steps = ("true_machine", "file")
@@ -210,7 +210,7 @@ def check_true_machine(sections: Sections, machine: Machine | None, references: 
 
 
 def _read_curves(truth: CurvesSettings, machine: Machine | None, references: References) -> None:
-    """Let the true machine have the curves of its files, or report what is wrong with them."""
+    """Let the true machine have the curves of its files, or report its faults."""
     from .curve_files import read_curves
 
     problems, curves = references.problems, dict[str, Points]()

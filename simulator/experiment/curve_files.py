@@ -33,7 +33,7 @@ def read_curves(path: Path) -> dict[str, Points]:
     """Read curves of one axis from a file whose first line names the columns, such as
     position_mm,EXX_um,EAX_urad.
 
-    :raises ExperimentError: everything that is wrong with the file at once.
+    :raises ExperimentError: all faults of the file at once.
     """
     return read_numbered_curves(path)[0]
 

@@ -93,7 +93,7 @@ def read_error_table(path: Path, name: str, axis: tuple[float, float] | None = N
 
     Where the ends of the `axis` are given, in metres, the table should cover it.
 
-    :raises ExperimentError: everything that is wrong with the file at once.
+    :raises ExperimentError: all faults of the file at once.
     """
     messages: list[Message] = []
     stated_values: dict[str, tuple[Mark, str]] = {}
@@ -185,7 +185,7 @@ def _meant(comment: str) -> str | None:
 def _range(
     file: str, positions: tuple[float, ...], numbers: tuple[int, ...], axis: tuple[float, float]
 ) -> list[Message]:
-    """What is wrong with the ends of a table whose points stand in lines `numbers`."""
+    """Faults of the ends of a table whose points stand in lines `numbers`."""
     lower, upper = axis
     length = upper - lower
     limits = []

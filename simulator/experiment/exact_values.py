@@ -93,7 +93,7 @@ def exact_contradictions(
     layouts: Mapping[str, BallLayout],
 ) -> Iterator[tuple[int, str]]:
     """Exact distances and co-ordinates of plates that no arrangement of balls has: of which item
-    the first is, and in words.
+    the first is, and as text.
     """
     for artefact in plates:
         mine = {

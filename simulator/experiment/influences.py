@@ -1,4 +1,4 @@
-"""Influence quantities of an experiment: what is wrong with them, and what they are in a design."""
+"""Influence quantities of an experiment: faults of them, and what they are in a design."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ from .structure import Sections
 def resolve_influences(
     sections: Sections, positions: dict[int, Position], references: References
 ) -> tuple[InfluenceSettings, ...]:
-    """Return the influence quantities; what is wrong goes to the problems."""
+    """Return the influence quantities; faults go to the problems."""
     placed = {position.name: position.artefact for position in positions.values()}
     found: list[InfluenceSettings] = []
     standards = [
@@ -145,6 +145,6 @@ def _refuse_too_many(disturbed: Design, experiment: Experiment, is_pool: bool) -
 
 
 def _of_class(experiment: Experiment, i: int, text: str) -> ExperimentError:
-    """What is wrong with the class of the i-th influence quantity."""
+    """Faults of the class of the i-th influence quantity."""
     name = type(experiment.influences[i]).__name__
     return experiment.refused(("influences", i), f"the class {name}: {text}")

@@ -73,7 +73,7 @@ def tidied(part: Any) -> Any:
 
 
 def _is_writable(default: Any, part: dict[str, Any]) -> bool:
-    """Tell whether a default could stand in the file: not null, nor the metres behind a text like 0
-    mm.
+    """True if a default could stand in the file: not null, nor the metres behind a text like
+    0 mm.
     """
     return default is not None and not (isinstance(default, float) and part.get("type") == "string")

@@ -56,8 +56,8 @@ def load(
 
     Returns the experiment, or one per variant in the order of the file. Tables that the file names
     are read from the folder it is in. For ``planning`` an experiment has its pool, and positions
-    may be missing where there is one; otherwise what only the pool places is left out. Error models
-    in Python are code that loading runs, as far as ``trust`` allows it. A ``text`` is read as what
+    may be missing where there is one; otherwise what only the pool places is left out. Error
+    models in Python are code that loading runs, if ``trust`` allows it. A ``text`` is read as what
     the file is to have.
 
     :raises ExperimentError: the file, or a table it names, is wrong; holds everything that was
@@ -113,8 +113,8 @@ def load(
 def trees_of(
     text: str, source: Path, refused: list[Message]
 ) -> tuple[Node, dict[str, Node], Problems]:
-    """What a file with this text says, its variants by name, and what is wrong with these; what is
-    wrong with the YAML goes to ``refused``.
+    """What a file with this text says, its variants by name, and faults of these; faults of the
+    YAML goes to ``refused``.
 
     :raises ExperimentError: the YAML is so wrong that there is no tree.
     """
@@ -135,7 +135,7 @@ def with_pool(experiment: Experiment) -> Experiment:
 def written_in_python(sections: AnyMapping[str, Any], folder: Path) -> Experiment:
     """The experiment of a mapping that holds what a file would, with paths relative to a folder.
 
-    :raises ExperimentError: it is wrong; holds everything that was found.
+    :raises ExperimentError: it is invalid; holds everything that was found.
     """
     mark = Mark("experiment", 0, 0)
     if "variants" in sections:
@@ -151,7 +151,7 @@ def written_in_python(sections: AnyMapping[str, Any], folder: Path) -> Experimen
 def _built(root: Node, source: Path, name: str | None, trust: Trust, planning: bool) -> Experiment:
     """The experiment of a tree.
 
-    :raises ExperimentError: it is wrong.
+    :raises ExperimentError: it is invalid.
     """
     experiment, messages = build(root, source, name, trust, planning)
     if experiment is None:

@@ -30,7 +30,7 @@ LARGE_REPEATABILITY = 1e-4
 
 
 def resolve_machine(settings: MachineSettings, problems: Problems) -> Machine | None:
-    """Return the machine, or None after saying what is wrong."""
+    """Return the machine, or None after reporting faults."""
     ends: dict[str, tuple[float, float]]
     if isinstance(settings.volume, tuple):
         ends = {axis: (0.0, edge) for axis, edge in zip(AXES, settings.volume, strict=False)}
@@ -76,7 +76,7 @@ def resolve_machine(settings: MachineSettings, problems: Problems) -> Machine | 
 
 
 def resolve_noise(settings: str | NoiseSettings | None, problems: Problems) -> Noise:
-    """Return the distribution of noise after saying what is wrong, or what does not heed it."""
+    """Return the distribution of noise after reporting faults."""
     if settings is None:
         return Noise()
     if isinstance(settings, str):
@@ -103,7 +103,7 @@ def resolve_evaluation(
     probes: Mapping[str, Probe],
     references: References,
 ) -> Evaluation | None:
-    """Return where to evaluate, or None after saying what is wrong."""
+    """Return where to evaluate, or None after reporting faults."""
     settings = sections.get("evaluation")
     probe = references.probes[0] if references.probes else ""
     nowhere = frozen(np.zeros((0, references.dimension or 0)))
@@ -140,7 +140,7 @@ def _task(
     sections: Sections,
     references: References,
 ) -> Task | None:
-    """Return a task, or None after saying what is wrong."""
+    """Return a task, or None after reporting faults."""
     steps: Steps = ("evaluation", "tasks", i)
     problems, dimension = references.problems, references.dimension
     before = len(problems.messages)

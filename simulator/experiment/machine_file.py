@@ -172,7 +172,7 @@ def _check_ends(ends: Iterable[tuple[float, float]], problems: Problems) -> None
 
 
 def _volume_of(root: Mapping, problems: Problems) -> None:
-    """Say what is wrong with the volume of a file that is wrong elsewhere."""
+    """Say faults of the volume of a file that is wrong elsewhere."""
     try:
         volume = VolumeSettings.model_validate(to_python(root).get("volume"))
     except ValidationError:
@@ -304,7 +304,7 @@ def _table(
 
 
 def _read_tables(root: Mapping, source: Path, problems: Problems, trust: Trust) -> None:
-    """Say what is wrong with the tables of a file that is wrong itself."""
+    """Say faults of the tables of a file that is wrong itself."""
     errors = root.items.get("errors")
     for name, node in errors.items.items() if isinstance(errors, Mapping) else ():
         file = node.items.get("file") if isinstance(node, Mapping) else None

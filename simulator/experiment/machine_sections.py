@@ -57,7 +57,7 @@ class LineSettings(Settings):
 
 
 class SmoothingSettings(Settings):
-    """A least-squares spline or polynomial in place of the points of a table."""
+    """A least-squares spline or polynomial instead of the points of a table."""
 
     order: int = Field(
         4,

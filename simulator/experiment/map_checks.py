@@ -1,4 +1,4 @@
-"""The fitted map of a map file's tree, or what is wrong with it."""
+"""The fitted map of a map file's tree, or faults of it."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ SAME_SQUARES = 1e-3
 def map_of_tree(
     root: Node, arrays: Mapping[str, Array], source: Path, problems: Problems, trust: Trust
 ) -> FittedMap | None:
-    """The map of a tree, or None after saying what is wrong."""
+    """The map of a tree, or None after reporting faults."""
     if not isinstance(root, MappingNode) or "map" not in root.items:
         description = (
             describe(to_python(root)) if not isinstance(root, MappingNode) else "no key map"
@@ -129,7 +129,7 @@ def map_of_tree(
 def _model(
     settings: MapSettings, volume: Volume, folder: Path, problems: Problems, trust: Trust
 ) -> ErrorModel | None:
-    """The error model, or None after saying what is wrong."""
+    """The error model, or None after reporting faults."""
     model_settings: Any = settings.error_model
     d = len(volume.lower)
     kind = kind_of(model_settings)
@@ -161,7 +161,7 @@ def _model(
 
 
 def _has_its_files(settings: MapSettings, folder: Path, problems: Problems) -> bool:
-    """Whether files that the error model rests on are what they were; reports which are not."""
+    """True if files that the error model rests on are what they were; reports which are not."""
     before = len(problems.messages)
     model_data = to_python(problems.root)["error_model"]  # type: ignore[index,unused-ignore]
     present = fingerprints(absolute(model_data, folder))
@@ -176,7 +176,7 @@ def _has_its_files(settings: MapSettings, folder: Path, problems: Problems) -> b
 
 
 def _probes(settings: MapSettings, d: int, problems: Problems) -> Probes | None:
-    """The probes, or None after saying what is wrong."""
+    """The probes, or None after reporting faults."""
     for name, probe in settings.probes.items():
         if {len(probe.offset), len(probe.nominal or probe.offset)} != {d} or any(
             AXES.index(axis) >= d for axis in probe.estimated
@@ -263,7 +263,7 @@ def _directions(settings: MapSettings, size: int, problems: Problems) -> Array:
 
 
 def _numbers(row: str | float, count: int, steps: tuple[str, int], problems: Problems) -> Array:
-    """The numbers of a row, zeros after saying what is wrong with them."""
+    """The numbers of a row, zeros after reporting faults."""
     words = str(row).split()
     try:
         values = np.array(list(map(float, words)))

@@ -81,8 +81,8 @@ def _json(value: Any) -> str:
 
 
 def read_map(path: str | os.PathLike[str], trust: Trust = OPENED) -> FittedMap:
-    """Read a map file, YAML or arrays of NumPy; an error model in Python is run as far as the file
-    is trusted.
+    """Read a map file, YAML or arrays of NumPy; an error model in Python is run if the file is
+    trusted.
 
     :raises ExperimentError: it cannot be read, is damaged, incomplete or edited, is no map, or
         rests on a file that has changed; holds everything that was found.

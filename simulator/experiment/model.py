@@ -49,7 +49,7 @@ class Probe:
 
     @property
     def is_estimated(self) -> bool:
-        """Whether the offset is a parameter."""
+        """True if the offset is a parameter."""
         return self.standard_uncertainty is not None
 
     @property
@@ -85,7 +85,7 @@ class ReadingGroup:
 class Position:
     """A position of an artefact, its nominal pose in the machine and what is read in it.
 
-    ``description`` says in words what a short name does not, empty where nothing is said.
+    ``description`` says as text what a short name does not, empty where nothing is said.
     """
 
     name: str
@@ -197,7 +197,7 @@ class Candidate:
 
 @dataclass(frozen=True)
 class AtMost:
-    """A limit: of `members`, indices of candidates, no more than `count`."""
+    """A limit: of `members`, indices of candidates, at most `count`."""
 
     members: tuple[int, ...]
     count: int
@@ -286,7 +286,7 @@ class Experiment:
         return self.layouts[item.artefact or next(iter(self.layouts))]
 
     def is_observed(self, item: Calibration) -> bool:
-        """Whether an item is observations of its own; lengths of standards are read."""
+        """True if an item is observations of its own; lengths of standards are read."""
         return not item.artefact or self.artefacts[item.artefact].role == "plate"
 
     @property
@@ -382,7 +382,7 @@ class Experiment:
         """The experiment with other keys of `readings`; None leaves one as it is, and columns are
         added to those stated.
 
-        :raises ExperimentError: they are wrong.
+        :raises ExperimentError: they are invalid.
         """
         settings_given = {key: value for key, value in changes.items() if value is not None}
         if not settings_given:
@@ -395,7 +395,7 @@ class Experiment:
 
 
 def _words_of(position: Position) -> str:
-    """What is read in a position, in words."""
+    """What is read in a position, as text."""
     groups = (
         f"{len(group.balls)} balls with {', '.join(group.probes)}"
         + (f", {group.repeats} times" if group.repeats > 1 else "")

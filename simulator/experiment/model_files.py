@@ -18,12 +18,12 @@ PLACES = {"machine": "file", "python": "folder"}
 
 
 def absolute(settings: Mapping[str, Any], folder: Path) -> dict[str, Any]:
-    """Settings of an error model with absolute paths in place of those found from a folder."""
+    """Settings of an error model with absolute paths instead of those found from a folder."""
     return _placed(settings, lambda path: str((folder / path).resolve()))
 
 
 def relative(settings: Mapping[str, Any], folder: Path) -> dict[str, Any]:
-    """Settings of an error model with paths found from a folder in place of absolute ones."""
+    """Settings of an error model with paths found from a folder instead of absolute ones."""
 
     def path_from(path: str) -> str:
         try:

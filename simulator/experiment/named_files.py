@@ -24,8 +24,8 @@ PATH_KEYS = ("file", "files", "values", "covariance")
 
 
 def named_by(source: Path) -> list[Path]:
-    """Files that an experiment or machine file names, those that they name, and its modules, as far
-    as they are there.
+    """Files that an experiment or machine file names, those that they name, and its modules, if
+    they are there.
 
     Empty where the file cannot be read: loading it tells why.
     """
@@ -37,8 +37,8 @@ def named_by(source: Path) -> list[Path]:
 
 
 def named_in(nodes: Sequence[tuple[str, Node]], folder: Path) -> list[Path]:
-    """Files that nodes at paths of an experiment name, as seen from a folder, those that they name,
-    and modules, as far as they are there.
+    """Files that nodes at paths of an experiment name, as seen from a folder, those that they
+    name, and modules, if they are there.
     """
     paths: set[Path] = set()
     for key, node in nodes:
@@ -75,7 +75,7 @@ def keyed_paths(node: Node, key: str) -> Iterator[tuple[str, Scalar]]:
 
 
 def is_rooted(text: str) -> bool:
-    """Whether a path begins at the root of a file system or of a drive, or at a home."""
+    """True if a path begins at the root of a file system or of a drive, or at a home."""
     windows = PureWindowsPath(text)
     return text.startswith("~") or Path(text).is_absolute() or bool(windows.anchor or windows.drive)
 
@@ -143,8 +143,8 @@ def module_files(folder: Path, module: str) -> set[Path]:
 
 
 def _imports(path: Path) -> Iterator[str]:
-    """Names of the modules that a file of Python imports; what is wrong with the file is told when
-    it is loaded.
+    """Names of the modules that a file of Python imports; faults of the file is told when it is
+    loaded.
     """
     try:
         tree = ast.parse(path.read_bytes())

@@ -10,8 +10,8 @@ from .structure import KEYS, Sections
 
 
 def resolve_own_sections(sections: Sections, references: References) -> dict[str, Any]:
-    """What is written under keys that extensions provide, as their `read` makes it, where they have
-    one; what is wrong goes to the problems.
+    """What is written under keys that extensions provide, as their `read` makes it, where they
+    have one; faults go to the problems.
     """
     for i, name in enumerate(sections.get("extensions") or ()):
         if not is_installed(name):

@@ -29,7 +29,7 @@ READING_KEYS = ("probes", "balls", "repeats", "standard_uncertainty")
 def resolve_position(
     settings: PositionSettings, steps: Steps, references: References
 ) -> Position | None:
-    """Return a position with its pose and readings, or None after saying what is wrong."""
+    """Return a position with its pose and readings, or None after reporting faults."""
     artefact = references.artefact(settings.artefact, steps)
     layout = references.layouts.get(artefact) if artefact is not None else None
     readings = _readings(settings, steps, layout, references)

@@ -111,7 +111,7 @@ class _Group:
 def generate(
     settings: GroupSettings, steps: Steps, bounds: Bounds | None, count: int, references: References
 ) -> list[Generated] | None:
-    """Return the candidates of a group, or None after saying what is wrong; `count` are there
+    """Return the candidates of a group, or None after reporting faults; `count` are there
     already.
     """
     group = _resolve(settings, steps, references)
@@ -159,7 +159,7 @@ def outline(pose: Pose, layout: BallLayout, edge: float) -> Floats:
 
 
 def is_within(indices: Floats, lower: Floats, upper: Floats) -> Any:
-    """Tell whether extents (…, 2, d) are within limits (d,)."""
+    """True if extents (…, 2, d) are within limits (d,)."""
     return np.all(
         (indices[..., 0, :] >= lower - TOLERANCE) & (indices[..., 1, :] <= upper + TOLERANCE),
         axis=-1,

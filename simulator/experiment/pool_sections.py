@@ -110,7 +110,7 @@ class ProbesByPlaneSettings(Settings):
 
 
 def form_of_balls(value: Any) -> str:
-    """Whether balls are stated by a word, as a list of names, or as a list of such sets."""
+    """True if balls are stated by a word, as a list of names, or as a list of such sets."""
     if not isinstance(value, tuple):
         return "<one>"
     return (
@@ -203,7 +203,7 @@ class ListedSettings(PositionSettings):
 
 
 def is_group(value: Any) -> bool:
-    """Whether an entry of the pool's candidates, mapping or settings, stands for many."""
+    """True if an entry of the pool's candidates, mapping or settings, stands for many."""
     return (
         isinstance(value, GroupSettings)
         or isinstance(value, dict)
@@ -264,7 +264,7 @@ class SelectorSettings(Settings):
 
 
 class AtMostSettings(Settings):
-    """No more than so many of some candidates."""
+    """At most so many of some candidates."""
 
     of: SelectorSettings = Field(description="which, such as {plane: x}")
     count: Annotated[int, Field(ge=0, le=100_000)] = Field(description="how many of them at most")

@@ -45,8 +45,8 @@ SET_UP, READING, PROBE_CHANGE, PLANE_CHANGE = 20 * 60.0, 15.0, 2 * 60.0, 30 * 60
 
 @dataclass
 class Candidates:
-    """Positions to choose from as far as they are right; `complete` states whether all that is
-    written is.
+    """Positions to choose from if they are right; `complete` states whether all that is written
+    is.
     """
 
     found: list[Candidate] = field(default_factory=list)
@@ -95,9 +95,7 @@ def resolve_candidates(
     probes: AnyMapping[str, Probe],
     references: References,
 ) -> Candidates:
-    """Return the positions to choose from, none without a pool; what is wrong goes to the
-    problems.
-    """
+    """Return the positions to choose from, none without a pool; faults go to the problems."""
     problems = references.problems
     root, result = problems.root, Candidates()
     node = written(root, "pool")
@@ -208,7 +206,7 @@ def resolve_pool(
     calibrations: AnyMapping[int, Calibration],
     references: References,
 ) -> Pool | None:
-    """Return the pool, or None without one; what is wrong goes to the problems."""
+    """Return the pool, or None without one; faults go to the problems."""
     problems = references.problems
     root = problems.root
     if ("pool", "times") not in sections.values:
@@ -324,7 +322,7 @@ def _identity(position: Position) -> Any:
 
 
 def _check_names(references: References) -> bool:
-    """Tell whether no entry of the pool has the name of another, or of a position, after reporting
+    """True if no entry of the pool has the name of another, or of a position, after reporting
     those that have.
     """
     problems, before = references.problems, len(references.problems.messages)

@@ -32,7 +32,7 @@ def resolve_priors(
     probes: Mapping[str, Probe],
     references: References,
 ) -> tuple[Prior, ...]:
-    """Return the priors; what is wrong goes to the problems."""
+    """Return the priors; faults go to the problems."""
     settings, entries = sections.get("error_model"), sections.entries("priors")
     if not entries or settings is None or machine is None:
         return ()

@@ -64,8 +64,8 @@ def resolve_probes(sections: Sections, references: References) -> dict[str, Prob
 def _offset(
     settings: ProbeSettings, head: HeadSettings | None, steps: Steps, references: References
 ) -> tuple[float, ...] | None:
-    """The offset (d,) that is stated, or that the head's angles make; None after saying what is
-    wrong.
+    """The offset (d,) that is stated, or that the head's angles make; None after reporting
+    faults.
     """
     if settings.a is None:
         return settings.offset
@@ -88,7 +88,7 @@ def _offset(
 
 
 def _star_members(sections: Sections, references: References) -> list[str]:
-    """Probes of stars, what is wrong with their names told."""
+    """Probes of stars, faults of their names told."""
     members: list[str] = []
     for i, settings in sections.entries("stars").items():
         steps: Steps = ("stars", int(i), "probes")
@@ -142,7 +142,7 @@ def resolve_stars(
 def _star_values(
     settings: StarSettings, names: tuple[str, ...], steps: Steps, references: References
 ) -> Floats | None:
-    """Co-ordinates (l, d) of a star's tips from its table, None after saying what is wrong."""
+    """Co-ordinates (l, d) of a star's tips from its table, None after reporting faults."""
     letters = list("xyz"[: references.dimension])
     try:
         rows = read_table(references.file(settings.values), ["probe"], letters, [])
@@ -169,8 +169,8 @@ def _star_values(
 
 
 def _reference_probe(sections: Sections, references: References) -> str:
-    """Name of the probe whose offset is held, none where stars turn about a stated place; what is
-    wrong with it is told.
+    """Name of the probe whose offset is held, none where stars turn about a stated place; faults
+    of it is told.
     """
     problems = references.problems
     listed = {
@@ -208,7 +208,7 @@ def _offset_uncertainty(
     settings: ProbeSettings, steps: Steps, references: References
 ) -> Floats | None:
     """Standard uncertainties (d,) of an offset that is estimated, infinite where it is unknown,
-    None after saying what is wrong and where nothing is stated.
+    None after reporting faults and where nothing is stated.
     """
     problems, dimension = references.problems, references.dimension
     stated = settings.standard_uncertainty

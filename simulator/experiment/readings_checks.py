@@ -64,7 +64,7 @@ def _check_constants(columns: ColumnsSettings, references: References) -> None:
 
 
 def is_text_encoding(name: str) -> bool:
-    """Whether Python knows an encoding of text by this name.
+    """True if Python knows an encoding of text by this name.
 
     >>> is_text_encoding("cp1252"), is_text_encoding("zip"), is_text_encoding("cp 12520")
     (True, False, False)

@@ -82,7 +82,7 @@ class Sections:
 
 
 def validate_sections(root: Node, problems: Problems, planning: bool = False) -> Sections:
-    """Validate what each section says by itself; what is wrong goes to ``problems``.
+    """Validate what each section says by itself; faults go to ``problems``.
 
     For ``planning`` positions may be missing where there is a pool to choose them from.
     """

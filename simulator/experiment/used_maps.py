@@ -33,7 +33,7 @@ SAME, SAME_PART = 1e-12, 1e-9
 
 
 def read_true_map(truth: TrueMapSettings, machine: Machine | None, references: References) -> None:
-    """Let the true machine be that of its map, or report what is wrong with it."""
+    """Let the true machine be that of its map, or report its faults."""
     steps: Steps = ("true_machine", "file")
     true_map = _read(truth.file, steps, references)
     if true_map is None:
@@ -70,7 +70,7 @@ def resolve_map_prior(
     probes: Mapping[str, Probe],
 ) -> list[Prior]:
     """What a map tells of the machine of another campaign, as priors that do not depend on one
-    another; what is wrong goes to the problems.
+    another; faults go to the problems.
 
     These are combinations of the parameters in which the map's covariance is diagonal, once each
     parameter is measured by its effect: as many as the map determines.
@@ -150,7 +150,7 @@ def _read(file: str, steps: Steps, references: References) -> FittedMap | None:
 def _years(
     settings: MapPriorSettings, fitted: FittedMap, steps: Steps, references: References
 ) -> float | None:
-    """Years between both campaigns, None after saying what is wrong."""
+    """Years between both campaigns, None after reporting faults."""
     if settings.drift_per_year is None:
         return 0.0
     if settings.years is not None:
@@ -178,7 +178,7 @@ def _between(start: date, end: date) -> float:
 def _is_same(
     fitted: FittedMap, model: ErrorModel, machine: Machine, steps: Steps, references: References
 ) -> bool:
-    """Whether a map is of the error model that is fitted here; says where not."""
+    """True if a map is of the error model that is fitted here; says where not."""
     add = references.problems.add
     if machine.dimension != fitted.dimension:
         add(steps, f"is of {fitted.dimension} axes, but machine.volume of {machine.dimension}")
@@ -210,7 +210,7 @@ def _is_same(
 def _check_ends(
     fitted: FittedMap, machine: Machine, steps: Steps, references: References, outside_only: bool
 ) -> bool:
-    """Whether the volume is that of the map, or within it where `outside_only`; says where not."""
+    """True if the volume is that of the map, or within it where `outside_only`; says where not."""
     volumes, volume, is_right = fitted.volume, machine.volume, True
     for k, axis in enumerate(AXES[: fitted.dimension]):
         ends = float(volumes.lower[k]), float(volumes.upper[k])

@@ -50,7 +50,7 @@ def with_present_keys(node: Node, above: tuple[str, ...] = ()) -> Node:
 
 
 def _has_aliases(above: AnySequence[str]) -> bool:
-    """Whether the keys below some steps are those that have earlier names."""
+    """True if the keys below some steps are those that have earlier names."""
     return not above or len(above) == 3 and tuple(above[:2]) == ("evaluation", "tasks")
 
 
@@ -123,7 +123,7 @@ def node_at(root: Node, path: str) -> Node | None:
 
 
 def is_same_place(root: Node, path: str, second: str) -> bool:
-    """Tell whether one of two paths leads to the other's place, or into it.
+    """True if one of two paths leads to the other's place, or into it.
 
     :raises ValueError: as ``node_at``.
     """

@@ -35,7 +35,7 @@ class LackOfFit:
 
     @property
     def is_significant(self) -> bool:
-        """Whether S^2 is larger than the stated uncertainties explain, by a test that errs once in
+        """True if S^2 is larger than the stated uncertainties explain, by a test that errs once in
         a thousand.
         """
         from scipy.special import chdtri
@@ -50,7 +50,7 @@ class LackOfFit:
 
     @property
     def is_beyond_limit(self) -> bool:
-        """Whether residuals are so large that no result of the fit can be relied on."""
+        """True if residuals are so large that no result of the fit can be relied on."""
         return self.times > self.limit**2
 
     @property

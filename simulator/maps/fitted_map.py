@@ -115,7 +115,7 @@ class FittedMap:
 
     @property
     def without_scatter(self) -> bool:
-        """Whether sigma, and with it the covariance, is zero but for rounding."""
+        """True if sigma, and with it the covariance, is zero except rounding."""
         return self.sigma_is_estimated and self.sigma < LEAST_SIGMA
 
     @property
@@ -208,7 +208,7 @@ class FittedMap:
 
 
 def readings_in_common(first: MapData | None, second: MapData | None) -> InCommon:
-    """Whether two maps rest on the same readings: what either knows from others counts as well, so
+    """True if two maps rest on the same readings: what either knows from others counts as well, so
     that an update of a map has only some in common with it.
     """
     if first is None or second is None:

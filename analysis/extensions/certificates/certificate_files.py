@@ -191,8 +191,8 @@ def ensure_certified(experiment: Experiment) -> None:
 
 
 def read_certificate(path: Path | GivenText, experiment: Experiment) -> Experiment:
-    """An experiment with the certificate values of a file in place of its own, and further
-    `doubts` where tables of stars are not those of its probes.
+    """An experiment with the certificate values of a file instead of its own, and further `doubts`
+    where tables of stars are not those of its probes.
 
     :raises ExperimentError: a wrong table; a value that the experiment does not have, or has
         already, or that is far from the drawing; values that are missing, or exact and
@@ -256,7 +256,7 @@ def read_certificate(path: Path | GivenText, experiment: Experiment) -> Experime
 
 
 def _wrong_together(found: Experiment) -> Iterator[str]:
-    """What is wrong with certified values of which each is possible."""
+    """Faults of certified values of which each is possible."""
     for one in found.calibration:
         if text := one.doubt(found.layout_of(one)):
             yield text
@@ -290,7 +290,7 @@ def _unknown(row: FileRow, known: list[CertifiedValue]) -> str:
 
 
 def is_calibration_table(source: GivenText) -> bool:
-    """Whether a table has the certified values of one calibration, which name no item."""
+    """True if a table has the certified values of one calibration, which name no item."""
     names = headings(source.text)
     of_pairs = names >= {"first", "second", "value"}
     return "item" not in names and (of_pairs or names >= {"ball", "x", "y"})

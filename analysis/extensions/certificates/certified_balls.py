@@ -102,7 +102,7 @@ class CertifiedBalls(Result):
 
     @property
     def facts(self) -> dict[str, str]:
-        """What is to be known beside the figures, in words."""
+        """What is to be known beside the figures, as text."""
         k, freedom = self.coverage_factor, self.degrees_of_freedom
         known = "uncertainties as stated in the experiment"
         if np.isfinite(freedom):

@@ -39,7 +39,7 @@ class Datum:
     plane: int | None = None
 
     def words(self, names: Sequence[str]) -> str:
-        """What defines the axes, in words."""
+        """What defines the axes, as text."""
         if self.axes is None:
             return "all balls as close as possible to where they are drawn (least squares)"
         told = axes_words(self.axes, tuple(names))

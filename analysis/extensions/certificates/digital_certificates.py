@@ -55,7 +55,7 @@ REGIONS = ("ellipsoidalRegion", "rectangularRegion", "measurementUncertaintyMult
 @dataclass(frozen=True)
 class DigitalValue:
     """A length: what it may be called, by itself and by what it stands in, its value and standard
-    uncertainty (NaN without one) in metres, and what is wrong with it, empty if nothing is.
+    uncertainty (NaN without one) in metres, and faults of it, empty if nothing is.
 
     `factor` is the coverage factor that its uncertainty was divided by, 1 for a standard one.
     """
@@ -95,7 +95,7 @@ class DigitalResult:
         return f"{name} ({', '.join(more)})" if more else name
 
     def is_called(self, name: str) -> bool:
-        """Whether a name, an identifier or one of the reference types is this result's."""
+        """True if a name, an identifier or one of the reference types is this result's."""
         return name in (*self.names, self.identifier, *self.reference_type.split())
 
 

@@ -36,7 +36,7 @@ def read_digital(
     steps: Steps,
     references: References,
 ) -> FileValues | None:
-    """The wanted values in a digital certificate; None after saying what is wrong.
+    """The wanted values in a digital certificate; None after reporting faults.
 
     The result is the one that is named, or else the only one that has them all.
     """

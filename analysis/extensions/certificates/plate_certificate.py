@@ -235,7 +235,7 @@ def _datum_balls(datum: Datum) -> list[int]:
 
 
 def _undetermined(is_open: Array, layout: BallLayout, distances: tuple[PlateDistance, ...]) -> str:
-    """Why there is no certificate, in words."""
+    """Why there is no certificate, as text."""
     if all(np.isnan(one.standard_uncertainty) for one in distances):
         return (
             "the readings and what is known determine no lengths of the plate, so that there is"
@@ -249,7 +249,7 @@ def _undetermined(is_open: Array, layout: BallLayout, distances: tuple[PlateDist
 
 
 def _carriers(experiment: Experiment, at: Linearisation, plate: str) -> tuple[str, ...]:
-    """What the plate's lengths rest on, in words.
+    """What the plate's lengths rest on, as text.
 
     :raises ExperimentError: nothing but the machine's own scales.
     """
@@ -267,7 +267,7 @@ def _carriers(experiment: Experiment, at: Linearisation, plate: str) -> tuple[st
 
 
 def _temperature(experiment: Experiment, plate: str) -> tuple[float | None, str]:
-    """The temperature that lengths are stated for, None where it is unknown; and in words."""
+    """The temperature that lengths are stated for, None where it is unknown; and as text."""
     for one in experiment.influences:
         if isinstance(one, TemperaturesSettings) and one.artefact in (None, plate):
             if one.artefact_expansion is not None:

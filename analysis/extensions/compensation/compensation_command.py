@@ -172,7 +172,7 @@ def _read(options: Namespace) -> tuple[CompensationTable, dict[str, str]]:
 
 
 def _misused(options: Namespace) -> list[str]:
-    """What is wrong with options that do not go together."""
+    """Faults of options that do not go together."""
     found = []
     written = "pitch", "volumetric", "without_rotations", "allow_lack_of_fit"
     others = written if options.read else ("arrangement",)

@@ -138,7 +138,7 @@ def _axis_lines(table: AxisTables) -> list[str]:
 
 
 def _largest(one: AxisTable) -> str:
-    """The largest correction of each error of an axis, in words."""
+    """The largest correction of each error of an axis, as text."""
     parts = [
         f"{name} {1e6 * value:.3g} {'µrad' if AXIS_ERRORS[name].is_rotation else 'µm'}"
         for name, value in zip(names_of(one.axis), np.abs(one.values).max(axis=0), strict=True)
@@ -254,8 +254,8 @@ def tabled_machine(
 ) -> tuple[TabledMachine, tuple[str, ...]]:
     """The machine of a machine file or of a map, and what is to be said of it.
 
-    :raises ExperimentError: the file is wrong, what it says of corrections is undetermined, or the
-        lack of fit is beyond the limit and not allowed.
+    :raises ExperimentError: the file is invalid, what it says of corrections is undetermined, or
+        the lack of fit is beyond the limit and not allowed.
     """
     if _is_map(path):
         return of_map(read_map(path), path, allow_lack_of_fit)
@@ -328,7 +328,7 @@ def of_map(
 
 
 def _open_with(fitted: FittedMap, offsets: Array) -> bool:
-    """Whether corrections less those at the lower corner are undetermined with a probe of one of
+    """True if corrections less those at the lower corner are undetermined with a probe of one of
     the offsets (k, d).
     """
     if not fitted.undetermined.shape[1]:
@@ -417,7 +417,8 @@ def read_compensation_files(
 ) -> ReadCompensation:
     """The table that files in the format of that name hold.
 
-    :raises ExperimentError: the files are wrong, or leave open what nobody says.
+    :raises ExperimentError: the files are invalid, or leave open what nobody says.
+
     :raises ValueError: no arrangement.
     """
     own = None if arrangement is None else parse_arrangement(arrangement)

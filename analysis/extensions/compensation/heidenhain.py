@@ -71,7 +71,7 @@ def _file(name: str, rows: Sequence[Sequence[str]]) -> str:
 def _read(paths: Sequence[Path]) -> StatedTable:
     """Read a .CMA file and the .COM files that its active line names, from the same folder.
 
-    :raises ExperimentError: what is wrong with them.
+    :raises ExperimentError: faults of them.
     """
     path = paths[0]
     if len(paths) > 1 or path.suffix.lower() != ".cma":

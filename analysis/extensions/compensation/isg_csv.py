@@ -116,7 +116,7 @@ def _aligned(heads: Sequence[str], positions: Array, values: Array) -> list[str]
 def _read(paths: Sequence[Path]) -> StatedTable:
     """Read the parameter files of a compensation.
 
-    :raises ExperimentError: what is wrong with them.
+    :raises ExperimentError: faults of them.
     """
     blocks: list[_Block] = []
     senses: set[Sense | None] = set()
@@ -188,7 +188,7 @@ def _blocks(path: Path) -> Iterator[_Block]:
 
 
 def _number(cell: str, name: str, mark: Mark, messages: list[Message]) -> float:
-    """A number in metres or radians; NaN after saying what is wrong."""
+    """A number in metres or radians; NaN after reporting faults."""
     if name not in AXES_LETTERS and name.removeprefix("E")[0] in "ABC":
         return read_number(cell, name, Fraction(1), mark, messages, "angle")
     return read_number(cell, name, Fraction(1, 1000), mark, messages)

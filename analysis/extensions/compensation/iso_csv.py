@@ -61,7 +61,7 @@ def _write(table: Table, sense: Sense, stem: str) -> dict[str, str]:
 def _read(paths: Sequence[Path]) -> StatedTable:
     """Read one file for each axis.
 
-    :raises ExperimentError: what is wrong with the files, or they do not go together.
+    :raises ExperimentError: faults of the files, or they do not go together.
     """
     axes: dict[int, AxisTable] = {}
     stated: dict[str, object] = {}

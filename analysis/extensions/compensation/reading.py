@@ -56,7 +56,7 @@ def read_table_files(
     `sense` says which errors they state where they do not, `arrangement` whose errors are wanted,
     and, where they state none, whose they are; `origin` is the point from which levers count.
 
-    :raises ExperimentError: the files are wrong, say otherwise, or leave open what nobody says.
+    :raises ExperimentError: the files are invalid, say otherwise, or leave open what nobody says.
     """
     stated = made.read(paths)
     meant = _sense(stated, sense, paths[0])

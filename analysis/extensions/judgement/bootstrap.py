@@ -250,7 +250,7 @@ def bootstrap(
 ) -> Bootstrap:
     """Fit data sets of a fit's own parameters, of which it estimated `functions`.
 
-    Lengths of standards without certificates are as drawn. Neither `workers` nor more trials change
+    Lengths of standards without certificates are nominal. Neither `workers` nor more trials change
     what a data set gives.
 
     :raises ValueError: the errors are so large that there are no readings of them.

@@ -215,7 +215,7 @@ def _largest_first(
     sources: tuple[str, ...], figures: tuple[BudgetFigure, ...]
 ) -> tuple[tuple[str, ...], tuple[BudgetFigure, ...]]:
     """Sources and their contributions in the order of what they contribute to the ranking figure,
-    those that are equal but for rounding as they were.
+    those that are equal except rounding as they were.
     """
     chosen = _ranking(figures)
     if chosen is None:

@@ -81,7 +81,7 @@ class RungFit:
 class Climb:
     """The models that a design determines, with their S^2, and what was chosen of them.
 
-    `beyond` says in words which models the design leaves undetermined, `most` is the number of
+    `beyond` says as text which models the design leaves undetermined, `most` is the number of
     coefficients up to which they were tried.
     """
 
@@ -154,7 +154,7 @@ def climb(
 
 @dataclass(frozen=True)
 class _Judge:
-    """Whether a design determines a model; `open` directions it leaves undetermined with any."""
+    """True if a design determines a model; `open` directions it leaves undetermined with any."""
 
     design: Design
     open: int
@@ -170,7 +170,7 @@ class _Judge:
 def _richest_polynomials(
     make: Callable[[int, int, dict[str, int]], LadderModel], judge: _Judge, most: int
 ) -> tuple[LadderModel, tuple[str, ...]]:
-    """The richest polynomials that a design determines, and in words which it does not."""
+    """The richest polynomials that a design determines, and as text which it does not."""
     n = m = most
     while (n, m) != POOREST and not judge.determines(make(n, m, {})):
         n, m = max(n - 1, POOREST[0]), max(m - 1, POOREST[1])
@@ -364,7 +364,7 @@ def _lack_of_fit(fitted: FittedSum, repeats: PureError) -> float:
 
 def _mistakes(fits: list[RungFit], file: LadderModel, x: Array, is_given: bool) -> tuple[str, ...]:
     """Mistakes in the file's offsets or arrangement that explain an S^2 of its own model that is
-    too large, in words.
+    too large, as text.
     """
     fit = next(suspect for suspect in fits if suspect.model.words == file.words)
     square, freedom = fit.fitted.sum_of_squares, fit.fitted.degrees_of_freedom
@@ -381,7 +381,7 @@ def _mistakes(fits: list[RungFit], file: LadderModel, x: Array, is_given: bool) 
 
 
 def _faults(fit: RungFit, x: Array, repeats: PureError, is_given: bool) -> tuple[str, ...]:
-    """What a model leaves unexplained, in words."""
+    """What a model leaves unexplained, as text."""
     faults, fitted, design = [], fit.fitted, fit.at.design
     chance = _lack_of_fit(fitted, repeats)
     if chance < MISFIT:

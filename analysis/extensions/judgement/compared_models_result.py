@@ -92,14 +92,14 @@ class ComparedModels(FitResult):
 
     @property
     def is_none(self) -> bool:
-        """Whether none of the models can be recommended."""
+        """True if none of the models can be recommended."""
         return bool(self.faults)
 
     def headline(self) -> str:
         return "none of these" if self.is_none else f"recommended: {self.recommended}"
 
     def verdict(self) -> list[str]:
-        """What to do, in words."""
+        """What to do, as text."""
         if self.is_mistake:
             return [f"none of these before the file is corrected: {'; '.join(self.faults)}"]
         if self.is_none:

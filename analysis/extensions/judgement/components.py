@@ -70,7 +70,7 @@ class VarianceComponent:
 
     @property
     def is_to_be_used(self) -> bool:
-        """Whether a fit that is reweighted uses the estimate: it may make uncertainties smaller
+        """True if a fit that is reweighted uses the estimate: it may make uncertainties smaller
         only where it is good to a half.
         """
         good = self.ratio > 0.0 and 2.0 * (self.ratio / self.standard_uncertainty) ** 2 >= FEW

@@ -84,7 +84,7 @@ class Comparison:
         return Criteria(misfit + 2 * parameters, misfit + float(np.log(count)) * parameters)
 
     def is_worse(self, fitted: FittedSum, rivals: list[FittedSum]) -> bool:
-        """Whether BIC clearly prefers one of others with more parameters."""
+        """True if BIC clearly prefers one of others with more parameters."""
         mine = self.criteria(fitted).bic
         return any(
             self.criteria(rival).bic < mine - CLEARLY_WORSE

@@ -145,7 +145,7 @@ def deficiency(design: Design, rung: LadderModel) -> int:
 
 
 def contains(outer: LadderModel, inner: LadderModel) -> bool:
-    """Whether an error model can do all that another can, and more."""
+    """True if an error model can do all that another can, and more."""
     if inner.count >= outer.count:
         return False
     if inner.numbers is None:

@@ -1,4 +1,4 @@
-"""Readings from tables in any form that is not ambiguous, and in words how each was read."""
+"""Readings from tables in any form that is not ambiguous, and as text how each was read."""
 
 from __future__ import annotations
 
@@ -166,7 +166,7 @@ class _Reader:
             raise ExperimentError(messages)
 
     def _texts(self, above: Mapping[str, str]) -> tuple[dict[str, str], list[str]]:
-        """What all rows have where no column says it, and in words where that comes from.
+        """What all rows have where no column says it, and as text where that comes from.
 
         :raises ExperimentError: nothing says which position it is.
         """
@@ -393,7 +393,7 @@ class _Reader:
 def _coverage_factor(
     column: HeadedColumn, cells: Sequence[str], sign: str, mark: Mark, messages: list[Message]
 ) -> float:
-    """The coverage factor of a row; NaN after saying what is wrong."""
+    """The coverage factor of a row; NaN after reporting faults."""
     cell = cells[column.place] if column.constant is None else column.constant
     try:
         factor = float(cell.replace(sign, "."))

@@ -66,8 +66,8 @@ ReadTime = tuple[Mark, str, ClockTime]
 
 
 def wrong_times(times: Sequence[ReadTime]) -> tuple[Message, ...]:
-    """What is wrong with times of readings in the order of their rows, with their texts: they are
-    of different kinds, or of a day and go back, so that they may be of several days.
+    """Faults of times of readings in the order of their rows, with their texts: they are of
+    different kinds, or of a day and go back, so that they may be of several days.
     """
     if not times:
         return ()

@@ -75,7 +75,7 @@ def _as_planned(design: Design, readings: Readings, seen: Array) -> bool:
 
 
 def common_cause(design: Design, x: Array, settings: ReadingsSettings) -> str:
-    """What would let all readings fit, in words; empty where nothing does.
+    """What would let all readings fit, as text; empty where nothing does.
 
     x (readings, d) are scale readings, made of what the table has as the settings state.
     """
@@ -108,7 +108,7 @@ def common_cause(design: Design, x: Array, settings: ReadingsSettings) -> str:
 
 
 def _changed(x: Array) -> Iterator[tuple[str, Array]]:
-    """Readings with their axes exchanged, or in other units, and in words how."""
+    """Readings with their axes exchanged, or in other units, and as text how."""
     d = x.shape[1]
     for order in permutations(range(d)):
         for signs in product((1, -1), repeat=d):

@@ -76,7 +76,7 @@ def with_names_swapped(
     design: Design, readings: Readings, x: Array, marks: Sequence[Mark]
 ) -> tuple[Readings, tuple[str, ...]]:
     """Readings of plates with the names of two balls swapped wherever scale readings x (m, d) show
-    that they are, and that in words; all others as they are.
+    that they are, and that as text; all others as they are.
     """
     plate = np.flatnonzero(design.artefacts.is_plate[design.balls.artefact[readings.ball]])
     of_plates = replace(design, readings=readings.select(plate)).observed(
@@ -105,7 +105,7 @@ def doubts_about_volume(design: Design, x: Array, marks: Sequence[Mark]) -> tupl
     """A sentence about readings outside the volume, where error models are extrapolated, or none.
 
     By less than a thousandth of the volume a reading is outside if an artefact was not set up just
-    as drawn.
+    nominal.
     """
     volume = design.machine.volume
     beyond = np.maximum(volume.lower - x, x - volume.upper)

@@ -60,7 +60,7 @@ class WrongReading:
 class WrongPosition:
     """A position whose readings fit the artefact turned onto itself, or in no pose at all.
 
-    `turned` states the turn in words and is empty in the latter case, where only `agreeing` of
+    `turned` states the turn as text and is empty in the latter case, where only `agreeing` of
     `count` readings fit.
     """
 
@@ -160,7 +160,7 @@ def _against_drawing(
 
 
 def _in_line(places: Array) -> bool:
-    """Whether places (m, d) lie in one line in space, about which any turn fits."""
+    """True if places (m, d) lie in one line in space, about which any turn fits."""
     extent = np.linalg.svd(places - places.mean(axis=0), compute_uv=False)
     return places.shape[1] == 3 and bool(extent[1] < FLAT * extent[0])
 

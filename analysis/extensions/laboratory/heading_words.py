@@ -124,7 +124,7 @@ def unit_of_further(cell: str, name: str) -> str | None:
 
 
 def is_clock(unit: str, units: Mapping[str, Fraction]) -> bool:
-    """Whether a heading with a unit, empty without one, is of clock times.
+    """True if a heading with a unit, empty without one, is of clock times.
 
     >>> [is_clock(unit, DURATION_UNITS) for unit in ("", "hh:mm", "s")]
     [True, True, False]

@@ -289,7 +289,7 @@ def _named(
 
 def _with_points(candidates: list[Feature], report: Report, found: _Taken) -> list[Feature]:
     """Spheres that were not measured, with the points that have their names and a number; without
-    any sphere, all points that have the same name but for their number.
+    any sphere, all points that have the same name except their number.
     """
     lacking = {one.name: one for one in candidates if one.lacks}
     points: dict[str, list[Feature]] = {}
@@ -309,7 +309,7 @@ def _of_points(name: str, points: Sequence[Feature]) -> Feature:
 
 
 def _grouped(candidates: list[Feature], apart: re.Pattern[str], found: _Taken) -> list[Feature]:
-    """Spheres of points that have the same name but for the number of the point."""
+    """Spheres of points that have the same name except the number of the point."""
     groups: dict[str, list[Feature]] = {}
     others = []
     for one in candidates:

@@ -39,7 +39,7 @@ class LengthRatio:
 
     @property
     def is_impossible(self) -> bool:
-        """Whether no machine has such a scale error."""
+        """True if no machine has such a scale error."""
         return abs(self.ratio - 1.0) > (IMPOSSIBLE if self.is_known else OFF_DRAWING)
 
 

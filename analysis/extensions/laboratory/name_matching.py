@@ -1,7 +1,7 @@
 """Positions, balls and probes of tables by the names that the experiment has for them.
 
 Names that differ are taken for those of the experiment where one rule alone explains all of them:
-the same but for case, signs and zeros before numbers; the number in the experiment's order; or the
+the same except case, signs and zeros before numbers; the number in the experiment's order; or the
 place, where nominal places tell. Every such match is told.
 """
 
@@ -42,11 +42,11 @@ class Names:
 def with_known_names(
     rows: Sequence[FileRow], design: Design, places: Callable[[Sequence[FileRow]], Array] | None
 ) -> tuple[tuple[FileRow, ...], Names]:
-    """Rows with the names that the design has, and in words what was matched how, and what could
+    """Rows with the names that the design has, and as text what was matched how, and what could
     not be.
 
-    `places` makes places of balls in the machine, in metres, of rows; None where the table does not
-    have them.
+    `places` makes places of balls in the machine, in metres, of rows; None where the table does
+    not have them.
     """
     found = Names()
     positions, balls, probes = design.positions.names, set(design.balls.names), design.probes.names
@@ -89,7 +89,7 @@ def _pairs(names: Mapping[str, str], limit: int = 4) -> str:
 
 
 def _alike(what: str, used: Sequence[str], known: Sequence[str], found: Names) -> dict[str, str]:
-    """Names that are the same but for case, signs and zeros; none unless all of them are."""
+    """Names that are the same except case, signs and zeros; none unless all of them are."""
     by_folded: dict[str, set[str]] = {}
     for name in known:
         by_folded.setdefault(folded(name), set()).add(name)

@@ -1,4 +1,4 @@
-"""Whether co-ordinates are scale readings or ball centres, as far as the readings tell.
+"""True if co-ordinates are scale readings or ball centres, if the readings tell.
 
 The offsets of two probes that read in one position differ; readings of both can be of one artefact
 only as what they are. A shift of all readings of a position is one of its pose: with one probe in
@@ -125,7 +125,7 @@ def _of_several_offsets(readings: Readings, offsets: Array) -> NDArray[np.bool_]
 
 
 def _is_of_drawing(design: Design, readings: Readings, seen: Array, pitch: Array) -> bool:
-    """Whether most places seen (m, d) are those of the artefact as drawn, position by position."""
+    """True if most places seen (m, d) are those of the artefact nominal, position by position."""
     for _, rows, nominal in read_in_positions(design, readings):
         if len(np.unique(readings.ball[rows])) < 2:
             continue

@@ -46,5 +46,5 @@ def what_it_is(source: GivenText) -> str:
 
 
 def is_program(form: Format, text: str) -> bool:
-    """Whether a file of a format moves a machine, and has nothing that was measured."""
+    """True if a file of a format moves a machine, and has nothing that was measured."""
     return form.name == "dmis" and not re.search(r"^[ \t]*FA\(", text, re.MULTILINE)

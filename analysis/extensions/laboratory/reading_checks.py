@@ -33,7 +33,7 @@ def doubts_about_table(
     mark: Mark,
 ) -> tuple[str, ...]:
     """What is doubtful about co-ordinates (m, d) as a table has them, and about uncertainties (m,)
-    that it states, in words; `mark` is where it begins.
+    that it states, as text; `mark` is where it begins.
 
     :raises ExperimentError: they clearly are other than stated, or than is taken for granted.
     """

@@ -56,8 +56,8 @@ def any_source_rows(
     units: Units,
     empty: Collection[str] = (),
 ) -> SourceRows:
-    """Rows of tables of readings, or of reports of measuring programs, with the names of the design
-    as far as they can be matched.
+    """Rows of tables of readings, or of reports of measuring programs, with the names of the
+    design if they can be matched.
 
     Messages about rows of plain tables are added to `messages`, so that more can be said at once.
 
@@ -174,7 +174,7 @@ def any_table_rows(
 
 
 def _places(rows: Sequence[FileRow], design: Design, settings: ReadingsSettings) -> Array:
-    """Places (m, d) of the balls of rows, as far as the probe is known."""
+    """Places (m, d) of the balls of rows, if the probe is known."""
     x = np.array([row.lengths[: design.dimension] for row in rows])
     added = design.probes.offsets
     if settings.coordinates == "ball centres":

@@ -1,4 +1,4 @@
-"""Readings straight from reports of measuring programs, in place of tables."""
+"""Readings straight from reports of measuring programs, instead of tables."""
 
 from __future__ import annotations
 
@@ -63,7 +63,7 @@ def _row(one: ImportedReading, dimension: int, further: int) -> FileRow:
 def with_coordinates(
     settings: ReadingsSettings, sources: Collection[object], tables: Collection[TableRows]
 ) -> tuple[ReadingsSettings, tuple[str, ...]]:
-    """Settings that say what co-ordinates are, where reports do, and that in words.
+    """Settings that say what co-ordinates are, where reports do, and that as text.
 
     :raises ExperimentError: reports say other than stated, or some files say it and others do not.
     """

@@ -195,7 +195,7 @@ def _form(
     decimal: str,
     may_be_empty: Collection[str] = (),
 ) -> Form:
-    """The rows below the headings, and what is wrong with them in this form."""
+    """The rows below the headings, and faults of them in this form."""
     sign = SEPARATORS[separator][0]
     places = [axis.place for group in headings.groups for axis in group.axes]
     needed = [*places, *(c.place for c in headings.roles.values() if c.constant is None)]
@@ -270,7 +270,7 @@ def _padded(cells: list[str], width: int, needed: Sequence[int], sign: str) -> l
 
 
 def _holds_no_number(cells: Sequence[str], places: Sequence[int], number: re.Pattern[str]) -> bool:
-    """Whether a line of another width is a remark, and no row that was cut off."""
+    """True if a line of another width is a remark, and no row that was cut off."""
     filled = [cell for cell in cells if cell]
     return len(cells) <= min(places) or (
         not any(_is_number(cell) for cell in filled) and len(filled) <= 2
@@ -284,7 +284,7 @@ def _wrong_row(
     decimal: str,
     may_be_empty: Collection[str],
 ) -> str:
-    """What is wrong with a row; empty where nothing is."""
+    """Faults of a row; empty where nothing is."""
     for group in headings.groups:
         own = [cells[axis.place] for axis in group.axes]
         if len(headings.groups) > 1 and all(cell.casefold() in NOTHING for cell in own):
@@ -298,7 +298,7 @@ def _wrong_row(
 
 
 def wrong_number(cell: str, name: str, decimal: str) -> str:
-    """What is wrong with a cell that should be a number."""
+    """Faults of a cell that should be a number."""
     if cell.casefold() in NOTHING:
         return f"no {name}; write a number, or remove the line"
     if THOUSANDS.fullmatch(cell[:LONGEST]):
@@ -360,7 +360,7 @@ def doubtful_decimals(form: Form) -> str:
 
 
 def commas_of_both_kinds(form: Form) -> bool:
-    """Whether commas may separate decimals as well as columns: all co-ordinates are whole numbers,
+    """True if commas may separate decimals as well as columns: all co-ordinates are whole numbers,
     and as many numbers as these stand in columns that nothing is taken from.
     """
     if form.separator != "comma" or not form.headings.unused:

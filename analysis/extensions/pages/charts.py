@@ -36,7 +36,7 @@ class Trace:
 
 @dataclass(frozen=True, eq=False)
 class Chart:
-    """Traces over two axes. `places` are names along the first axis in place of numbers, each with
+    """Traces over two axes. `places` are names along the first axis instead of numbers, each with
     where it stands; `words` tell those who do not see the chart what it shows.
     """
 

@@ -39,7 +39,7 @@ MOST_DRAWN = 12
 @dataclass(frozen=True, eq=False)
 class DesignContents:
     """What a page of a design is made of: plain data as the commands print them, by the command's
-    name; the linearised design with its undetermined and weak motions; `target` in words; the
+    name; the linearised design with its undetermined and weak motions; `target` as text; the
     `file` and what was assumed. `unreliable` is the reason why there is no reliability among the
     data.
     """

@@ -174,8 +174,8 @@ def _ellipsoids(
     names: tuple[str, str, str],
     factor: float,
 ) -> SpatialPicture:
-    """Ellipsoids about points (m, d) with covariances of square roots `spread` (m, d, r), `told` by
-    a name, in short, and in words.
+    """Ellipsoids about points (m, d) with covariances of square roots `spread` (m, d, r), `told`
+    by a name, in short, and as text.
     """
     name, label, title = names
     variances, axes = np.linalg.eigh(spread @ spread.transpose(0, 2, 1))

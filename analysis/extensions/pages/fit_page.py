@@ -57,9 +57,9 @@ class PlateResiduals:
 class FitContents:
     """What a page of a fit is made of: plain data of the fit and of its design's reliability, None
     where that was left out for the reason `unreliable`; why residuals were not tested for gross
-    errors, empty where they were; `kinds` of the estimates by name; the
-    edges (k, 2, d) of the volume; `target` in words; `files` that it comes from, and what was
-    assumed; the `caveat` to what is said of the target.
+    errors, empty where they were; `kinds` of the estimates by name; the edges (k, 2, d) of the
+    volume; `target` as text; `files` that it comes from, and what was assumed; the `caveat` to
+    what is said of the target.
     """
 
     title: str
@@ -133,7 +133,7 @@ def _results(fit: QuotedData, contents: FitContents) -> list[PageSection]:
 
 
 def _is_good(data: Mapping[str, Any]) -> bool:
-    """Whether nothing on the page asks for a person's attention."""
+    """True if nothing on the page asks for a person's attention."""
     shares = [quantity.get("within_target") for quantity in data["quantities"].values()]
     wrong = (
         data["degrees_of_freedom"] <= 0

@@ -1,4 +1,4 @@
-"""What pages of results take for granted of an experiment, by name and in words."""
+"""What pages of results take for granted of an experiment, by name and as text."""
 
 from __future__ import annotations
 

@@ -84,7 +84,7 @@ def compensated_points(
 ) -> CompensatedPoints:
     """Places (m, 2) of the profile compensated by the curve's errors, and its corners behind them.
 
-    `normals` (m, 2) are used in place of those of circles through neighbouring points.
+    `normals` (m, 2) are used instead of those of circles through neighbouring points.
 
     :raises SplineError: the curve is none of errors along a profile, a place is not on it, or a
         corner is hardly one.

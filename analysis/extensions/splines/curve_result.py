@@ -81,7 +81,7 @@ class FittedCurve(Result):
         """The points of the curve, or nominal points of a CSV file on the same profile, moved
         against the errors that the curve has there, and its corners.
 
-        :raises ExperimentError: the file is wrong, or a point is not on the profile.
+        :raises ExperimentError: the file is invalid, or a point is not on the profile.
         """
         points = self.curve.points
         try:
@@ -143,7 +143,8 @@ def error_curve(
 
     `check` may refuse points before anything is fitted.
 
-    :raises ExperimentError: the file is wrong, or there is no such curve.
+    :raises ExperimentError: the file is invalid, or there is no such curve.
+
     :raises OptionError: a text that does not say what it should.
     """
     asked = asked or Asked()

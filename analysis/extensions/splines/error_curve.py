@@ -211,7 +211,7 @@ def _space(
 def _misplaced(
     settings: CurveSettings, boundaries: tuple[float, ...], lower: float, upper: float
 ) -> list[SplineProblem]:
-    """What is wrong with features, boundaries and knots between the ends of a curve."""
+    """Faults of features, boundaries and knots between the ends of a curve."""
     problems = [
         SplineProblem(
             f"there is no feature {k}; there are {len(boundaries) + 1}, counted from the start of"
@@ -255,7 +255,7 @@ def _misplaced_corners(
     holds: tuple[Constraint, ...],
     x: Array,
 ) -> list[SplineProblem]:
-    """What is wrong with corners: whatever stands on one belongs to either feature."""
+    """Faults of corners: whatever stands on one belongs to either feature."""
     problems = []
     for corner in corners:
         if corner in boundaries:

@@ -81,7 +81,7 @@ class Profile:
 
     @cached_property
     def _outward(self) -> float:
-        """Whether a tangent that is turned to the left points out of the material, 1 or -1: that
+        """True if a tangent that is turned to the left points out of the material, 1 or -1: that
         is on the side of the axis.
         """
         return -1.0 if (self._turned.imag * self.places[:, 0]).sum() < 0 else 1.0

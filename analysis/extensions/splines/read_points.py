@@ -99,13 +99,13 @@ def read_points(path: Path, x: str | None = None, y: str | None = None) -> Curve
     """Read points from a file whose first line names the columns, each with its unit, such as
     position_mm,error_um.
 
-    `x` and `y` choose columns, with or without the unit. Without `x` the abscissa is the arc length
-    along the profile if the file has the columns nominal_x and nominal_z (or x and z), otherwise
-    the first column with a unit; without `y` the error is the only column left. `point` and
-    `feature` are texts, `u` a standard uncertainty of the error, `normal_x` and `normal_z`, without
-    unit, the direction out of the material. Other columns are not read.
+    `x` and `y` choose columns, with or without the unit. Without `x` the abscissa is the arc
+    length along the profile if the file has the columns nominal_x and nominal_z (or x and z),
+    otherwise the first column with a unit; without `y` the error is the only column left. `point`
+    and `feature` are texts, `u` a standard uncertainty of the error, `normal_x` and `normal_z`,
+    without unit, the direction out of the material. Other columns are not read.
 
-    :raises ExperimentError: everything that is wrong with the file at once.
+    :raises ExperimentError: all faults of the file at once.
     """
     file = str(path)
     if path.suffix.lower() in NO_TABLES:

@@ -69,7 +69,7 @@ def answer(experiment: Experiment) -> dict[str, Any]:
 
 @single_threaded
 def scale_answer(experiment: Experiment) -> list[str]:
-    """What carries the scale of a design, in words: it is told after the rest, since the design is
+    """What carries the scale of a design, as text: it is told after the rest, since the design is
     evaluated once more without each of those that may.
     """
     scale = scale_of(experiment, linearise(lay_out(experiment)))

@@ -59,7 +59,7 @@ class DesignDocument:
 
     @property
     def has_changes(self) -> bool:
-        """Whether something was done to the text that the file does not hold."""
+        """True if something was done to the text that the file does not hold."""
         return bool(self.back) and not self.is_saved
 
 
@@ -94,7 +94,7 @@ def data_of(document: DesignDocument) -> Any:
 
 
 def variants_of(document: DesignDocument) -> tuple[str, ...]:
-    """The names of the variants that the text has, none where it is wrong."""
+    """The names of the variants that the text has, none where it is invalid."""
     try:
         experiments = load(document.path, True, document.trust, document.text)
     except ExperimentError:

@@ -169,7 +169,9 @@ def started(name: str, document: DesignDocument, settings: Mapping[str, Any]) ->
     """Start a computation with the document as it is now.
 
     :raises KeyError: there is no such job.
-    :raises ActionError: its settings are wrong.
+
+    :raises ActionError: its settings are invalid.
+
     :raises ExperimentError: the text is wrong, where this is found before the start.
     """
     JOBS[name]

@@ -29,7 +29,7 @@ class DesignJudgement:
 
 
 def judgement(document: DesignDocument) -> DesignJudgement:
-    """What a page shows of a document, or what is wrong with its text."""
+    """What a page shows of a document, or faults of its text."""
     variants = variants_of(document) if document.variant else ()
     try:
         experiment = experiment_of(document)
@@ -68,7 +68,7 @@ class Judge:
         self._connection: Connection | None = None
 
     def begin(self, work: Callable[[DesignDocument], Any], document: DesignDocument) -> None:
-        """Begin the work, in place of what is under way."""
+        """Begin the work, instead of what is under way."""
         if self.is_busy or self._process is None or not self._process.is_alive():
             self.stop()
             self._start()

@@ -26,8 +26,8 @@ def kept_in(path: Path, owner: str = "") -> Path:
 
 
 def keep(document: DesignDocument, owner: str) -> Path | None:
-    """Keep the text as far as it is not saved, with what the file held when it was read; where it
-    is kept now, None where the folder cannot be written or nothing is to be kept.
+    """Keep the text if it is not saved, with what the file held when it was read; where it is kept
+    now, None where the folder cannot be written or nothing is to be kept.
 
     What another owner has kept stays.
     """

@@ -126,7 +126,7 @@ class Session:
 
     @property
     def is_recoverable(self) -> bool:
-        """Whether nothing is lost if the studio ends now."""
+        """True if nothing is lost if the studio ends now."""
         with self._lock:
             return self.is_saved or self.kept() is not None
 
@@ -162,9 +162,10 @@ class Session:
         return data
 
     def scale(self) -> dict[str, Any]:
-        """What carries the scale of the design, in words, and which design that is.
+        """What carries the scale of the design, as text, and which design that is.
 
         :raises ExperimentError: the text is wrong.
+
         :raises RefusedError: something else was asked for meanwhile.
         """
         with self._lock:

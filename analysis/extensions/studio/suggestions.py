@@ -27,7 +27,7 @@ MOST_TOLD = 5
 def suggested_repairs(
     document: DesignDocument, report: Report = unreported
 ) -> list[dict[str, Any]]:
-    """Changes that leave nothing undetermined, in words, with the positions that they add or move,
+    """Changes that leave nothing undetermined, as text, with the positions that they add or move,
     as plain data.
 
     :raises ExperimentError: the text is wrong.

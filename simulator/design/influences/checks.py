@@ -30,7 +30,7 @@ def few(count: int) -> Integers:
 
 
 def wrong_of_parameters(parameters: tuple[InfluenceParameter, ...], positions: int) -> str:
-    """What is wrong with parameters where there are so many positions; empty if nothing is."""
+    """Faults of parameters where there are so many positions; empty if nothing is."""
     return next(iter(_of_parameters(parameters, positions)), "")
 
 
@@ -70,7 +70,7 @@ def wrong_of_shifts(
     at: Disturbed,
     again: Callable[[InfluenceSettings], Influence],
 ) -> str:
-    """What is wrong with shifts and their derivatives at readings `at`; empty if nothing is.
+    """Faults of shifts and their derivatives at readings `at`; empty if nothing is.
 
     Where a number among the settings is the value of a parameter, the influence is made `again`
     with others, and the derivative compared with differences. Other derivatives are not.
@@ -127,7 +127,7 @@ def _stated(settings: InfluenceSettings, influence: Influence) -> Iterator[tuple
 
 
 def _differ_in_value_only(one: Influence, other: Influence, k: int) -> bool:
-    """Whether two influences have the same parameters but for the value of one of them."""
+    """True if two influences have the same parameters except the value of one of them."""
     if len(one.parameters) != len(other.parameters):
         return False
     value = one.parameters[k].value

@@ -131,9 +131,7 @@ class InfluenceSettings(Settings):
     in_order: ClassVar[bool] = False
 
     def check(self, steps: Steps, positions: Mapping[str, str], references: References) -> None:
-        """Report what is wrong with them where `positions` are names with those of their
-        artefacts.
-        """
+        """Report faults of them where `positions` are names with those of their artefacts."""
 
     def influence(self, design: DesignParts) -> Influence:
         """The influence quantity in a design.

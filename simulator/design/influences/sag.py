@@ -145,7 +145,7 @@ class Sag(Influence):
         return (self.parameter,)
 
     def shifts(self, at: Disturbed) -> tuple[Array, Array]:
-        """A displacement along the normal, as far as gravity is along it."""
+        """A displacement along the normal, if gravity is along it."""
         normal = at.rotations[:, :, -1]
         derivative = (self.shape[at.ball] * (normal @ self.down))[:, None] * normal
         return self.parameter.value * derivative, derivative[:, :, None]
@@ -179,7 +179,7 @@ def _shape(
 def _values(path: Path, names: tuple[str, ...]) -> Array:
     """Values (n,) of a file for each of the balls.
 
-    :raises ExperimentError: the file is wrong; a ball is unknown, missing or there twice.
+    :raises ExperimentError: the file is invalid; a ball is unknown, missing or there twice.
     """
     values_by_name: dict[str, float] = {}
     messages: list[Message] = []

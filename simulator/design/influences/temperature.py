@@ -1,9 +1,9 @@
 """Temperature of artefacts and scales: both expand from a reference temperature on.
 
-A ball at y in its artefact's frame is at R (1 + b t) y + o, and a scale reading x stands for x (1 +
-c s), where b and c are coefficients of thermal expansion and t and s what artefact and scales are
-above the reference temperature. Products of the errors of a coefficient and of a temperature are
-neglected. A file of readings may have temperatures of each reading in place of those of its
+A ball at y in its artefact's frame is at R (1 + b t) y + o, and a scale reading x stands for x (1
++ c s), where b and c are coefficients of thermal expansion and t and s what artefact and scales
+are above the reference temperature. Products of the errors of a coefficient and of a temperature
+are neglected. A file of readings may have temperatures of each reading instead of those of its
 position.
 """
 
@@ -275,7 +275,7 @@ class TemperaturesSettings(InfluenceSettings):
         )
 
     def _has_axes(self) -> bool:
-        """Whether any temperature of the scales is stated by axis."""
+        """True if any temperature of the scales is stated by axis."""
         scales_stated = [
             position_temperatures.scales
             for position_temperatures in (self.positions or {}).values()

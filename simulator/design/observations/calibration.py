@@ -75,7 +75,7 @@ class Calibration(ABC):
 
     @property
     def subject(self) -> str:
-        """What its values are of, in words."""
+        """What its values are of, as text."""
         return self.artefact or "the machine"
 
     def observed(self, first: int) -> Observations:
@@ -87,7 +87,7 @@ class Calibration(ABC):
         raise NotImplementedError
 
     def doubt(self, layout: BallLayout) -> str:
-        """What is wrong with values that are each possible; empty if nothing is."""
+        """Faults of values that are each possible; empty if nothing is."""
         return ""
 
     def certified_values(self, layout: BallLayout) -> Iterator[CertifiedValue]:

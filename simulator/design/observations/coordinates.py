@@ -70,7 +70,7 @@ def no_coordinates() -> CalibratedCoordinates:
 
 
 def flat(layout: BallLayout, first: int, uncertainty: float) -> CalibratedCoordinates:
-    """Co-ordinates out of the plane as drawn, of an artefact whose balls begin at `first` and of
+    """Co-ordinates out of the plane nominal, of an artefact whose balls begin at `first` and of
     which nothing else tells them.
     """
     count = len(layout.names)
@@ -207,7 +207,7 @@ def read_coordinates(
 
 
 def _axes(settings: CoordinatesSettings, steps: Steps, references: References) -> list[str] | None:
-    """The calibrated axes, None after saying what is wrong with them."""
+    """The calibrated axes, None after reporting faults."""
     dimension, uncertainty = references.dimension, settings.standard_uncertainty
     place = (*steps, "standard_uncertainty")
     if uncertainty is None or isinstance(uncertainty, float):
@@ -303,8 +303,8 @@ def _table_of_coordinates(
 
 
 def far_spread(values: Array, drawn: Array) -> str:
-    """What is wrong with certified co-ordinates (m, axes) whose spread is not that of the drawing;
-    empty if nothing is.
+    """Faults of certified co-ordinates (m, axes) whose spread is not that of the drawing; empty if
+    nothing is.
 
     Where their axes begin may be another place than in the drawing.
     """

@@ -244,7 +244,7 @@ def _nominal(
     steps: Steps,
     references: References,
 ) -> Array | None:
-    """Distances (m,) as drawn, None after saying that one is none."""
+    """Distances (m,) nominal, None after saying that one is none."""
     difference = layout.coordinates[indices[:, 1]] - layout.coordinates[indices[:, 0]]
     nominal = np.linalg.norm(difference[:, :dimensions], axis=1)
     if np.any(nominal < COINCIDENT):
@@ -261,7 +261,7 @@ def _nominal(
 def _suits_role(
     settings: DistancesSettings, artefact: str, steps: Steps, references: References
 ) -> bool:
-    """Whether keys that are for length standards only are of one, after saying which are not."""
+    """True if keys that are for length standards only are of one, after saying which are not."""
     is_right = True
     if references.artefacts[artefact].role != "length_standard":
         for key in ("form", "repeatability"):
@@ -368,7 +368,7 @@ def _entries(
     steps: Steps,
     references: References,
 ) -> FileValues | None:
-    """What the file or the list of values states; None after saying what is wrong."""
+    """What the file or the list of values states; None after reporting faults."""
     if is_digital(settings.values):
         return read_digital(settings, wanted, True, steps[:-1], references)
     if isinstance(settings.values, str):

@@ -157,7 +157,7 @@ class ByPosition:
     """Rows of lengths, position by position, in units of the readings' noise alone.
 
     `length` (r,) is a length of each row's position, `rows` (r, k) are uncorrelated and of unit
-    variance but for the errors of certificates, in their uncertainties, and `by_error` (r,
+    variance except the errors of certificates, in their uncertainties, and `by_error` (r,
     certificates) is the derivative by these.
     """
 

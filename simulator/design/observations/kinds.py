@@ -44,7 +44,7 @@ else:
 
 
 def is_of_machine(kind: str) -> bool:
-    """Whether items of a kind are of no artefact."""
+    """True if items of a kind are of no artefact."""
     settings = None if kind in KINDS else provided("calibrations", kind, "SETTINGS")
     return settings is not None and "artefact" not in settings.model_fields
 
@@ -52,7 +52,7 @@ def is_of_machine(kind: str) -> bool:
 def read_calibration(
     settings: Any, artefact: str, steps: Steps, references: References
 ) -> Calibration | None:
-    """The item of an artefact that settings describe, or None after saying what is wrong."""
+    """The item of an artefact that settings describe, or None after reporting faults."""
     reader = next(
         (
             reader

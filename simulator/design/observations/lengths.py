@@ -259,7 +259,7 @@ def true_lengths(design: Design, truth: State) -> Array:
 
 
 def _measured_lengths(design: Design, origins: Array, x: Array) -> Array:
-    """Unknown lengths as the readings have them, in the mean; as drawn where there are none."""
+    """Unknown lengths as the readings have them, in the mean; nominal where there are none."""
     lengths = design.of(Lengths)
     if lengths.free is None or not len(design.unknown_lengths.names):
         return design.unknown_lengths.drawn

@@ -337,7 +337,7 @@ def _parsed(texts: tuple[str, ...], unit: Unit, steps: Steps, references: Refere
 
 # In one piece: each check relies on those before it.
 def _check(name: str, functions: Any, drawn: Array) -> None:
-    """Raise what is wrong with functions of balls, the first thing that is."""
+    """Raise faults of functions of balls, the first thing that is."""
     members = ("names", "unit", "values", "derivatives")
     missing = [member for member in members if not hasattr(functions, member)]
     if missing:

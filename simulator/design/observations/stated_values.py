@@ -78,12 +78,12 @@ class FileValues:
 
 
 def is_digital(values: object) -> bool:
-    """Whether the values of an item are in a digital certificate."""
+    """True if the values of an item are in a digital certificate."""
     return isinstance(values, str) and values.lower().endswith(".xml")
 
 
 def check_keys(settings: Any, steps: Steps, references: References) -> bool:
-    """Tell whether the keys about a file go with one another, after saying which do not."""
+    """True if the keys about a file go with one another, after saying which do not."""
     is_right = True
     of_file = isinstance(settings.values, str)
     digital = is_digital(settings.values)
@@ -114,7 +114,7 @@ def uncertainties_of(
     references: References,
 ) -> Uncertainties | None:
     """Uncertainties of values with `names`: those `stated` (m,) with the item, or those `found`
-    (m,) in its file, and those of a covariance; None after saying what is wrong.
+    (m,) in its file, and those of a covariance; None after reporting faults.
     """
     problems, own_uncertainty = references.problems, (*steps, "standard_uncertainty")
     in_file = not np.isnan(uncertainties_read).any()
@@ -209,7 +209,7 @@ def _of_file(
     references: References,
 ) -> Any:
     """Covariance and rounding (m, m) of values from a CSV file, and a third entry where they are
-    those of correlations; None after saying what is wrong.
+    those of correlations; None after reporting faults.
     """
     from ...inputs.covariances import read_matrix
 
@@ -269,7 +269,7 @@ def read_digital(
     references: References,
 ) -> FileValues | None:
     """The wanted values in a digital calibration certificate, which an extension reads; None after
-    saying what is wrong.
+    reporting faults.
     """
     reader = optional_service("read_digital")
     if reader is None:

@@ -11,7 +11,7 @@ from ...machines.protocol import Array, Integers
 
 @dataclass(frozen=True)
 class Whitening:
-    """The symmetric root of an inverse covariance, diagonal but for errors that the rows of a group
+    """The symmetric root of an inverse covariance, diagonal except errors that the rows of a group
     share.
 
     The covariance of m rows is diag(s^2) + u u' within a group, where u are standard uncertainties

@@ -117,7 +117,7 @@ def _table(text: Text) -> _Table | None:
 
 
 def recognises(beginning: str) -> bool:
-    """Whether a text has headings of Calypso within its first lines: those of a table with a
+    """True if a text has headings of Calypso within its first lines: those of a table with a
     characteristic to a row, or one with a feature to a row and its kind.
     """
     table = _table(Text("", tuple(beginning.splitlines()), (), False))
@@ -130,7 +130,7 @@ def recognises(beginning: str) -> bool:
 
 @dataclass
 class _Located:
-    """Co-ordinates of a feature as far as rows have told them."""
+    """Co-ordinates of a feature if rows have told them."""
 
     mark: Mark
     name: str
@@ -265,7 +265,7 @@ def _axis_and_name(row: dict[str, str]) -> tuple[str, str]:
 
 
 def _agrees(row: dict[str, str]) -> bool:
-    """Whether a row's deviation is the actual value less the nominal, as far as it has them."""
+    """True if a row's deviation is the actual value less the nominal, if it has them."""
     texts = [with_point(row.get(name, "")) for name in ("actual", "nominal", "deviation")]
     if not all(is_number(text) for text in texts):
         return True

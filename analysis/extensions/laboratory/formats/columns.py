@@ -9,7 +9,7 @@ NUMBER = re.compile(r"[+-]?(?:[0-9]+(?:[.,][0-9]*)?|[.,][0-9]+)(?:[eE][+-]?[0-9]
 
 
 def is_number(text: str) -> bool:
-    """Whether a text is a number, with a point or a comma.
+    """True if a text is a number, with a point or a comma.
 
     >>> [is_number(text) for text in ("-1,5", "+.5", "----#----", "1.2.3")]
     [True, True, False, False]
@@ -18,7 +18,7 @@ def is_number(text: str) -> bool:
 
 
 def with_point(text: str) -> str:
-    """A number with a point in place of its comma."""
+    """A number with a point instead of its comma."""
     return text.replace(",", ".")
 
 

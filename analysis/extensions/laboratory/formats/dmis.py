@@ -235,7 +235,7 @@ class _Reader:
 
 
 def _has_decimal_commas(numbers: list[str]) -> bool:
-    """Whether a number has zeros before its digits, as decimals behind a comma have.
+    """True if a number has zeros before its digits, as decimals behind a comma have.
 
     >>> _has_decimal_commas(["749", "99877", "-0", "00121"])
     True
@@ -246,7 +246,7 @@ def _has_decimal_commas(numbers: list[str]) -> bool:
 
 
 def _is_sphere(numbers: list[str]) -> bool:
-    """Whether numbers are a centre and a diameter, and perhaps a direction."""
+    """True if numbers are a centre and a diameter, and perhaps a direction."""
     if len(numbers) != 7:
         return len(numbers) == 4
     try:

@@ -66,7 +66,7 @@ class _Dimension:
 
 @dataclass
 class _Located:
-    """Co-ordinates of a feature as far as dimensions have told them."""
+    """Co-ordinates of a feature if dimensions have told them."""
 
     mark: Mark
     name: str
@@ -248,7 +248,7 @@ def _by_column(line: str, columns: list[tuple[str, int]]) -> dict[str, str] | No
 
 
 def _agrees(row: dict[str, str]) -> bool:
-    """Whether a row's deviation is what it measured less the nominal, as far as it tells them.
+    """True if a row's deviation is what it measured less the nominal, if it tells them.
 
     Its sign may be turned round, by a setting, where the nominal is negative.
     """

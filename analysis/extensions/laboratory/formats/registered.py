@@ -38,9 +38,9 @@ def recognised(text: str) -> Format | None:
 
 
 def is_table(text: str) -> bool:
-    """Whether lines of a text are rows of the same columns, of a name at least and three numbers.
+    r"""True if lines of a text are rows of the same columns, of a name at least and three numbers.
 
-    >>> is_table("p;b;x;y;z\\nlow;1;0,1;2,5;3"), is_table("one, two, three, four\\nfive")
+    >>> is_table("p;b;x;y;z\nlow;1;0,1;2,5;3"), is_table("one, two, three, four\nfive")
     (True, False)
     """
     lines = [line for line in text[:BEGINNING].splitlines() if line.strip()]
