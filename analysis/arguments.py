@@ -114,12 +114,12 @@ def observed_of(
     from ballplate.simulator.readings.reading_files import read_readings
 
     chosen = experiment_of(experiment)
-    tables, count_of_doubts = tables_of(readings, chosen), len(chosen.doubts)
+    tables, doubt_count = tables_of(readings, chosen), len(chosen.doubts)
     if certificate is not None:
         read = service("CertificateFiles").read
         chosen = read(table_of("certificate", certificate), chosen)
     observed = read_readings(tables, lay_out(chosen), settings=chosen.readings)
-    return chosen, replace(observed, certificate_doubts=chosen.doubts[count_of_doubts:])
+    return chosen, replace(observed, certificate_doubts=chosen.doubts[doubt_count:])
 
 
 def fit_map_or_path(name: str, fitted: Fit | FittedMap | PathLike) -> Fit | FittedMap | Path:

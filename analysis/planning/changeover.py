@@ -314,9 +314,9 @@ class _Task:
             for k, (place, probes) in enumerate(self.positions):
                 before = sets_of_size[sets_of_size >> k & 1 == 0]
                 for first, last in _ends(probes):
-                    state, after = place * size + last, before | 1 << k
+                    end, after = place * size + last, before | 1 << k
                     cost = reached[before, place * size + first]
-                    ended[after, state] = np.minimum(ended[after, state], cost)
+                    ended[after, end] = np.minimum(ended[after, end], cost)
         return ended, reached
 
     @cached_property
@@ -356,21 +356,21 @@ class _Task:
     def traced(self) -> Iterator[_Step]:
         """The best order of single positions, found from its end."""
         ended, reached = self.by_positions
-        size, state, steps = len(self.names), len(ended) - 1, []
-        index = int(ended[state].argmin())
-        while state:
+        size, last_end, steps = len(self.names), len(ended) - 1, []
+        index = int(ended[last_end].argmin())
+        while last_end:
             k, first = next(
                 (k, first)
                 for k, (place, probes) in enumerate(self.positions)
                 for first, last in _ends(probes)
-                if state >> k & 1
+                if last_end >> k & 1
                 and place * size + last == index
-                and reached[state & ~(1 << k), place * size + first] == ended[state, index]
+                and reached[last_end & ~(1 << k), place * size + first] == ended[last_end, index]
             )
             place, probes = self.positions[k]
             steps.append((place, probes, first, index % size))
-            state &= ~(1 << k)
-            index = int((ended[state] + self.between[:, place * size + first]).argmin())
+            last_end &= ~(1 << k)
+            index = int((ended[last_end] + self.between[:, place * size + first]).argmin())
         yield from reversed(steps)
 
 

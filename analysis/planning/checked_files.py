@@ -75,8 +75,8 @@ class Wanted:
         """The trust in a file."""
         if self.with_modules:
             return OPENED
-        here, folders = Path.cwd(), path.resolve().parent
-        within = here if folders.is_relative_to(here) else folders
+        here, folder = Path.cwd(), path.resolve().parent
+        within = here if folder.is_relative_to(here) else folder
         return Trust(within=within, remedy=WITH_MODULES)
 
 

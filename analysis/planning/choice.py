@@ -114,11 +114,11 @@ class Selection:
 
     def title_of(self, candidate: Candidate) -> str:
         """The name of a candidate, after its short name if it has one."""
-        prefixes, name = "", candidate.name
+        prefix, name = "", candidate.name
         if name.startswith(REST):
-            prefixes, name = REST, name.removeprefix(REST)
+            prefix, name = REST, name.removeprefix(REST)
         short = self.names.get(name, name)
-        return candidate.name if short == name else f"{prefixes}{short}, {name}"
+        return candidate.name if short == name else f"{prefix}{short}, {name}"
 
     @property
     def efficiency(self) -> float:

@@ -165,18 +165,18 @@ class Criterion:
                 if self.largest
                 else _mean_tangent(self.functions, root)
             )
-        decomposition, sizes, _ = np.linalg.svd(self.scaled @ root, full_matrices=False)
+        left_vectors, sizes, _ = np.linalg.svd(self.scaled @ root, full_matrices=False)
         n, value = len(sizes), self.value(root)
         if self.name == "A":
             return value, value, self.scaled.T @ self.scaled / (2 * n * value)
         if self.name == "D":
-            half = (decomposition / sizes).T @ self.scaled
+            half = (left_vectors / sizes).T @ self.scaled
             return value, value, value / (2 * n) * half.T @ half
         relative = sizes / sizes[0]
         weights = relative**power / (relative**power).sum()
         value = float(np.sqrt(weights @ sizes**2))
         smooth = float(sizes[0] * (relative ** (power + 2)).mean() ** (1 / (power + 2)))
-        half = (decomposition * np.sqrt(weights)).T @ self.scaled
+        half = (left_vectors * np.sqrt(weights)).T @ self.scaled
         return smooth, value, half.T @ half / (2 * value)
 
 
@@ -364,14 +364,17 @@ class Pairs:
             sums.append(weighed.sum(axis=1))
             weights_of_block = np.zeros(block.length.shape)
             weights_of_block[block.chosen] = weighed[0]
-            from_end, to_end = self.displacement[block.first], self.displacement[block.second]
+            first_moves, second_moves = (
+                self.displacement[block.first],
+                self.displacement[block.second],
+            )
             for i, j, weight in block.weights:
                 amount = weights_of_block * weight
                 moved[block.first, i] += (
-                    amount.sum(axis=1)[:, None] * from_end[:, j] - amount @ to_end[:, j]
+                    amount.sum(axis=1)[:, None] * first_moves[:, j] - amount @ second_moves[:, j]
                 )
                 moved[block.second, i] += (
-                    amount.sum(axis=0)[:, None] * to_end[:, j] - amount.T @ from_end[:, j]
+                    amount.sum(axis=0)[:, None] * second_moves[:, j] - amount.T @ first_moves[:, j]
                 )
         size = self.displacement.shape[2]
         total = self.displacement.reshape(-1, size).T @ moved.reshape(-1, size)

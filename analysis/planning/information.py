@@ -482,10 +482,10 @@ def _basis(
     for some in _batches(every if even is None else even, 4 * (y + shared)):
         triangle = np.asarray(np.linalg.qr(np.concatenate([triangle, *some]), mode="r"))
     triangle = np.concatenate([triangle, np.zeros((y + shared, y + shared))])[: y + shared]
-    decomposition, of_balls, by_balls = np.linalg.svd(triangle[:y, :y])
+    left_vectors, of_balls, by_balls = np.linalg.svd(triangle[:y, :y])
     is_read = of_balls > EXACT * of_balls.max(initial=0.0)
     # What balls leave of the rows above belongs to shared columns.
-    below = np.concatenate([decomposition[:, ~is_read].T @ triangle[:y, y:], triangle[y:, y:]])
+    below = np.concatenate([left_vectors[:, ~is_read].T @ triangle[:y, y:], triangle[y:, y:]])
     _, values, right = np.linalg.svd(below, full_matrices=True)
     values = np.concatenate([values, np.zeros(shared - len(values))])
     # Where balls take up all of them, the largest that is left is rounding, too.
@@ -493,7 +493,7 @@ def _basis(
     ball_open, open_ = by_balls[~is_read].T, right[~is_known].T
     if even is None:
         ball_root = by_balls[is_read].T / of_balls[is_read]
-        ball_shared = ball_root @ decomposition[:, is_read].T @ triangle[:y, y:]
+        ball_shared = ball_root @ left_vectors[:, is_read].T @ triangle[:y, y:]
         return (
             InformationBasis(
                 balls, ball_root, ball_shared, right[is_known].T / values[is_known], ball_open

@@ -218,15 +218,15 @@ def run_sheet(
 
 def first_readings(sequence: Sequenced, changes: ChangeTimes) -> list[float]:
     """When the first reading of each position in a sequence begins, in seconds."""
-    best, elapsed = [], 0.0
+    done_visits, elapsed = [], 0.0
     for k, (candidate, probes) in enumerate(sequence):
         elapsed += change_over(sequence[k - 1], sequence[k], changes)[0] if k else 0.0
         elapsed += candidate.seconds
         seconds_taken = (
             len(probes) - 1
         ) * changes.probe + candidate.readings * candidate.reading_seconds
-        best.append(elapsed - min(seconds_taken, candidate.seconds))
-    return best
+        done_visits.append(elapsed - min(seconds_taken, candidate.seconds))
+    return done_visits
 
 
 def change_over(

@@ -226,9 +226,9 @@ def _sieve(
     # All candidates together have the identity, up to what the base has.
     mean = (whole - problem.information.base) / len(matrices)
     root = _inverse(np.asarray(np.linalg.cholesky(_ridged(information + mean)), float)).T
-    weights, (_, _, half) = problem.counted, problem.tangent(root)
+    counted, (_, _, half) = problem.counted, problem.tangent(root)
     if len(added) > SLOPED:
-        spread = root @ (root[weights].T @ half)
+        spread = root @ (root[counted].T @ half)
         slope = np.tensordot(matrices, spread @ spread.T, axes=2)[added]
         added = np.sort(added[np.argsort(-comparable(slope), kind="stable")[:SLOPED]])
     losses = np.zeros(len(added))
@@ -241,7 +241,7 @@ def _sieve(
             if (pivots.min() < UNDETERMINED) if by_pivots else _is_deficient(inverse):
                 losses[start + k] = _in_place(information + matrices[some[k]])
             else:
-                losses[start + k] = ((inverse[weights, weights] @ half) ** 2).sum()
+                losses[start + k] = ((inverse[counted, counted] @ half) ** 2).sum()
     return added, losses
 
 
@@ -264,10 +264,10 @@ def best_addition(
     seconds = np.maximum(problem.constraints.seconds, 1.0)
     framed = np.isin(added, list(problem.information.frames.fixed))
     if len(added) > SMALL_POOL and not framed.any():
-        added, sieved = losses.sieved(members, added)
+        added, tangents = losses.sieved(members, added)
         if per_second:
-            sieved = (sieved - sieved.max()) / seconds[added]
-        added = added[np.argsort(comparable(sieved), kind="stable")[:SIEVED]]
+            tangents = (tangents - tangents.max()) / seconds[added]
+        added = added[np.argsort(comparable(tangents), kind="stable")[:SIEVED]]
     after = np.array([losses.of(members | {int(k)}) for k in added])
     gain = after - losses.of(members)
     best = int(comparable(gain / seconds[added] if per_second else gain).argmin())

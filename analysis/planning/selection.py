@@ -73,9 +73,12 @@ class Campaign(Selection, Result):
         source = self.experiment.source.name
         header = f"Chosen by ballplate plan from {source}: {self.criterion}, no more"
         header += f" than {self.budget}."
-        deficiency, open_expected = self.left_open or None, self.experiment.expected_rank_deficiency
-        if open_expected == self.prediction.verdict.deficiency:
-            deficiency = open_expected
+        deficiency, expected_deficiency = (
+            self.left_open or None,
+            self.experiment.expected_rank_deficiency,
+        )
+        if expected_deficiency == self.prediction.verdict.deficiency:
+            deficiency = expected_deficiency
         written = self.sheet.written
         return experiment_text(
             self.experiment,

@@ -308,10 +308,10 @@ def _every_two_positions(
     later = (np.cumsum(count)[measured.pair] - 1) - rows
     first = np.repeat(rows, later)
     second = first + 1 + np.arange(len(first)) - np.repeat(np.cumsum(later) - later, later)
-    row, repeated = np.nonzero(measured.pair[:, None] == measured.calibrated)
+    row, calibrated_index = np.nonzero(measured.pair[:, None] == measured.calibrated)
     return _stacked(
         _differences(measured, length, by_model, first, second),
-        _prescribed(measured, length, by_model, row, repeated),
+        _prescribed(measured, length, by_model, row, calibrated_index),
     )
 
 

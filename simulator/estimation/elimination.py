@@ -305,10 +305,10 @@ def _tied_rows(gathered: _Gathered, place_of: Integers, columns: int, s: int) ->
             some = slice(start, start + TIED_AT_ONCE)
             by_ball = of_all.by_ball[some]
             rows = np.zeros((len(by_ball), columns + s + 1), order="F")
-            ball_rows, d = np.arange(len(by_ball)), by_ball.shape[2]
+            index, d = np.arange(len(by_ball)), by_ball.shape[2]
             for ball, slope in zip(balls[some].T, by_ball.swapaxes(0, 1), strict=True):
                 for axis in range(d):
-                    rows[ball_rows, d * place_of[ball] + axis] += slope[:, axis]
+                    rows[index, d * place_of[ball] + axis] += slope[:, axis]
             if of_all.by_shared is not None:
                 rows[:, columns:-1] = of_all.by_shared[some]
             rows[:, -1] = of_all.residual[some]

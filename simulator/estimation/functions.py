@@ -200,13 +200,13 @@ def displacements(
     """
     design, drawn = linearisation.design, linearisation.as_drawn.state
     if isinstance(places, BallPlaces):
-        own_roots, index = linearisation.balls.own[places.index], places.index
+        own_root, index = linearisation.balls.own[places.index], places.index
         size = np.full((len(index), design.dimension), MICROMETRE)
         where = places.at(design, linearisation.state), places.at(design, drawn)
         return Displacements(
             where[0],
             linearisation.balls.common[index],
-            own_roots,
+            own_root,
             linearisation.ball_null[index],
             where[1],
             size,

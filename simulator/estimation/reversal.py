@@ -105,9 +105,9 @@ def reverse(first: Array, second: Array, scale: Scale, offsets: bool = True) -> 
             "the balls lie on one line, and do not show both squareness and scale difference"
         )
     x2, y2 = second.T
-    zero, scale_factors = np.zeros(len(x2)), np.ones(len(x2))
-    by_x = np.stack([-x2, -x2, -y2, scale_factors, zero], axis=1)
-    by_y = np.stack([y2, -y2, -x2, zero, scale_factors], axis=1)
+    zero, factors = np.zeros(len(x2)), np.ones(len(x2))
+    by_x = np.stack([-x2, -x2, -y2, factors, zero], axis=1)
+    by_y = np.stack([y2, -y2, -x2, zero, factors], axis=1)
     rows = np.concatenate([by_x, by_y])[:, : 5 if offsets else 3]
     wanted = np.concatenate([first[:, 0] + y2, first[:, 1] - x2])
     # A unit of each column then moves some reading by the plate's size.

@@ -71,12 +71,12 @@ def _unsuitable(item: Calibration, layout: BallLayout) -> str:
     if text := _unnamed(item.names(layout)):
         return text
     names = [", ".join(name) for name in item.names(layout)]
-    value_and_extent, extent = item.observed(0), float(np.ptp(layout.coordinates, axis=0).max())
-    assert isinstance(value_and_extent, BallObservations)
-    values, slopes = _values_at(value_and_extent, layout.coordinates)
+    observed, extent = item.observed(0), float(np.ptp(layout.coordinates, axis=0).max())
+    assert isinstance(observed, BallObservations)
+    values, slopes = _values_at(observed, layout.coordinates)
     # Each ball is moved otherwise, by what rounding may do.
     way = np.sin(np.arange(1.0, layout.coordinates.size + 1.0)).reshape(layout.coordinates.shape)
-    beside = _values_at(value_and_extent, layout.coordinates + 1e-12 * extent * way)[1]
+    beside = _values_at(observed, layout.coordinates + 1e-12 * extent * way)[1]
     size, change = (np.abs(name).max(axis=(1, 2)) for name in (slopes, beside - slopes))
     # A change that is no number is no small one.
     is_smooth = np.isfinite(values) & (change <= 0.5 * size)
@@ -88,7 +88,7 @@ def _unsuitable(item: Calibration, layout: BallLayout) -> str:
             " in one place; choose other balls"
         )
     # A ball that is named twice moves with both.
-    is_same = value_and_extent.balls[:, :, None] == value_and_extent.balls[:, None, :]
+    is_same = observed.balls[:, :, None] == observed.balls[:, None, :]
     moved = np.abs(np.einsum("mij,mjd->mid", is_same, slopes)).max(axis=(1, 2))
     is_fixed = ~(moved > 1e-9 * size)
     if is_fixed.any():

@@ -81,11 +81,11 @@ def resolve_noise(settings: str | NoiseSettings | None, problems: Problems) -> N
         return Noise()
     if isinstance(settings, str):
         settings = NoiseSettings.model_validate({"distribution": settings})
-    freedom_and_path, steps = settings.degrees_of_freedom, ("noise",)
-    if settings.distribution == "student t" and freedom_and_path is None:
+    freedom, steps = settings.degrees_of_freedom, ("noise",)
+    if settings.distribution == "student t" and freedom is None:
         text = "student t has no degrees of freedom; write {distribution: student t, degrees_of_"
         problems.add(steps, text + "freedom: 5}")
-    elif settings.distribution != "student t" and freedom_and_path is not None:
+    elif settings.distribution != "student t" and freedom is not None:
         text = f"{settings.distribution} noise has none; remove it, or write student t"
         problems.add((*steps, "degrees_of_freedom"), text)
     if settings.correlation:
@@ -94,7 +94,7 @@ def resolve_noise(settings: str | NoiseSettings | None, problems: Problems) -> N
             " independent; have uncertainties with it by Monte Carlo (run --trials)"
         )
         problems.doubt((*steps, "correlation"), text)
-    return Noise(settings.distribution, freedom_and_path or np.inf, settings.correlation)
+    return Noise(settings.distribution, freedom or np.inf, settings.correlation)
 
 
 def resolve_evaluation(

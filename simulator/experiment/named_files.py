@@ -110,11 +110,11 @@ def model_modules(nodes: Sequence[tuple[str, Node]], folder: Path) -> Iterator[t
     """Objects of error models in Python, each with the folder of its module."""
     for path, node in nodes:
         for _, mapping in python_models(node):
-            name, object_and_folder = mapping.items.get("object"), mapping.items.get("folder")
+            name, module_folder = mapping.items.get("object"), mapping.items.get("folder")
             if isinstance(name, Scalar):
                 inner = (
-                    str(object_and_folder.value)
-                    if isinstance(object_and_folder, Scalar) and object_and_folder.value is not None
+                    str(module_folder.value)
+                    if isinstance(module_folder, Scalar) and module_folder.value is not None
                     else "."
                 )
                 yield Path(os.path.abspath(folder / inner)), name

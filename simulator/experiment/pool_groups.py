@@ -406,18 +406,18 @@ def _values(lengths: Any) -> tuple[float, ...]:
 def _probes(
     settings: GroupSettings, planes: Sequence[Axis], steps: Steps, references: References
 ) -> dict[str, tuple[tuple[str, ...], ...]]:
-    names_and_path, where = settings.probes, (*steps, "probes")
-    if names_and_path is None:
+    stated, where = settings.probes, (*steps, "probes")
+    if stated is None:
         names = references.probe_names(None, steps)
         return {} if names is None else dict.fromkeys(planes, (names,))
-    if not isinstance(names_and_path, ProbesByPlaneSettings):
-        return dict.fromkeys(planes, _sets(names_and_path, where, references))
+    if not isinstance(stated, ProbesByPlaneSettings):
+        return dict.fromkeys(planes, _sets(stated, where, references))
     if references.dimension == 2:
         references.problems.add(where, "has no planes in two dimensions; list the probes")
         return {}
     sets = {}
     for plane in AXIS_INDEX:
-        value = getattr(names_and_path, plane)
+        value = getattr(stated, plane)
         if value is not None and plane not in planes:
             text = "is not among the planes; remove it, or add it to planes"
             references.problems.add((*where, plane), text, of_key=True)

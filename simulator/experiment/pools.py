@@ -211,7 +211,7 @@ def resolve_pool(
     root = problems.root
     if ("pool", "times") not in sections.values:
         return None
-    candidates_and_complete, complete = list(candidates.found), candidates.complete
+    chosen_from, complete = list(candidates.found), candidates.complete
     at_most: list[AtMost] = []
     radii: dict[str, list[int]] = {}
     fixed = {
@@ -240,27 +240,23 @@ def resolve_pool(
                     "; "
                 )
                 problems.add(steps, f"{text}remove one of the two")
-            radii.setdefault(item.artefact, []).append(len(candidates_and_complete))
+            radii.setdefault(item.artefact, []).append(len(chosen_from))
         item_settings = to_python(written(root, *steps))  # type: ignore[arg-type]
         item_settings = {
             key: value for key, value in item_settings.items() if key not in ("name", "price")
         }
-        candidates_and_complete.append(
+        chosen_from.append(
             Candidate(settings.name, item, settings.price, "", settings.name, False, item_settings)
         )
     if complete:
         check_lengths(by_steps, candidates.positions, references)
     at_most += [AtMost(tuple(members), 1) for members in radii.values() if len(members) > 1]
-    must, limited = _limits(
-        sections.get("pool", "limits"), candidates_and_complete, complete, references
-    )
+    must, limited = _limits(sections.get("pool", "limits"), chosen_from, complete, references)
     times: TimesSettings = sections.get("pool", "times")
     changes = ChangeTimes(
         _or(times.probe_change, PROBE_CHANGE), _or(times.plane_change, PLANE_CHANGE)
     )
-    return Pool(
-        tuple(candidates_and_complete), changes, must, (*at_most, *limited), candidates.dropped
-    )
+    return Pool(tuple(chosen_from), changes, must, (*at_most, *limited), candidates.dropped)
 
 
 def _candidate(
@@ -344,7 +340,7 @@ def _check_names(references: References) -> bool:
 
 def _reach(limits: LimitsSettings, references: References) -> dict[str, Floats]:
     """Lower and upper ends (2, d) of where balls can be read, by probe."""
-    problems, problems_and_reach = references.problems, {}
+    problems, reach = references.problems, {}
     for name, region in limits.reach.items():
         steps: Steps = ("pool", "limits", "reach", name)
         if name not in references.probes:
@@ -360,8 +356,8 @@ def _reach(limits: LimitsSettings, references: References) -> dict[str, Floats]:
             if k >= (references.dimension or 3):
                 references.refuse_in_plane(*steps, axis)
             ends[:, k] = axis_lengths
-        problems_and_reach[name] = frozen(ends[:, : references.dimension or 3])
-    return problems_and_reach
+        reach[name] = frozen(ends[:, : references.dimension or 3])
+    return reach
 
 
 def _check_bounds(position: Position, steps: Steps, bounds: Bounds, references: References) -> None:

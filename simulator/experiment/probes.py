@@ -149,23 +149,23 @@ def _star_values(
     except ExperimentError as error:
         references.problems.take(error, steps)
         return None
-    before, messages_and_values = len(references.problems.messages), dict[str, tuple[float, ...]]()
+    before, values = len(references.problems.messages), dict[str, tuple[float, ...]]()
     for row in rows:
         name = row.texts[0]
         if name not in names:
             text = f'unknown probe "{name}"; {hint(name, names)}'
             references.problems.add_at(row.mark, steps, text)
-        elif name in messages_and_values:
+        elif name in values:
             text = f'probe "{name}" is listed twice; remove one of the two lines'
             references.problems.add_at(row.mark, steps, text)
-        messages_and_values[name] = row.lengths
-    missing = [name for name in names if name not in messages_and_values]
+        values[name] = row.lengths
+    missing = [name for name in names if name not in values]
     if missing and len(references.problems.messages) == before:
         text = f"no co-ordinates for {listing(missing)}; add them, or leave them out of probes"
         references.problems.add(steps, text)
     if len(references.problems.messages) > before:
         return None
-    return np.array([messages_and_values[name] for name in names])
+    return np.array([values[name] for name in names])
 
 
 def _reference_probe(sections: Sections, references: References) -> str:

@@ -211,9 +211,9 @@ def _check_ends(
     fitted: FittedMap, machine: Machine, steps: Steps, references: References, outside_only: bool
 ) -> bool:
     """True if the volume is that of the map, or within it where `outside_only`; says where not."""
-    volumes, volume, is_right = fitted.volume, machine.volume, True
+    mapped, volume, is_right = fitted.volume, machine.volume, True
     for k, axis in enumerate(AXES[: fitted.dimension]):
-        ends = float(volumes.lower[k]), float(volumes.upper[k])
+        ends = float(mapped.lower[k]), float(mapped.upper[k])
         low, high = float(volume.lower[k]), float(volume.upper[k])
         if outside_only:
             is_wrong = low < ends[0] - TOLERANCE or high > ends[1] + TOLERANCE

@@ -230,8 +230,8 @@ def determined_only(null: Array, scale: Array) -> Array:
     >>> determined_only(np.array([[2.0, 0.0], [0.0, 0.0]]), np.array([2.0, 1.0])).tolist()
     [[2.0], [0.0]]
     """
-    decomposition, sizes, _ = np.linalg.svd(null / scale[:, None], full_matrices=False)
-    directions = scale[:, None] * decomposition[:, sizes > TOUCHED]
+    left_vectors, sizes, _ = np.linalg.svd(null / scale[:, None], full_matrices=False)
+    directions = scale[:, None] * left_vectors[:, sizes > TOUCHED]
     signs = np.sign(
         directions[
             np.abs(directions / scale[:, None]).argmax(axis=0), np.arange(directions.shape[1])

@@ -136,13 +136,17 @@ def _constrained(
         return np.zeros(space.count), np.eye(space.count), ()
     q, r, order = qr(matrix.T, pivoting=True)
     rank = int((np.abs(np.diag(r)) > NOTHING).sum())
-    rank_rows, free_columns = order[:rank], sorted(order[rank:].tolist())
-    particular = q[:, :rank] @ solve_triangular(r[:rank, :rank], values[rank_rows], trans="T")
+    determined_columns, free_columns = order[:rank], sorted(order[rank:].tolist())
+    particular = q[:, :rank] @ solve_triangular(
+        r[:rank, :rank], values[determined_columns], trans="T"
+    )
     # What is left of a value that is met up to rounding, beside the values that it is made of.
     size = NOTHING * max(float(np.abs(values).max()), float(np.abs(particular).max(initial=0.0)))
     contradictory = [k for k in free_columns if abs(matrix[k] @ particular - values[k]) > size]
     if contradictory:
-        raise SplineError(_contradiction(constraints, matrix, rank_rows, k) for k in contradictory)
+        raise SplineError(
+            _contradiction(constraints, matrix, determined_columns, k) for k in contradictory
+        )
     return particular, q[:, rank:], tuple(constraints[k] for k in free_columns)
 
 

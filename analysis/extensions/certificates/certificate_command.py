@@ -39,11 +39,11 @@ class _Written(OutputAction):
         self, parser: ArgumentParser, namespace: Namespace, values: Any, option_string: Any = None
     ) -> None:
         super().__call__(parser, namespace, values, option_string)
-        others = [one for one in namespace.outputs if one.dest != "covariance"]
+        other_outputs = [output for output in namespace.outputs if output.dest != "covariance"]
         if values.suffix.lower() == ".csv":
             beside = values.with_name(f"{values.stem}-covariance{values.suffix}")
-            others.append(Output("covariance", "the covariance's", beside, None, False))
-        namespace.outputs = tuple(others)
+            other_outputs.append(Output("covariance", "the covariance's", beside, None, False))
+        namespace.outputs = tuple(other_outputs)
 
 
 class _Stated(Action):
@@ -132,11 +132,11 @@ def run(options: Namespace) -> int:
         return 1
     try:
         asked = options.plate, options.datum, options.coverage_factor, options.about
-        found = plate_certificate(result, *asked)
-        texts = {} if options.output is None else found.texts(options.output)
+        result_certificate = plate_certificate(result, *asked)
+        texts = {} if options.output is None else result_certificate.texts(options.output)
     except ValueError as error:
         raise UsageError(error) from None
     write_noted(options, texts)
     if options.json or not texts:
-        show(options, found)
+        show(options, result_certificate)
     return 1 if result.complaint else 0

@@ -17,10 +17,10 @@ def coordinates_csv(certificate: CertifiedBalls, covariance: str) -> str:
     the table with these.
     """
     axes = "xyz"[: certificate.dimension]
-    said = [f"{key}: {text}" for key, text in certificate.facts.items()]
-    said += [f"covariance: {covariance}", *certificate.notes]
+    comments = [f"{key}: {text}" for key, text in certificate.facts.items()]
+    comments += [f"covariance: {covariance}", *certificate.notes]
     stream = io.StringIO()
-    stream.writelines(f"# {in_one_line(text)}\n" for text in said)
+    stream.writelines(f"# {in_one_line(text)}\n" for text in comments)
     writer = CsvWriter(stream)
     heads = [
         *(f"{axis}_mm" for axis in axes),
@@ -33,7 +33,9 @@ def coordinates_csv(certificate: CertifiedBalls, covariance: str) -> str:
         certificate.standard_uncertainties.tolist(),
         strict=True,
     ):
-        writer.writerow([name, *(scaled(one, 3) for one in place), *(scaled(one, 6) for one in u)])
+        writer.writerow(
+            [name, *(scaled(value, 3) for value in place), *(scaled(value, 6) for value in u)]
+        )
     return stream.getvalue()
 
 
@@ -44,7 +46,7 @@ def covariance_csv(certificate: CertifiedBalls) -> str:
     writer = CsvWriter(stream)
     writer.writerow(["covariance_um2", *names])
     for name, row in zip(names, certificate.covariance.tolist(), strict=True):
-        writer.writerow([name, *(scaled(one, 12) for one in row)])
+        writer.writerow([name, *(scaled(value, 12) for value in row)])
     return stream.getvalue()
 
 

@@ -60,26 +60,26 @@ UNIT_NAMES = {"rad": "rad", "1": "m/m"}
 
 def certified_values(experiment: Experiment) -> list[CertifiedValue]:
     """All values that certificates, probes and priors of an experiment state, in its order."""
-    found = [
-        replace(one, item=format_path(("calibration", k)))
+    values = [
+        replace(certified_value, item=format_path(("calibration", k)))
         for k, item in enumerate(experiment.calibration)
-        for one in item.certified_values(experiment.layout_of(item))
+        for certified_value in item.certified_values(experiment.layout_of(item))
     ]
     for probe, axis, value, u in experiment.certified_offsets:
         item = format_path(("probes", probe.name))
-        found.append(CertifiedValue(item, "offset", AXES[axis], value, u))
+        values.append(CertifiedValue(item, "offset", AXES[axis], value, u))
     for k, star in enumerate(experiment.stars):
         item, u = format_path(("stars", k)), star.standard_uncertainty
         for (tip, letter), value in zip(star.names, star.coordinates.ravel().tolist(), strict=True):
-            found.append(CertifiedValue(item, tip, letter, value, u))
+            values.append(CertifiedValue(item, tip, letter, value, u))
     for prior in experiment.priors:
         item = prior.path.rpartition(".")[0]
-        found.append(
+        values.append(
             CertifiedValue(
                 item, prior.name, "value", prior.value, prior.standard_uncertainty, prior.unit
             )
         )
-    return found
+    return values
 
 
 def with_values(experiment: Experiment, values: Array) -> Experiment:
@@ -137,28 +137,32 @@ def drawn_values(
     priors = priors[design.of(Priors).of_influence < 0]
     true += priors[len(experiment.priors) :].tolist()
     for star in experiment.stars:
-        own = [design.probes.names.index(name) for name in star.probes]
-        true += star.true_values(truth.probes[own]).tolist()
+        probes_of_star = [design.probes.names.index(name) for name in star.probes]
+        true += star.true_values(truth.probes[probes_of_star]).tolist()
     true += priors[: len(experiment.priors)].tolist()
     if generator is None:
         return np.array(true, float)
-    uncertainty = np.array([one.standard_uncertainty for one in certified_values(experiment)])
+    uncertainty = np.array([value.standard_uncertainty for value in certified_values(experiment)])
     normal = generator.standard_normal(len(true))
-    errors, at = uncertainty * normal, 0
-    for item, own in zip(experiment.calibration, of_items, strict=True):
-        part = slice(at, at + len(own))
+    errors, start = uncertainty * normal, 0
+    for item, probes_of_star in zip(experiment.calibration, of_items, strict=True):
+        part = slice(start, start + len(probes_of_star))
         errors[part] = item.drawn_errors(normal[part], uncertainty[part])
-        at = part.stop
+        start = part.stop
     return np.asarray(np.array(true, float) + errors)
 
 
 def certificate_rows(experiment: Experiment) -> Iterator[tuple[str, str, str, str]]:
     """All values that an experiment states, with all digits, as rows of `COLUMNS`."""
-    for one in certified_values(experiment):
+    for certified_value in certified_values(experiment):
         # Less than can be read again is rounding, such as that of the cosine of a right angle.
-        value = one.value if abs(one.value) >= SMALLEST else 0.0
-        text = length_text(value) if one.unit == "m" else f"{value!r} {UNIT_NAMES[one.unit]}"
-        yield one.item, one.first, one.second, text
+        value = certified_value.value if abs(certified_value.value) >= SMALLEST else 0.0
+        text = (
+            length_text(value)
+            if certified_value.unit == "m"
+            else f"{value!r} {UNIT_NAMES[certified_value.unit]}"
+        )
+        yield certified_value.item, certified_value.first, certified_value.second, text
 
 
 def write_certificate(stream: TextIO, experiment: Experiment, comment: str) -> None:
@@ -169,11 +173,13 @@ def write_certificate(stream: TextIO, experiment: Experiment, comment: str) -> N
     writer.writerows(certificate_rows(experiment))
 
 
-def with_drawn_values(experiment: Experiment, found: Simulated) -> Experiment:
+def with_drawn_values(experiment: Experiment, simulated: Simulated) -> Experiment:
     """An experiment with values of its certificates, priors and probe offsets that go with readings
     that have just been simulated.
     """
-    values = drawn_values(experiment, found.design, found.truth, found.model, found.generator)
+    values = drawn_values(
+        experiment, simulated.design, simulated.truth, simulated.model, simulated.generator
+    )
     return with_values(experiment, values)
 
 
@@ -201,91 +207,97 @@ def read_certificate(path: Path | GivenText, experiment: Experiment) -> Experime
     problems: list[Message] = []
     table = path if isinstance(path, GivenText) else GivenText(str(path), read_text(path))
     if is_calibration_table(table):
-        told = (
+        advice = (
             "this is a table of the certified values of one calibration; name it in the experiment"
             f" file under calibration: values: {Path(path.name).name}, and leave --certificate out"
         )
-        raise refused(path, told, line=1)
+        raise refused(path, advice, line=1)
     rows = read_table(table, COLUMNS, [], problems=problems)
-    known = certified_values(experiment)
-    if not known:
+    values_known = certified_values(experiment)
+    if not values_known:
         text = (
             "the experiment has no certificate, prior or probe offset with an uncertainty; leave"
             " the file out"
         )
         raise refused(path, text)
-    place = {one.key: k for k, one in enumerate(known)}
-    pairs = {one.item for one in known if one.is_pair}
-    values, lines = np.full(len(known), np.nan), dict[int, FileRow]()
+    place = {certified_value.key: k for k, certified_value in enumerate(values_known)}
+    pairs = {certified_value.item for certified_value in values_known if certified_value.is_pair}
+    values, lines = np.full(len(values_known), np.nan), dict[int, FileRow]()
     for row in rows[:MOST_MESSAGES] if problems else rows:
         item, first, second, text = row.texts
         names = sorted((first, second)) if item in pairs else [first, second]
         k = place.get((item, names[0], names[1]))
         if k is None:
-            problems.append(row.mark.message("", _unknown(row, known)))
+            problems.append(row.mark.message("", _unknown(row, values_known)))
             continue
         if k in lines:
-            told = (
+            advice = (
                 f"{item} has {first}, {second} in line {lines[k].mark.line} already; remove one of"
                 " the two"
             )
-            problems.append(row.mark.message("", told))
+            problems.append(row.mark.message("", advice))
             continue
         lines[k] = row
         try:
-            values[k] = PARSERS[known[k].unit](text)
+            values[k] = PARSERS[values_known[k].unit](text)
         except QuantityError as error:
             problems.append(row.mark.message("", str(error)))
             continue
-        drawn = known[k].drawn
+        drawn = values_known[k].drawn
         if drawn is not None and not abs(values[k] - drawn) <= FAR_FROM_DRAWING * drawn:
-            told = f"{far_from_drawing(values[k], drawn)}; correct one of the two"
-            problems.append(row.mark.message("", told))
+            advice = f"{far_from_drawing(values[k], drawn)}; correct one of the two"
+            problems.append(row.mark.message("", advice))
     missing = [
-        f"{one.item} {one.first}, {one.second}" for k, one in enumerate(known) if k not in lines
+        f"{certified_value.item} {certified_value.first}, {certified_value.second}"
+        for k, certified_value in enumerate(values_known)
+        if k not in lines
     ]
     if missing and not problems:
         problems.append(Message(str(path), 1, 1, "", f"no value of {listing(missing)}; add it"))
     if problems:
         raise ExperimentError(sorted(problems)[:MOST_MESSAGES])
-    found = with_values(experiment, values)
-    wrong = [Message(str(path), 1, 1, "", text) for text in _wrong_together(found)]
+    changed = with_values(experiment, values)
+    wrong = [Message(str(path), 1, 1, "", text) for text in _wrong_together(changed)]
     if wrong:
         raise ExperimentError(wrong)
-    return replace(found, doubts=(*experiment.doubts, *_doubts_of_stars(path, found, experiment)))
+    return replace(
+        changed, doubts=(*experiment.doubts, *_doubts_of_stars(path, changed, experiment))
+    )
 
 
-def _wrong_together(found: Experiment) -> Iterator[str]:
+def _wrong_together(experiment: Experiment) -> Iterator[str]:
     """Faults of certified values of which each is possible."""
-    for one in found.calibration:
-        if text := one.doubt(found.layout_of(one)):
+    for item in experiment.calibration:
+        if text := item.doubt(experiment.layout_of(item)):
             yield text
-    plates = [name for name, one in found.artefacts.items() if one.role != "length_standard"]
-    calibrations = dict(enumerate(found.calibration))
-    for _, text in exact_contradictions(calibrations, plates, found.layouts):
+    plates = [name for name, item in experiment.artefacts.items() if item.role != "length_standard"]
+    calibrations = dict(enumerate(experiment.calibration))
+    for _, text in exact_contradictions(calibrations, plates, experiment.layouts):
         yield text
 
 
 def _doubts_of_stars(
-    path: Path | GivenText, found: Experiment, experiment: Experiment
+    path: Path | GivenText, changed_experiment: Experiment, experiment: Experiment
 ) -> Iterator[str]:
     """What is unlikely of stars whose values are those of a file, where it was not before."""
-    for k, (star, before) in enumerate(zip(found.stars, experiment.stars, strict=True)):
-        offsets = np.array([found.probes[name].offset for name in star.probes])
+    for k, (star, before) in enumerate(
+        zip(changed_experiment.stars, experiment.stars, strict=True)
+    ):
+        offsets = np.array([changed_experiment.probes[name].offset for name in star.probes])
         text = doubt_of_table(star, offsets)
         if text and text != doubt_of_table(before, offsets):
             yield f"{path}: {format_path(('stars', k))}: {text}"
 
 
-def _unknown(row: FileRow, known: list[CertifiedValue]) -> str:
+def _unknown(row: FileRow, values_known: list[CertifiedValue]) -> str:
     item, first, second, _ = row.texts
-    own = [one for one in known if one.item == item]
-    if not own:
+    of_item = [value for value in values_known if value.item == item]
+    if not of_item:
         return (
             f'the experiment has no certified "{item}";'
-            f" {hint(item, dict.fromkeys(one.item for one in known))}"
+            f" {hint(item, dict.fromkeys(value.item for value in values_known))}"
         )
-    names = [f"{one.first}, {one.second}" for one in own]
+    names = [f"{value.first}, {value.second}" for value in of_item]
     return f'{item} has no "{first}, {second}"; {hint(f"{first}, {second}", names)}'
 
 

@@ -100,7 +100,8 @@ def _table(rows: Sequence[Sequence[str]], names: int) -> str:
         start = f'{kind} scope="col"' if kind == "th" else kind
         kinds = [f'{start} class="name"' if k < names else start for k in range(len(row))]
         return "".join(
-            f"<{one}>{escaped(cell)}</{kind}>" for one, cell in zip(kinds, row, strict=True)
+            f"<{column_kind}>{escaped(cell)}</{kind}>"
+            for column_kind, cell in zip(kinds, row, strict=True)
         )
 
     head, *body = rows
@@ -113,10 +114,10 @@ def _table(rows: Sequence[Sequence[str]], names: int) -> str:
 
 def _of_distances(certificate: CertifiedBalls) -> str:
     count = len(certificate.names)
-    told = "Any distance and its uncertainty follow from co-ordinates and covariance."
+    note = "Any distance and its uncertainty follow from co-ordinates and covariance."
     if len(certificate.distances) == count * (count - 1) // 2:
-        return told
-    return f"Some of the {count * (count - 1) // 2} distances, between balls far apart. {told}"
+        return note
+    return f"Some of the {count * (count - 1) // 2} distances, between balls far apart. {note}"
 
 
 def _covariance(certificate: CertifiedBalls) -> str:

@@ -104,10 +104,10 @@ class CertifiedBalls(Result):
     def facts(self) -> dict[str, str]:
         """What is to be known beside the figures, as text."""
         k, freedom = self.coverage_factor, self.degrees_of_freedom
-        known = "uncertainties as stated in the experiment"
+        source = "uncertainties as stated in the experiment"
         if np.isfinite(freedom):
-            known = f"uncertainties scaled by the residuals, {freedom_words(int(freedom))}"
-        told = {
+            source = f"uncertainties scaled by the residuals, {freedom_words(int(freedom))}"
+        facts_told = {
             "plate": self.artefact,
             "experiment": self.heading,
             "identifier": self.identifier,
@@ -117,13 +117,15 @@ class CertifiedBalls(Result):
                 f" {number(1e6 * self.scale_uncertainty, 3)} µm/m"
             ),
             "temperature": self.temperature,
-            "uncertainty": (f"U = {k:g} u, of {100.0 * self.coverage_probability:.4g} %; {known}"),
+            "uncertainty": (f"U = {k:g} u, of {100.0 * self.coverage_probability:.4g} %; {source}"),
         }
         if self.left_out:
-            told["undetermined"] = f"no value is stated of {listing(self.left_out)}"
-        told["computed by"] = f"ballplate {version('ballplate')}"
-        given = {key: self.about[key] for key in ABOUT if self.about[key] not in ("", ABOUT[key])}
-        return told | {key: text for key, text in given.items() if key != "identifier"}
+            facts_told["undetermined"] = f"no value is stated of {listing(self.left_out)}"
+        facts_told["computed by"] = f"ballplate {version('ballplate')}"
+        facts_given = {
+            key: self.about[key] for key in ABOUT if self.about[key] not in ("", ABOUT[key])
+        }
+        return facts_told | {key: text for key, text in facts_given.items() if key != "identifier"}
 
     @property
     def notes(self) -> tuple[str, ...]:
@@ -140,21 +142,25 @@ class CertifiedBalls(Result):
         """Co-ordinates in mm with U in µm below a line of headings."""
         axes, u = "xyz"[: self.dimension], self.coverage_factor * self.standard_uncertainties
         rows = [["ball", *(f"{axis}, mm" for axis in axes), *(f"U({axis}), µm" for axis in axes)]]
-        for name, place, own in zip(self.names, self.coordinates.tolist(), u.tolist(), strict=True):
+        for name, place, uncertainties in zip(
+            self.names, self.coordinates.tolist(), u.tolist(), strict=True
+        ):
             values = [
-                to_uncertainty(1e3 * value, 1e3 * one)
-                for value, one in zip(place, own, strict=True)
+                to_uncertainty(1e3 * value, 1e3 * component)
+                for value, component in zip(place, uncertainties, strict=True)
             ]
-            rows.append([name, *values, *(number(1e6 * one, 3) for one in own)])
+            rows.append(
+                [name, *values, *(number(1e6 * component, 3) for component in uncertainties)]
+            )
         return rows
 
     def distance_table(self) -> list[list[str]]:
         """Distances in mm with U in µm below a line of headings."""
         rows = [["from", "to", "distance, mm", "U, µm"]]
-        for one in self.distances:
-            expanded = self.coverage_factor * one.standard_uncertainty
-            length = to_uncertainty(1e3 * one.length, 1e3 * expanded)
-            rows.append([*one.balls, length, number(1e6 * expanded, 3)])
+        for distance in self.distances:
+            expanded = self.coverage_factor * distance.standard_uncertainty
+            length = to_uncertainty(1e3 * distance.length, 1e3 * expanded)
+            rows.append([*distance.balls, length, number(1e6 * expanded, 3)])
         return rows
 
     def lines(self) -> list[str]:
@@ -175,20 +181,22 @@ class CertifiedBalls(Result):
             "left_out": list(self.left_out),
             "balls": {
                 name: {
-                    axis: {"value": value, "standard_uncertainty": one, "unit": "m"}
-                    for axis, value, one in zip(axes, place, own, strict=True)
+                    axis: {"value": value, "standard_uncertainty": distance, "unit": "m"}
+                    for axis, value, distance in zip(axes, place, uncertainties, strict=True)
                 }
-                for name, place, own in zip(self.names, self.coordinates.tolist(), u, strict=True)
+                for name, place, uncertainties in zip(
+                    self.names, self.coordinates.tolist(), u, strict=True
+                )
             },
             "covariance": {"unit": "m^2", "values": self.covariance.tolist()},
             "distances": [
                 {
-                    "balls": list(one.balls),
-                    "value": one.length,
-                    "standard_uncertainty": one.standard_uncertainty,
+                    "balls": list(distance.balls),
+                    "value": distance.length,
+                    "standard_uncertainty": distance.standard_uncertainty,
                     "unit": "m",
                 }
-                for one in self.distances
+                for distance in self.distances
             ],
             "notes": list(self.notes),
         }

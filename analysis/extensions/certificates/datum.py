@@ -42,12 +42,16 @@ class Datum:
         """What defines the axes, as text."""
         if self.axes is None:
             return "all balls as close as possible to where they are drawn (least squares)"
-        told = axes_words(self.axes, tuple(names))
-        return told if self.plane is None else f"{told}, xy plane through ball {names[self.plane]}"
+        definition = axes_words(self.axes, tuple(names))
+        return (
+            definition
+            if self.plane is None
+            else f"{definition}, xy plane through ball {names[self.plane]}"
+        )
 
 
 def chosen_datum(
-    layout: BallLayout, dimension: int, chosen: Sequence[str], stated: PlateAxes | None = None
+    layout: BallLayout, dimension: int, chosen: Sequence[str], axes_stated: PlateAxes | None = None
 ) -> Datum:
     """The datum that names choose: none for that of the layout, "all", or as many balls as there
     are dimensions, first the origin, then one on an axis, then one in the xy plane.
@@ -64,23 +68,23 @@ def chosen_datum(
     if list(chosen) == ["all"]:
         return Datum(None)
     if not chosen:
-        axes = stated or plate_axes(layout)
+        axes = axes_stated or plate_axes(layout)
         if axes is None or axes.ball == axes.origin:
             raise ValueError("its balls are drawn above one another; no x or y axis goes through")
         return Datum(axes, _farthest_from(drawn, axes) if dimension == 3 else None)
     if len(chosen) != dimension or len(set(chosen)) != len(chosen):
-        told = "the origin, one on an axis" + (" and one in the xy plane" * (dimension == 3))
-        raise ValueError(f"{', '.join(chosen)}: name {dimension} different balls, {told}, or all")
+        needed = "the origin, one on an axis" + (" and one in the xy plane" * (dimension == 3))
+        raise ValueError(f"{', '.join(chosen)}: name {dimension} different balls, {needed}, or all")
     for name in chosen:
         if name not in names:
             raise ValueError(f'no ball "{name}"; {hint(name, names)}')
-    origin, ball, *others = (names.index(name) for name in chosen)
+    origin, ball, *further_balls = (names.index(name) for name in chosen)
     along = drawn[ball, :2] - drawn[origin, :2]
     if not along.any():
         raise ValueError(f"{chosen[0]} and {chosen[1]} are drawn above one another; name others")
     axis = int(np.abs(along).argmax())
     axes = PlateAxes(origin, ball, axis, -1.0 if along[axis] < 0.0 else 1.0)
-    plane = others[0] if others else None
+    plane = further_balls[0] if further_balls else None
     if plane is not None and not _is_apart(drawn, axes)[plane]:
         raise ValueError(f"{', '.join(chosen)} are in line; name three balls that are not")
     return Datum(axes, plane)
@@ -157,9 +161,9 @@ def _conditions(datum: Datum, d: int) -> list[int]:
     """Indices among all co-ordinates of those that are zero by definition."""
     axes = datum.axes
     assert axes is not None
-    found = [d * axes.origin + axis for axis in range(d)]
-    found += [d * axes.ball + axis for axis in range(d) if axis != axes.axis]
-    return found if datum.plane is None else [*found, d * datum.plane + 2]
+    conditions = [d * axes.origin + axis for axis in range(d)]
+    conditions += [d * axes.ball + axis for axis in range(d) if axis != axes.axis]
+    return conditions if datum.plane is None else [*conditions, d * datum.plane + 2]
 
 
 def relative_to(datum: Datum, coordinates: Array, displacements: Array) -> Array:

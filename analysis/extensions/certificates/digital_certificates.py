@@ -113,14 +113,16 @@ def read_digital_certificate(path: Path) -> tuple[str, tuple[DigitalResult, ...]
         raise root.mark.refused(text)
     version = root.attributes.get("schemaVersion", "")
     if version.partition(".")[0] not in VERSIONS:
-        told = f'schemaVersion is "{shorten(version)}"' if version else "there is no schemaVersion"
-        raise root.mark.refused(f"{told}; versions 2.x and 3.x are read")
+        problem = (
+            f'schemaVersion is "{shorten(version)}"' if version else "there is no schemaVersion"
+        )
+        raise root.mark.refused(f"{problem}; versions 2.x and 3.x are read")
     results = []
     for measurement in root.walk():
         if measurement.name == "measurementResult":
             temperatures = tuple(_temperatures(measurement))
-            for one in measurement.all("results", "result"):
-                results.append(_result(one, temperatures))
+            for result in measurement.all("results", "result"):
+                results.append(_result(result, temperatures))
     if not results:
         raise root.mark.refused("has no result")
     return version, tuple(results)
@@ -128,8 +130,8 @@ def read_digital_certificate(path: Path) -> tuple[str, tuple[DigitalResult, ...]
 
 def _names(element: Element) -> tuple[str, ...]:
     """What an element is called in all languages, its label, and its identifier."""
-    texts = [one.text for one in element.all("name", "content")]
-    texts += [one.text for one in element.all("label")]
+    texts = [label_text.text for label_text in element.all("name", "content")]
+    texts += [label_text.text for label_text in element.all("label")]
     texts.append(element.attributes.get("id", ""))
     return tuple(dict.fromkeys(text for text in texts if text))
 
@@ -139,9 +141,9 @@ def _temperatures(measurement: Element) -> Iterator[tuple[str, float]]:
         if condition.name != "influenceCondition":
             continue
         name = next(iter(_names(condition)), condition.attributes.get("refType", "condition"))
-        for one in condition.walk():
-            if one.name == "real":
-                value = celsius(_plain(one.text_at("value")), one.text_at("unit"))
+        for element in condition.walk():
+            if element.name == "real":
+                value = celsius(_plain(element.text_at("value")), element.text_at("unit"))
                 if value is not None and math.isfinite(value):
                     yield name, value
 
@@ -152,23 +154,23 @@ def _result(element: Element, temperatures: tuple[tuple[str, float], ...]) -> Di
     data = element.first("data")
     for part in _parts(data, ()) if data is not None else ():
         block = part.block
-        found = list(_values(block, part.contexts, part.labels))
+        values = list(_values(block, part.contexts, part.labels))
         if part.is_relative:
             # What is stated in the unit of the values as well says the same, and of which kind.
-            found = [
-                replace(one, problem=RELATIVE)
-                if math.isnan(one.uncertainty) and not one.problem
-                else one
-                for one in found
+            values = [
+                replace(item, problem=RELATIVE)
+                if math.isnan(item.uncertainty) and not item.problem
+                else item
+                for item in values
             ]
         start = len(lengths)
-        lengths += found
-        matrix = _matrix(block, len(found)) if _is_length(block) else None
+        lengths += values
+        matrix = _matrix(block, len(values)) if _is_length(block) else None
         if matrix is not None:
-            matrices.append((tuple(range(start, start + len(found))), matrix))
+            matrices.append((tuple(range(start, start + len(values))), matrix))
     return DigitalResult(
         element.mark,
-        tuple(one.text for one in element.all("name", "content") if one.text),
+        tuple(item.text for item in element.all("name", "content") if item.text),
         element.attributes.get("id", ""),
         element.attributes.get("refType", ""),
         tuple(lengths),
@@ -193,20 +195,22 @@ def _parts(
     element: Element, contexts: tuple[str, ...], labels: tuple[tuple[str, ...], ...] = ()
 ) -> Iterator[_Part]:
     """Values and lists of values below an element."""
-    for one in element.children:
-        if one.name in REALS:
-            yield _Part(one, contexts, labels)
-        elif one.name in ("quantity", "list", "hybrid"):
+    for child in element.children:
+        if child.name in REALS:
+            yield _Part(child, contexts, labels)
+        elif child.name in ("quantity", "list", "hybrid"):
             beside = labels
-            if one.name == "list":
-                texts = [each.text.split() for each in one.all("quantity", "charsXMLList")]
+            if child.name == "list":
+                texts = [
+                    inner_part.text.split() for inner_part in child.all("quantity", "charsXMLList")
+                ]
                 beside = (*labels, *map(tuple, texts))
-            inner = list(_parts(one, (*contexts, *_names(one)), beside))
-            if one.first("relativeUncertainty") is not None:
+            inner = list(_parts(child, (*contexts, *_names(child)), beside))
+            if child.first("relativeUncertainty") is not None:
                 inner = [replace(part, is_relative=True) for part in inner]
             # All parts of a hybrid are one quantity in several units.
-            in_metres = [each for each in inner if _is_length(each.block)]
-            yield from (in_metres or inner)[:1] if one.name == "hybrid" else inner
+            in_metres = [inner_part for inner_part in inner if _is_length(inner_part.block)]
+            yield from (in_metres or inner)[:1] if child.name == "hybrid" else inner
 
 
 NO_LENGTH = "is no length"
@@ -219,7 +223,7 @@ RELATIVE = (
 def _units(block: Element) -> list[str]:
     if block.name == "realList":
         common = block.text_at("listUnit")
-        return [one.text_at("unit") or common for one in block.all("real")]
+        return [unit_element.text_at("unit") or common for unit_element in block.all("real")]
     name = f"unit{LIST}" if block.name.endswith(LIST) else "unit"
     texts = block.text_at(name)
     return texts.split() if block.name.endswith(LIST) else [texts]
@@ -237,32 +241,37 @@ def _values(
 ) -> Iterator[DigitalValue]:
     """The values of a real, or of a list, which has labels of its own or `beside` it."""
     if block.name == "real":
-        stated = _uncertainty(block)
+        uncertainty = _uncertainty(block)
         yield _value(
-            block.mark, _names(block), contexts, block.text_at("value"), _units(block)[0], stated
+            block.mark,
+            _names(block),
+            contexts,
+            block.text_at("value"),
+            _units(block)[0],
+            uncertainty,
         )
         return
     if block.name == "realList":
         common = _uncertainty(block)
         inside = (*contexts, *_names(block))
-        for one, unit in zip(block.all("real"), _units(block), strict=True):
-            stated = _uncertainty(one) or common
-            yield _value(one.mark, _names(one), inside, one.text_at("value"), unit, stated)
+        for real, unit in zip(block.all("real"), _units(block), strict=True):
+            uncertainty = _uncertainty(real) or common
+            yield _value(real.mark, _names(real), inside, real.text_at("value"), unit, uncertainty)
         return
     values = block.text_at(f"value{LIST}").split()
     labels = block.text_at(f"label{LIST}").split()
     units = _units(block)
-    stated = _uncertainty(block)
+    uncertainty = _uncertainty(block)
     for k, value in enumerate(values[: MOST_NAMES + 1]):
-        own: tuple[str, ...] = (labels[k],) if len(labels) == len(values) else ()
+        labels_of_value: tuple[str, ...] = (labels[k],) if len(labels) == len(values) else ()
         if not labels:
-            texts = [each[k] for each in beside if len(each) == len(values)]
-            own = tuple(dict.fromkeys((" ".join(texts), *texts))) if texts else ()
+            texts = [neighbour[k] for neighbour in beside if len(neighbour) == len(values)]
+            labels_of_value = tuple(dict.fromkeys((" ".join(texts), *texts))) if texts else ()
         own_unit = _one_of(units, k, len(values))
         if own_unit is None:
             yield DigitalValue(
                 block.mark,
-                own,
+                labels_of_value,
                 contexts,
                 math.nan,
                 math.nan,
@@ -271,13 +280,16 @@ def _values(
             )
             continue
         mine = None
-        if stated is not None:
-            amounts = _one_of(stated.amounts, k, len(values))
-            factors = _one_of(stated.factors, k, len(values)) if stated.factors else ""
+        if uncertainty is not None:
+            amounts = _one_of(uncertainty.amounts, k, len(values))
+            factors = _one_of(uncertainty.factors, k, len(values)) if uncertainty.factors else ""
             mine = _Uncertainty(
-                stated.mark, stated.is_expanded, [amounts or ""], [factors] if factors else []
+                uncertainty.mark,
+                uncertainty.is_expanded,
+                [amounts or ""],
+                [factors] if factors else [],
             )
-        yield _value(block.mark, own, contexts, value, own_unit, mine)
+        yield _value(block.mark, labels_of_value, contexts, value, own_unit, mine)
 
 
 def _one_of(texts: list[str], k: int, count: int) -> str | None:
@@ -298,16 +310,16 @@ class _Uncertainty:
 
 
 def _uncertainty(block: Element) -> _Uncertainty | None:
-    for one in block.children:
-        if one.name.removesuffix(LIST) not in UNCERTAINTIES:
+    for child in block.children:
+        if child.name.removesuffix(LIST) not in UNCERTAINTIES:
             continue
-        inner = {each.name.removesuffix(LIST): each for each in one.walk()}
+        inner = {element.name.removesuffix(LIST): element for element in child.walk()}
         factors = inner["coverageFactor"].text.split() if "coverageFactor" in inner else []
         for names, is_expanded in ((EXPANDED, True), (STANDARD, False)):
             for name in names:
                 if name in inner:
-                    return _Uncertainty(one.mark, is_expanded, inner[name].text.split(), factors)
-        return _Uncertainty(one.mark, True, [""], factors)
+                    return _Uncertainty(child.mark, is_expanded, inner[name].text.split(), factors)
+        return _Uncertainty(child.mark, True, [""], factors)
     return None
 
 
@@ -317,7 +329,7 @@ def _value(
     contexts: tuple[str, ...],
     value: str,
     unit: str,
-    stated: _Uncertainty | None,
+    uncertainty: _Uncertainty | None,
 ) -> DigitalValue:
     nothing = DigitalValue(mark, names, contexts, math.nan, math.nan, 1.0, NO_LENGTH)
     try:
@@ -328,18 +340,20 @@ def _value(
         return DigitalValue(mark, names, contexts, math.nan, math.nan, 1.0, f"{NO_LENGTH}: {error}")
     try:
         length = metres_or_radians(value, factor)
-        if stated is None:
+        if uncertainty is None:
             return DigitalValue(mark, names, contexts, length, math.nan, 1.0)
-        amount = metres_or_radians(stated.amounts[0] if stated.amounts else "", factor)
+        amount = metres_or_radians(uncertainty.amounts[0] if uncertainty.amounts else "", factor)
     except QuantityError as error:
         return DigitalValue(mark, names, contexts, math.nan, math.nan, 1.0, str(error))
     k, problem = 1.0, ""
-    if stated.is_expanded:
-        k = _plain(stated.factors[0]) if stated.factors else math.nan
-        if not stated.factors:
+    if uncertainty.is_expanded:
+        k = _plain(uncertainty.factors[0]) if uncertainty.factors else math.nan
+        if not uncertainty.factors:
             problem = "has an expanded uncertainty without a coverage factor"
         elif not 0.0 < k < math.inf:
-            problem = f'has the coverage factor "{shorten(stated.factors[0])}"; it must be above 0'
+            problem = (
+                f'has the coverage factor "{shorten(uncertainty.factors[0])}"; it must be above 0'
+            )
     if amount < 0.0:
         problem = "has an uncertainty below zero"
     u = math.nan if problem else amount / k
@@ -351,22 +365,24 @@ def _matrix(block: Element, count: int) -> NamedMatrix | None:
 
     :raises ExperimentError: it is of another size, has other units, or is no covariance.
     """
-    region = next((one for one in block.children if one.name.removesuffix(LIST) in REGIONS), None)
+    region = next(
+        (element for element in block.children if element.name.removesuffix(LIST) in REGIONS), None
+    )
     if region is None:
         return None
     if count > MOST_NAMES:
         text = f"a covariance of {count} values; at most {MOST_NAMES} are possible"
         raise region.mark.refused(text)
-    columns = [one for one in region.walk() if one.name.removesuffix(LIST) == "column"]
+    columns = [element for element in region.walk() if element.name.removesuffix(LIST) == "column"]
     values, rounding = np.zeros((count, count)), np.zeros((count, count))
     marks, factors = [], set[float]()
     for k, column in enumerate(columns):
         marks.append(column.mark)
         numbers, units = list[str](), list[str]()
         for entry in column.children:
-            for each in entry.children:
-                texts = each.text.split()
-                (numbers if each.name.startswith("value") else units).extend(texts)
+            for cell in entry.children:
+                texts = cell.text.split()
+                (numbers if cell.name.startswith("value") else units).extend(texts)
         if len(columns) != count or len(numbers) != count:
             text = (
                 f"a covariance of {len(columns)} columns, this one of {len(numbers)} entries, for"
@@ -385,11 +401,11 @@ def _matrix(block: Element, count: int) -> NamedMatrix | None:
                 raise column.mark.refused(text)
     names = tuple(f"value {k + 1}" for k in range(count))
     unit = unit_of_area(factors.pop()) if len(factors) == 1 else "um"
-    found = NamedMatrix(names, values, rounding, False, tuple(marks), unit)
-    wrong: list[Message] = matrix_problems(found)
+    matrix = NamedMatrix(names, values, rounding, False, tuple(marks), unit)
+    wrong: list[Message] = matrix_problems(matrix)
     if wrong:
         raise ExperimentError(wrong)
-    return found
+    return matrix
 
 
 def _plain(text: str) -> float:

@@ -56,8 +56,8 @@ def digital_certificate(certificate: CertifiedBalls) -> str:
 
 
 def _told(certificate: CertifiedBalls) -> list[str]:
-    said = [f"{key}: {text}" for key, text in certificate.facts.items()]
-    return [*said, *certificate.notes]
+    comments = [f"{key}: {text}" for key, text in certificate.facts.items()]
+    return [*comments, *certificate.notes]
 
 
 def _text(text: str) -> str:
@@ -72,7 +72,7 @@ def _name(text: str) -> str:
     return f"<dcc:name>{_content(text)}</dcc:name>"
 
 
-def _dates(stated: str) -> tuple[str, str]:
+def _dates(text: str) -> tuple[str, str]:
     """The first and the last day of a measurement.
 
     :raises ValueError: they are not stated, or are no dates.
@@ -80,26 +80,29 @@ def _dates(stated: str) -> tuple[str, str]:
     >>> _dates("2026-11-02/2026-11-03")
     ('2026-11-02', '2026-11-03')
     """
-    first, _, last = stated.partition("/")
+    first, _, last = text.partition("/")
     try:
-        found = date.fromisoformat(first.strip()), date.fromisoformat((last or first).strip())
+        start_and_end = (
+            date.fromisoformat(first.strip()),
+            date.fromisoformat((last or first).strip()),
+        )
     except ValueError:
-        told = f'"{stated}" is no date' if stated else "a DCC states when the plate was measured"
+        problem = f'"{text}" is no date' if text else "a DCC states when the plate was measured"
         raise ValueError(
-            f"{told}; state it as date, such as 2026-11-02 or 2026-11-02/2026-11-03"
+            f"{problem}; state it as date, such as 2026-11-02 or 2026-11-02/2026-11-03"
         ) from None
-    if found[0] > found[1]:
-        raise ValueError(f"date {stated} ends before it begins")
-    return found[0].isoformat(), found[1].isoformat()
+    if start_and_end[0] > start_and_end[1]:
+        raise ValueError(f"date {text} ends before it begins")
+    return start_and_end[0].isoformat(), start_and_end[1].isoformat()
 
 
 def _administrative(certificate: CertifiedBalls) -> str:
     about = certificate.about
     first, last = _dates(about["date"])
     if not re.fullmatch("[A-Z]{2}", about["country"]):
-        told = f'"{about["country"]}" is none' if about["country"] else "it is not stated"
+        problem = f'"{about["country"]}" is none' if about["country"] else "it is not stated"
         raise ValueError(
-            f"a DCC states the country by its two capital letters, such as country=DE; {told}"
+            f"a DCC states the country by its two capital letters, such as country=DE; {problem}"
         )
     issuer, value = "owner", about["serial number"]
     where = f"<dcc:location><dcc:city>{_text(about['city'])}</dcc:city></dcc:location>"
@@ -158,9 +161,9 @@ def _coordinates(certificate: CertifiedBalls) -> str:
     entries = [
         "<si:column>"
         + "".join(
-            f"<si:covariance><si:value>{scaled(one, 6)}</si:value><si:unit>{SQUARE}</si:unit>"
+            f"<si:covariance><si:value>{scaled(value, 6)}</si:value><si:unit>{SQUARE}</si:unit>"
             "</si:covariance>"
-            for one in column
+            for value in column
         )
         + "</si:column>"
         for column in covariance.T.tolist()
@@ -190,30 +193,36 @@ def _ellipsoid_factor(certificate: CertifiedBalls) -> str:
 
 
 def _list(
-    certificate: CertifiedBalls, names: list[str], values: np.ndarray, u: np.ndarray, rest: str
+    certificate: CertifiedBalls,
+    names: list[str],
+    values: np.ndarray,
+    u: np.ndarray,
+    units_text: str,
 ) -> str:
     k = certificate.coverage_factor
     return (
         f"<si:realListXMLList>\n<si:labelXMLList>{_labels(names)}</si:labelXMLList>\n"
-        f"<si:valueXMLList>{' '.join(scaled(one, 3) for one in values.tolist())}"
+        f"<si:valueXMLList>{' '.join(scaled(value, 3) for value in values.tolist())}"
         f"</si:valueXMLList>\n<si:unitXMLList>{MILLIMETRE}</si:unitXMLList>\n"
         f"<si:expandedUncXMLList><si:uncertaintyXMLList>"
-        f"{' '.join(scaled(k * one, 3) for one in u.tolist())}</si:uncertaintyXMLList>"
+        f"{' '.join(scaled(k * value, 3) for value in u.tolist())}</si:uncertaintyXMLList>"
         f"<si:coverageFactorXMLList>{k:g}</si:coverageFactorXMLList><si:coverageProbabilityXMLList>"
         f"{certificate.coverage_probability:.6f}</si:coverageProbabilityXMLList>"
-        f"</si:expandedUncXMLList>\n{rest}</si:realListXMLList>"
+        f"</si:expandedUncXMLList>\n{units_text}</si:realListXMLList>"
     )
 
 
 def _distances(certificate: CertifiedBalls) -> str:
-    known = [one for one in certificate.distances if np.isfinite(one.standard_uncertainty)]
-    if not known:
+    finite_distances = [
+        distance for distance in certificate.distances if np.isfinite(distance.standard_uncertainty)
+    ]
+    if not finite_distances:
         return ""
     values = _list(
         certificate,
-        [" ".join(one.balls) for one in known],
-        np.array([one.length for one in known]),
-        np.array([one.standard_uncertainty for one in known]),
+        [" ".join(distance.balls) for distance in finite_distances],
+        np.array([distance.length for distance in finite_distances]),
+        np.array([distance.standard_uncertainty for distance in finite_distances]),
         "",
     )
     return (

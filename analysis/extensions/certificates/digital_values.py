@@ -50,33 +50,40 @@ def read_digital(
     except ExperimentError as error:
         problems.take(error, place)
         return None
-    labels = listing(one.label for one in results)
-    chosen = [one for one in results if settings.result is None or one.is_called(settings.result)]
+    labels = listing(digital_result.label for digital_result in results)
+    chosen = [
+        digital_result
+        for digital_result in results
+        if settings.result is None or digital_result.is_called(settings.result)
+    ]
     if not chosen or settings.result is not None and len(chosen) > 1:
         many = "several results are" if chosen else "no result is"
         text = f'{path.name}: {many} called "{shorten(settings.result)}"; it has {labels}'
         problems.add((*steps, "result"), text)
         return None
     forms = _forms(wanted)
-    by_result = [_matched(one, forms) for one in chosen]
-    full = [k for k, found in enumerate(by_result) if len(found) == len(wanted)]
+    by_result = [_matched(digital_result, forms) for digital_result in chosen]
+    full = [k for k, matches in enumerate(by_result) if len(matches) == len(wanted)]
     if len(full) > 1:
-        told = listing(chosen[k].label for k in full)
-        text = f"{path.name}: {len(full)} results have these values: {told}; say which with result:"
+        labels_listed = listing(chosen[k].label for k in full)
+        text = (
+            f"{path.name}: {len(full)} results have these values: {labels_listed};"
+            " say which with result:"
+        )
         problems.add(place, text)
         return None
     best = full[0] if full else max(range(len(chosen)), key=lambda k: len(by_result[k]))
-    result, found = chosen[best], by_result[best]
+    result, matches = chosen[best], by_result[best]
     if not full:
-        text = _nothing_found(result, found, wanted, is_pair)
+        text = _nothing_found(result, matches, wanted, is_pair)
         problems.add(place, f"{path.name}: {text}; it has {labels}")
         return None
     before = len(problems.messages)
     entries = []
     for k, names in enumerate(wanted):
-        values = [result.lengths[i] for i in found[k]]
+        values = [result.lengths[i] for i in matches[k]]
         if len(values) > 1:
-            lines = listing(str(one.mark.line) for one in values)
+            lines = listing(str(digital_result.mark.line) for digital_result in values)
             text = f"{value_name(names, is_pair)} has several values, in lines {lines}"
             problems.add_at(values[1].mark, place, text)
         # Who states the uncertainty needs none of the file.
@@ -89,11 +96,11 @@ def read_digital(
         )
     if len(problems.messages) > before:
         return None
-    covariance = matrix_of(result, [found[k][0] for k in range(len(wanted))])
+    covariance = matrix_of(result, [matches[k][0] for k in range(len(wanted))])
     _tell(
         version,
         result,
-        [result.lengths[found[k][0]] for k in range(len(wanted))],
+        [result.lengths[matches[k][0]] for k in range(len(wanted))],
         settings,
         covariance is not None,
         place,
@@ -112,14 +119,14 @@ def _tell(
     references: References,
 ) -> None:
     """Say which result was taken, and the temperature that it is stated for."""
-    factors = sorted({f"{one.factor:g}" for one in values if not math.isnan(one.uncertainty)})
-    told = f"DCC {version}, result {result.label}: {len(values)} values"
-    told += f", k = {listing(factors)}" if factors else ""
-    told += ", with their covariance" if correlated else ""
+    factors = sorted({f"{value.factor:g}" for value in values if not math.isnan(value.uncertainty)})
+    line = f"DCC {version}, result {result.label}: {len(values)} values"
+    line += f", k = {listing(factors)}" if factors else ""
+    line += ", with their covariance" if correlated else ""
     for name, degrees in result.temperatures:
-        told += f"; {shorten(name)} {degrees:.4g} °C"
-    references.problems.note(steps, f"{settings.values}: {told}")
-    away = [one for _, one in result.temperatures if abs(one - REFERENCE_TEMPERATURE) > 0.5]
+        line += f"; {shorten(name)} {degrees:.4g} °C"
+    references.problems.note(steps, f"{settings.values}: {line}")
+    away = [value for _, value in result.temperatures if abs(value - REFERENCE_TEMPERATURE) > 0.5]
     if away:
         text = (
             f"{settings.values} states a temperature of {away[0]:.4g} °C; its values are taken as"
@@ -130,19 +137,23 @@ def _tell(
 
 def _nothing_found(
     result: DigitalResult,
-    found: dict[int, list[int]],
+    matches: dict[int, list[int]],
     wanted: Sequence[tuple[str, str]],
     is_pair: bool,
 ) -> str:
     missing = listing(
-        value_name(names, is_pair) for k, names in enumerate(wanted) if k not in found
+        value_name(names, is_pair) for k, names in enumerate(wanted) if k not in matches
     )
-    if found:
+    if matches:
         return f"result {result.label} has no value of {missing}"
-    known = list(dict.fromkeys(name for one in result.lengths for name in one.names))
+    names_known = list(dict.fromkeys(name for length in result.lengths for name in length.names))
     example = " ".join(wanted[0])
-    told = f"its values are called {listing(known)}" if known else "its values have no names"
-    return f'no result has values of these balls, called for example "{example}"; {told}'
+    names_text = (
+        f"its values are called {listing(names_known)}"
+        if names_known
+        else "its values have no names"
+    )
+    return f'no result has values of these balls, called for example "{example}"; {names_text}'
 
 
 def _words(text: str) -> tuple[str, ...]:
@@ -160,13 +171,13 @@ def _forms(wanted: Sequence[tuple[str, str]]) -> dict[tuple[str, ...], int]:
 
 def _matched(result: DigitalResult, forms: dict[tuple[str, ...], int]) -> dict[int, list[int]]:
     """Places of the values of a result by what is wanted."""
-    found: dict[int, list[int]] = {}
-    for i, one in enumerate(result.lengths):
-        texts = [*one.names, *one.contexts]
-        texts += [f"{own} {about}" for own in one.names for about in one.contexts]
+    matches: dict[int, list[int]] = {}
+    for i, length in enumerate(result.lengths):
+        texts = [*length.names, *length.contexts]
+        texts += [f"{name} {about}" for name in length.names for about in length.contexts]
         tried = [_words(text) for text in texts]
         tried += [tuple(word for word in words if word not in IDLE) for words in tried]
         k = next((forms[words] for words in tried if words in forms), None)
         if k is not None:
-            found.setdefault(k, []).append(i)
-    return found
+            matches.setdefault(k, []).append(i)
+    return matches

@@ -36,7 +36,7 @@ def length_factor(unit: str, power: int = 1) -> Fraction:
     >>> length_factor(r"\milli\metre"), length_factor(r"\micro\metre\tothe{2}", 2)
     (Fraction(1, 1000), Fraction(1, 1000000000000))
     """
-    factor, found, prefix, start = Fraction(1), 0, 0, 0
+    factor, exponent, prefix, start = Fraction(1), 0, 0, 0
     last = Fraction(1)
     text = unit.strip()
     for match in _TOKEN.finditer(text):
@@ -48,18 +48,18 @@ def length_factor(unit: str, power: int = 1) -> Fraction:
             prefix += PREFIXES[name]
         elif name in METRES and number is None:
             last = Fraction(10) ** prefix
-            factor, found, prefix = factor * last, found + 1, 0
-        elif name == "tothe" and number is not None and found and not prefix:
+            factor, exponent, prefix = factor * last, exponent + 1, 0
+        elif name == "tothe" and number is not None and exponent and not prefix:
             times = int(number) - 1
-            factor, found = factor * last**times, found + times
+            factor, exponent = factor * last**times, exponent + times
         else:
             break
     else:
-        if start == len(text) and found == power and not prefix:
+        if start == len(text) and exponent == power and not prefix:
             return factor
-    what = "a length" if power == 1 else "the square of a length"
+    quantity = "a length" if power == 1 else "the square of a length"
     example = r"\milli\metre" if power == 1 else r"\micro\metre\tothe{2}"
-    raise QuantityError(f'the unit "{shorten(unit)}" is none of {what}, such as {example}')
+    raise QuantityError(f'the unit "{shorten(unit)}" is none of {quantity}, such as {example}')
 
 
 def celsius(value: float, unit: str) -> float | None:

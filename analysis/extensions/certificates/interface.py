@@ -31,6 +31,6 @@ def certificate(
     ensure_type(bool, "True or False", exact=exact)
     chosen = experiment_of(experiment)
     certificate_files.ensure_certified(chosen)
-    found = certificate_files.with_drawn_values(chosen, simulated_readings(chosen, seed, exact))
-    rows = certificate_files.certificate_rows(found)
+    drawn = certificate_files.with_drawn_values(chosen, simulated_readings(chosen, seed, exact))
+    rows = certificate_files.certificate_rows(drawn)
     return pandas.DataFrame(rows, columns=list(certificate_files.COLUMNS))

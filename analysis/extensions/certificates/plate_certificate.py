@@ -117,7 +117,7 @@ def plate_certificate(
         lengths, or nothing its co-ordinates.
     :raises ValueError: the fit has not converged, balls that define no axes, or an unknown key.
     """
-    experiment, at = fit.experiment, fit.functions.at
+    experiment, linearisation = fit.experiment, fit.functions.at
     assert experiment is not None
     if fit.without_scatter:
         raise ValueError(
@@ -134,40 +134,40 @@ def plate_certificate(
         most = MOST_NAMES // d
         text = f"{len(layout.names)} balls are too many for a covariance of all; at most {most}"
         raise refused(experiment.source, text, f"artefacts.{name}")
-    stated = plate_axes(layout, experiment.artefacts[name].axes) if d == 2 else None
-    chosen = chosen_datum(layout, d, datum, stated)
-    index = at.design.balls.of(at.design.artefacts.names.index(name))
-    coordinates, root, is_open = _in_axes(at, layout, index, chosen)
-    known = np.flatnonzero(~is_open.any(axis=1))
-    if not len(known) or is_open[_datum_balls(chosen)].any():
-        distances = _distances(at, index, layout.names, fit.sigma)
+    axes_stated = plate_axes(layout, experiment.artefacts[name].axes) if d == 2 else None
+    chosen = chosen_datum(layout, d, datum, axes_stated)
+    index = linearisation.design.balls.of(linearisation.design.artefacts.names.index(name))
+    coordinates, root, is_open = _in_axes(linearisation, layout, index, chosen)
+    determined = np.flatnonzero(~is_open.any(axis=1))
+    if not len(determined) or is_open[_datum_balls(chosen)].any():
+        distances = _distances(linearisation, index, layout.names, fit.sigma)
         text = _undetermined(is_open, layout, distances)
         raise refused(experiment.source, text, "calibration")
-    coordinates, root = coordinates[known], fit.sigma * root[known]
+    coordinates, root = coordinates[determined], fit.sigma * root[determined]
     coordinates[np.abs(coordinates) < ROUNDING] = 0.0
     root[np.linalg.norm(root, axis=2) < ROUNDING] = 0.0
-    temperature, told = _temperature(experiment, name)
-    carriers = _carriers(experiment, at, name)
-    flat = root.reshape(len(known) * d, -1)
+    temperature, temperature_text = _temperature(experiment, name)
+    carriers = _carriers(experiment, linearisation, name)
+    flat = root.reshape(len(determined) * d, -1)
     centred = coordinates - coordinates.mean(axis=0)
     by_scale = np.einsum("nd,ndr->r", centred, root) / (centred**2).sum()
     freedom = float(fit.degrees_of_freedom) if fit.sigma_is_estimated else np.inf
-    names = tuple(layout.names[k] for k in known)
+    names = tuple(layout.names[k] for k in determined)
     return PlateCertificate(
         fit.label,
         fit.title,
         name,
         chosen.words(layout.names),
         names,
-        layout.coordinates[known, :d],
+        layout.coordinates[determined, :d],
         coordinates,
         flat @ flat.T,
-        _distances(at, index[known], names, fit.sigma),
+        _distances(linearisation, index[determined], names, fit.sigma),
         tuple(layout.names[k] for k in np.flatnonzero(is_open.any(axis=1))),
         carriers,
         float(np.linalg.norm(by_scale)),
         temperature,
-        told,
+        temperature_text,
         coverage_factor or expansion(experiment.coverage_factor),
         freedom,
         _remarks(fit, experiment, name, carriers),
@@ -178,21 +178,21 @@ def plate_certificate(
 
 def _fingerprint(fit: CertifiedFit, experiment: Experiment, plate: str, datum: str) -> str:
     """SHA-256 of what a certificate comes from."""
-    said = [
+    contents = [
         data_of(fit.observed).sha256,
         to_python(experiment.tree),
         plate,
         datum,
         fit.sigma == 1.0,
     ]
-    return hashlib.sha256(json.dumps(said, default=str, sort_keys=True).encode()).hexdigest()
+    return hashlib.sha256(json.dumps(contents, default=str, sort_keys=True).encode()).hexdigest()
 
 
 def _plate_name(experiment: Experiment, plate: str | None) -> str:
     plates = [
         name
-        for name, one in experiment.artefacts.items()
-        if one.role == "plate" and len(experiment.layouts[name].names) > 1
+        for name, artefact in experiment.artefacts.items()
+        if artefact.role == "plate" and len(experiment.layouts[name].names) > 1
     ]
     if plate is None and len(plates) == 1:
         return plates[0]
@@ -208,17 +208,17 @@ def _plate_name(experiment: Experiment, plate: str | None) -> str:
 
 
 def _in_axes(
-    at: Linearisation, layout: BallLayout, index: Integers, datum: Datum
+    linearisation: Linearisation, layout: BallLayout, index: Integers, datum: Datum
 ) -> tuple[Array, Array, Array]:
     """Co-ordinates (n, d) in a datum, a square root (n, d, r) of their covariance, and which of
     them (n, d) are undetermined.
     """
-    moved = displacements(at, BallPlaces(index))
+    moved = displacements(linearisation, BallPlaces(index))
     n, d = moved.places.shape
     drawn = layout.coordinates[:, :d]
-    own = np.zeros((n, d, n, d))
-    own[np.arange(n), :, np.arange(n)] = moved.own
-    root = np.concatenate([moved.common, own.reshape(n, d, n * d)], axis=2)
+    rotation_blocks = np.zeros((n, d, n, d))
+    rotation_blocks[np.arange(n), :, np.arange(n)] = moved.own
+    root = np.concatenate([moved.common, rotation_blocks.reshape(n, d, n * d)], axis=2)
     coordinates, rotation = in_datum(moved.places, datum, drawn)
     root = relative_to(datum, coordinates, np.einsum("ij,njr->nir", rotation, root))
     as_drawn, turn = in_datum(moved.drawn, datum, drawn)
@@ -230,13 +230,13 @@ def _in_axes(
 def _datum_balls(datum: Datum) -> list[int]:
     if datum.axes is None:
         return []
-    found = [datum.axes.origin, datum.axes.ball]
-    return found if datum.plane is None else [*found, datum.plane]
+    datum_balls = [datum.axes.origin, datum.axes.ball]
+    return datum_balls if datum.plane is None else [*datum_balls, datum.plane]
 
 
 def _undetermined(is_open: Array, layout: BallLayout, distances: tuple[PlateDistance, ...]) -> str:
     """Why there is no certificate, as text."""
-    if all(np.isnan(one.standard_uncertainty) for one in distances):
+    if all(np.isnan(distance.standard_uncertainty) for distance in distances):
         return (
             "the readings and what is known determine no lengths of the plate, so that there is"
             " nothing to certify; calibrate a length (ballplate check says what is missing)"
@@ -248,13 +248,13 @@ def _undetermined(is_open: Array, layout: BallLayout, distances: tuple[PlateDist
     )
 
 
-def _carriers(experiment: Experiment, at: Linearisation, plate: str) -> tuple[str, ...]:
+def _carriers(experiment: Experiment, linearisation: Linearisation, plate: str) -> tuple[str, ...]:
     """What the plate's lengths rest on, as text.
 
     :raises ExperimentError: nothing but the machine's own scales.
     """
-    found = scale_of(experiment, at)
-    words = [one.words for one in found.carriers] if found is not None else []
+    scale = scale_of(experiment, linearisation)
+    words = [carrier.words for carrier in scale.carriers] if scale is not None else []
     of_machine = words == [OWN_SCALES]
     if of_machine and not certified_values(experiment):
         text = (
@@ -268,13 +268,17 @@ def _carriers(experiment: Experiment, at: Linearisation, plate: str) -> tuple[st
 
 def _temperature(experiment: Experiment, plate: str) -> tuple[float | None, str]:
     """The temperature that lengths are stated for, None where it is unknown; and as text."""
-    for one in experiment.influences:
-        if isinstance(one, TemperaturesSettings) and one.artefact in (None, plate):
-            if one.artefact_expansion is not None:
-                told = f"lengths are those at {one.reference:g} °C; the plate's expansion is"
-                return one.reference, f"{told} followed from its temperatures"
-            told = f"the scales' expansion is followed from {one.reference:g} °C, the plate's is"
-            return None, f"reference temperature unknown: {told} not"
+    for influence in experiment.influences:
+        if isinstance(influence, TemperaturesSettings) and influence.artefact in (None, plate):
+            if influence.artefact_expansion is not None:
+                sentence = (
+                    f"lengths are those at {influence.reference:g} °C; the plate's expansion is"
+                )
+                return influence.reference, f"{sentence} followed from its temperatures"
+            sentence = (
+                f"the scales' expansion is followed from {influence.reference:g} °C, the plate's is"
+            )
+            return None, f"reference temperature unknown: {sentence} not"
     return None, (
         "reference temperature unknown: the experiment states no temperatures; lengths are right"
         " where plate, scales and calibrated lengths were at the temperature that these are"
@@ -283,19 +287,19 @@ def _temperature(experiment: Experiment, plate: str) -> tuple[float | None, str]
 
 
 def _distances(
-    at: Linearisation, index: Integers, names: tuple[str, ...], sigma: float
+    linearisation: Linearisation, index: Integers, names: tuple[str, ...], sigma: float
 ) -> tuple[PlateDistance, ...]:
-    moved = displacements(at, BallPlaces(index))
+    moved = displacements(linearisation, BallPlaces(index))
     some = list(range(len(names)))
     if len(some) > MOST_BALLS_FOR_ALL_DISTANCES:
         some = _far_apart(moved.drawn)
     pairs = np.array(list(combinations(some, 2)), np.int64).reshape(-1, 2)
-    found = pairs_of(moved, pairs)
-    u = np.where(found.is_open, np.nan, sigma * found.uncertainties)
+    lengths_moved = pairs_of(moved, pairs)
+    u = np.where(lengths_moved.is_open, np.nan, sigma * lengths_moved.uncertainties)
     return tuple(
-        PlateDistance((names[i], names[j]), length, own)
-        for (i, j), length, own in zip(
-            pairs.tolist(), found.lengths.tolist(), u.tolist(), strict=True
+        PlateDistance((names[i], names[j]), length, uncertainty)
+        for (i, j), length, uncertainty in zip(
+            pairs.tolist(), lengths_moved.lengths.tolist(), u.tolist(), strict=True
         )
     )
 
@@ -320,17 +324,17 @@ def _remarks(
     fit: CertifiedFit, experiment: Experiment, plate: str, carriers: tuple[str, ...]
 ) -> tuple[str, ...]:
     """What a reader has to know of the fit and of the plate."""
-    found = [*fit.warnings, *filter(None, [fit.complaint])]
+    remarks = [*fit.warnings, *filter(None, [fit.complaint])]
     if carriers == (OWN_SCALES,):
-        found.append(
+        remarks.append(
             "the error model takes the mean of the machine's scales for right: what they are wrong"
             " by has no part in the uncertainties; a model with a scale of its own for each axis"
             " would have the lengths from what is calibrated"
         )
     flatness = experiment.artefacts[plate].flatness
     if flatness is not None:
-        found.append(
+        remarks.append(
             "nothing is read across the plate's plane: z is as drawn, with a standard uncertainty"
             f" of {1e6 * flatness:.4g} µm of each ball before the axes were put through them"
         )
-    return tuple(dict.fromkeys(found))
+    return tuple(dict.fromkeys(remarks))

@@ -38,9 +38,9 @@ def gtc_archive(certificate: CertifiedBalls) -> str:
         # Of numbers that are correlated and known from one scatter (GTC, ensembles).
         ensemble = {"ensemble": list(identifiers.values())}
     leaves = {
-        own: {
+        identifier: {
             "CLASS": "LeafNode",
-            "uid": own,
+            "uid": identifier,
             "label": names[k],
             "u": float(u[k]),
             "df": freedom if np.isfinite(freedom) else None,
@@ -51,7 +51,7 @@ def gtc_archive(certificate: CertifiedBalls) -> str:
             },
             **ensemble,
         }
-        for k, own in identifiers.items()
+        for k, identifier in identifiers.items()
     }
     tagged = {
         name: (
@@ -69,7 +69,9 @@ def gtc_archive(certificate: CertifiedBalls) -> str:
         "tagged_complex": {},
         "untagged_real": {},
         "intermediate_uids": {
-            one["uid"]: [one["label"], 0.0, None] for one in tagged.values() if "label" in one
+            number["uid"]: [number["label"], 0.0, None]
+            for number in tagged.values()
+            if "label" in number
         },
     }
     return json.dumps(archive, indent=1) + "\n"

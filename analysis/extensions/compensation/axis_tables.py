@@ -118,10 +118,10 @@ class AxisFunctions:
         """The six errors (m, 6) of an axis at positions (m,) along it."""
         x = np.tile(self.origin, (len(positions), 1))
         x[:, axis] = positions
-        own = len(self.chain.parameters)
-        translation, rotation = self.chain.motions(x, self.a[:own])
+        size = len(self.chain.parameters)
+        translation, rotation = self.chain.motions(x, self.a[:size])
         moved = translation[:, axis].copy()
-        for field, value in zip(self.fields, self.a[own:], strict=True):
+        for field, value in zip(self.fields, self.a[size:], strict=True):
             # At the others' origin a term of another axis is zero.
             moved += value * field.values(x - self.origin)
         return np.hstack([moved, rotation[:, axis]])
@@ -156,24 +156,24 @@ def tabulated(
     arrangement = functions.chain.arrangement
     shift = np.asarray(origin) - functions.origin
     axes = range(len(nodes))
-    found = {k: functions.values(k, nodes[k]) for k in axes}
+    tables = {k: functions.values(k, nodes[k]) for k in axes}
     at_zero = {k: functions.values(k, zero[k : k + 1])[0] for k in axes}
     levers = carried_vectors(arrangement, shift[None], np.zeros((1, 3)))
     masks = carried_vectors(arrangement, np.ones((1, 3)), np.zeros((1, 3)))
     for k in axes:
-        for values in (found[k], at_zero[k]):
+        for values in (tables[k], at_zero[k]):
             turned = levers[k][0] * np.cross(values[..., 3:], levers[k][1][0])
             values[..., :3] += turned
     for k in axes:
         for j in axes:
             if masks[k][1][0, j]:
                 slope = masks[k][0] * np.cross(at_zero[k][3:], np.eye(3)[j])
-                found[j][:, :3] += slope * (nodes[j] - origin[j])[:, None]
+                tables[j][:, :3] += slope * (nodes[j] - origin[j])[:, None]
                 at_zero[j][:3] += slope * (zero[j] - origin[j])
     return AxisTables(
         arrangement,
         origin,
-        tuple(AxisTable(k, nodes[k], found[k] - at_zero[k]) for k in axes),
+        tuple(AxisTable(k, nodes[k], tables[k] - at_zero[k]) for k in axes),
     )
 
 
@@ -196,10 +196,10 @@ def in_arrangement(tables: AxisTables, arrangement: Arrangement) -> AxisTables:
 
     :raises NotOfAxesError: the axes stand in another order between workpiece and probe.
     """
-    own, wanted = tool_chain(tables.arrangement), tool_chain(arrangement)
-    if own != wanted:
+    own_chain, wanted = tool_chain(tables.arrangement), tool_chain(arrangement)
+    if own_chain != wanted:
         raise NotOfAxesError(
-            f"from the workpiece to the probe its axes are {', '.join(own)}, not"
+            f"from the workpiece to the probe its axes are {', '.join(own_chain)}, not"
             f" {', '.join(wanted)}"
         )
     before, after = set(tables.arrangement.probe_side), set(arrangement.probe_side)

@@ -122,12 +122,12 @@ def run(options: Namespace) -> int:
     if options.sense == "indication":
         options.sense = "errors of indication"
     try:
-        found, texts = _read(options) if options.read else _made(options)
+        result, texts = _read(options) if options.read else _made(options)
     except ValueError as error:
         misused.append(str(error))
     if misused:
         raise UsageError("; ".join(misused))
-    for remark in found.notes:
+    for remark in result.notes:
         complain(remark)
     paths = {options.output.parent / name: text for name, text in texts.items()} if texts else {}
     if paths:
@@ -136,7 +136,7 @@ def run(options: Namespace) -> int:
         )
         check_outputs(options)
         write(options, paths)
-    show(options, found)
+    show(options, result)
     if paths and not options.json:
         print(f"written: {', '.join(map(str, sorted(paths)))}")
     return 0
@@ -165,25 +165,27 @@ def _made(options: Namespace) -> tuple[CompensationTable, dict[str, str]]:
 def _read(options: Namespace) -> tuple[CompensationTable, dict[str, str]]:
     from .compensation_tables import read_compensation_files
 
-    read = read_compensation_files(
+    compensation_read = read_compensation_files(
         options.files, options.format, options.sense, options.arrangement, options.origin
     )
-    return read, {} if options.output is None else read.machine_files(options.output.stem)
+    return compensation_read, {} if options.output is None else compensation_read.machine_files(
+        options.output.stem
+    )
 
 
 def _misused(options: Namespace) -> list[str]:
     """Faults of options that do not go together."""
-    found = []
+    misused = []
     written = "pitch", "volumetric", "without_rotations", "allow_lack_of_fit"
-    others = written if options.read else ("arrangement",)
-    for name in others:
+    other_options = written if options.read else ("arrangement",)
+    for name in other_options:
         if getattr(options, name):
             whose = "tables that are written" if options.read else "tables that are read"
-            found.append(f"--{name.replace('_', '-')} is for {whose}; leave it out")
+            misused.append(f"--{name.replace('_', '-')} is for {whose}; leave it out")
     if options.without_rotations and options.format != "heidenhain":
-        found.append(f"{options.format} tables have rotations; leave --without-rotations out")
+        misused.append(f"{options.format} tables have rotations; leave --without-rotations out")
     if options.output is not None:
         ending = ".yaml" if options.read else ".cma" if options.format == "heidenhain" else ".csv"
         if options.output.suffix.lower() != ending:
-            found.append(f"-o {options.output} should end in {ending}")
-    return found
+            misused.append(f"-o {options.output} should end in {ending}")
+    return misused

@@ -55,7 +55,7 @@ class CompensationTable(Result):
         if isinstance(self.table, VolumeTable):
             counts = " x ".join(str(len(nodes)) for nodes in self.table.nodes)
             return f"{self.format.name}, {counts} nodes"
-        counts = ", ".join(str(len(one.positions)) for one in self.table.axes)
+        counts = ", ".join(str(len(axis.positions)) for axis in self.table.axes)
         return f"{self.format.name}, {counts} positions"
 
     def correction(self, points: Any, offset: Any = None) -> Array:
@@ -80,27 +80,31 @@ class CompensationTable(Result):
             ]
             return {f"{name}, {_UNITS.get(name, 'mm')}": name for name in rows[0]}, rows
         rows = [
-            {"axis": AXES[one.axis], "position": position, **dict(zip(_PARTS, values, strict=True))}
-            for one in self.table.axes
-            for position, values in zip(one.positions.tolist(), one.values.tolist(), strict=True)
+            {
+                "axis": AXES[axis.axis],
+                "position": position,
+                **dict(zip(_PARTS, values, strict=True)),
+            }
+            for axis in self.table.axes
+            for position, values in zip(axis.positions.tolist(), axis.values.tolist(), strict=True)
         ]
         parts = {f"{name}, {unit}": name for name, unit in _UNITS.items()}
         return {"axis": "axis", "position, mm": "position", **parts}, rows
 
     def data(self) -> dict[str, Any]:
-        found: dict[str, Any] = {
+        result_data: dict[str, Any] = {
             "title": self.title,
             "format": self.format.name,
             "states": self.sense,
             "dimension": self.table.dimension,
         }
         if isinstance(self.table, AxisTables):
-            found |= {
+            result_data |= {
                 "probe_side": list(self.table.arrangement.probe_side),
                 "workpiece_side": list(self.table.arrangement.workpiece_side),
                 "levers_from": self.table.origin,
             }
-        return {**found, "corrections": self.rows(), "warnings": self.remarks}
+        return {**result_data, "corrections": self.rows(), "warnings": self.remarks}
 
     def table_lines(self) -> list[str]:
         """What the table is and how large its corrections are."""
@@ -110,10 +114,10 @@ class CompensationTable(Result):
         origin = ", ".join(format_length(value) for value in self.table.origin)
         chain = ", ".join(tool_chain(self.table.arrangement))
         side = self.table.arrangement.workpiece_side
-        told = f"{listing(side)} on the workpiece's side" if side else "all on the tool's side"
+        sides = f"{listing(side)} on the workpiece's side" if side else "all on the tool's side"
         return [
             words,
-            f"axes from the workpiece to the tool: {chain}; {told}; levers from {origin}",
+            f"axes from the workpiece to the tool: {chain}; {sides}; levers from {origin}",
             "",
             *_axis_lines(self.table),
         ]
@@ -128,20 +132,22 @@ _PARTS = tuple(_UNITS)
 
 def _axis_lines(table: AxisTables) -> list[str]:
     columns = {
-        "": lambda one: AXES[one.axis],
-        "positions": lambda one: len(one.positions),
-        "from": (lambda one: float(one.positions[0]), format_length),
-        "to": (lambda one: float(one.positions[-1]), format_length),
+        "": lambda axis_table: AXES[axis_table.axis],
+        "positions": lambda axis_table: len(axis_table.positions),
+        "from": (lambda axis_table: float(axis_table.positions[0]), format_length),
+        "to": (lambda axis_table: float(axis_table.positions[-1]), format_length),
         "largest correction": _largest,
     }
     return table_lines(columns, table.axes)
 
 
-def _largest(one: AxisTable) -> str:
+def _largest(axis_table: AxisTable) -> str:
     """The largest correction of each error of an axis, as text."""
     parts = [
         f"{name} {1e6 * value:.3g} {'µrad' if AXIS_ERRORS[name].is_rotation else 'µm'}"
-        for name, value in zip(names_of(one.axis), np.abs(one.values).max(axis=0), strict=True)
+        for name, value in zip(
+            names_of(axis_table.axis), np.abs(axis_table.values).max(axis=0), strict=True
+        )
         if value > 0.0
     ]
     return ", ".join(parts) or "none"
@@ -274,11 +280,11 @@ def tabled_machine(
         for axis in range(3)
     )
     lower, upper, zero = (
-        np.array(one) for one in (machine.lower, machine.upper, machine.reference)
+        np.array(vector) for vector in (machine.lower, machine.upper, machine.reference)
     )
     offsets = np.array([machine.probe])
-    found = TabledMachine(machine.title, truth.model, truth.a, lower, upper, zero, offsets, bends)
-    return found, tuple(map(str, doubts))
+    tabled = TabledMachine(machine.title, truth.model, truth.a, lower, upper, zero, offsets, bends)
+    return tabled, tuple(map(str, doubts))
 
 
 def _is_map(path: Path) -> bool:
@@ -348,7 +354,9 @@ def _open_functions(fitted: FittedMap) -> list[str]:
     touched = np.abs(fitted.undetermined / fitted.scale[:, None]).max(axis=1) > 1e-6
     return list(
         dict.fromkeys(
-            one.function for one, is_open in zip(fitted.parameters, touched, strict=True) if is_open
+            parameter.function
+            for parameter, is_open in zip(fitted.parameters, touched, strict=True)
+            if is_open
         )
     )
 
@@ -421,10 +429,10 @@ def read_compensation_files(
 
     :raises ValueError: no arrangement.
     """
-    own = None if arrangement is None else parse_arrangement(arrangement)
+    own_arrangement = None if arrangement is None else parse_arrangement(arrangement)
     point = None if origin is None else tuple(origin)
-    found = read_table_files(FORMATS[name], paths, sense, own, point)
+    tables_read = read_table_files(FORMATS[name], paths, sense, own_arrangement, point)
     title = listing(path.name for path in paths)
     return ReadCompensation(
-        paths[0].stem, title, FORMATS[name], found.sense, found.table, found.notes
+        paths[0].stem, title, FORMATS[name], tables_read.sense, tables_read.table, tables_read.notes
     )

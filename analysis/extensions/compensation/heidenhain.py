@@ -49,19 +49,19 @@ class _Line:
 def _write(table: Table, sense: Sense, stem: str) -> dict[str, str]:
     assert isinstance(table, AxisTables)
     letters = LETTERS[: table.dimension]
-    found = {}
-    for one in table.axes:
+    contents = {}
+    for axis in table.axes:
         rows = [["NR", POSITION, BACKLASH, *letters]]
         for k, (position, values) in enumerate(
-            zip(one.positions.tolist(), one.values.tolist(), strict=True)
+            zip(axis.positions.tolist(), axis.values.tolist(), strict=True)
         ):
-            told = (f"{1e3 * value + 0.0:+.4f}" for value in values[: table.dimension])
-            rows.append([str(k), f"{1e3 * position + 0.0:+.4f}", "", *told])
-        ending = f"-{AXES[one.axis]}.com"
-        found[ending] = _file(f"{stem}{ending}", rows)
-    names = [f"{stem}-{AXES[one.axis]}.com" for one in table.axes]
-    found[".cma"] = _file(f"{stem}.cma", [["NR", ACTIVE, *letters], ["0", "*", *names]])
-    return found
+            values_written = (f"{1e3 * value + 0.0:+.4f}" for value in values[: table.dimension])
+            rows.append([str(k), f"{1e3 * position + 0.0:+.4f}", "", *values_written])
+        ending = f"-{AXES[axis.axis]}.com"
+        contents[ending] = _file(f"{stem}{ending}", rows)
+    names = [f"{stem}-{AXES[axis.axis]}.com" for axis in table.axes]
+    contents[".cma"] = _file(f"{stem}.cma", [["NR", ACTIVE, *letters], ["0", "*", *names]])
+    return contents
 
 
 def _file(name: str, rows: Sequence[Sequence[str]]) -> str:
@@ -85,12 +85,12 @@ def _read(paths: Sequence[Path]) -> StatedTable:
         name = active[0].cells.get(letter)
         if name is not None:
             # Paths on a control are not paths here.
-            own = path.parent / re.split(r"[\\/:]", name)[-1]
-            table, told = _axis(own, LETTERS.index(letter))
+            axis_file = path.parent / re.split(r"[\\/:]", name)[-1]
+            table, axis_read = _axis(axis_file, LETTERS.index(letter))
             axes.append(table)
-            notes += told
-    others = [name for name in active[0].cells if name not in (*LETTERS, ACTIVE, "NR")]
-    notes += [f"{path}: tables of {listing(others)} are not read"] if others else []
+            notes += axis_read
+    other_columns = [name for name in active[0].cells if name not in (*LETTERS, ACTIVE, "NR")]
+    notes += [f"{path}: tables of {listing(other_columns)} are not read"] if other_columns else []
     if [table.axis for table in axes] not in ([0, 1], [0, 1, 2]):
         raise refused(path, "the active line names no tables of x and y; add them")
     return StatedTable(tuple(axes), notes=tuple(notes))
@@ -119,10 +119,10 @@ def _axis(path: Path, axis: int) -> tuple[AxisTable, list[str]]:
         )
     if messages:
         raise ExperimentError(messages)
-    found = np.array(rows).reshape(-1, 4)
-    positions = found[:, 0]
+    table = np.array(rows).reshape(-1, 4)
+    positions = table[:, 0]
     steps = np.diff(positions)
-    if len(found) < 2 or steps.min() <= 0.0 or np.ptp(steps) > EVEN * steps.max():
+    if len(table) < 2 or steps.min() <= 0.0 or np.ptp(steps) > EVEN * steps.max():
         text = (
             f"{POSITION} should have two positions or more, ascending and evenly spaced; correct it"
         )
@@ -132,7 +132,7 @@ def _axis(path: Path, axis: int) -> tuple[AxisTable, list[str]]:
         notes.append(
             f"{path}: {BACKLASH} is not read: a machine file has one error for both directions"
         )
-    values = np.hstack([found[:, 1:], np.zeros((len(found), 3))])
+    values = np.hstack([table[:, 1:], np.zeros((len(table), 3))])
     return AxisTable(axis, positions, values), notes
 
 
@@ -156,7 +156,7 @@ def _lines(path: Path) -> Iterator[_Line]:
             ended = True
             break
         if line.strip() and not heads:
-            heads = [(found.start(), found[0]) for found in re.finditer(r"\S+", line)]
+            heads = [(word.start(), word[0]) for word in re.finditer(r"\S+", line)]
         elif line.strip():
             yield _Line(mark, dict(_cells(line, heads, mark)))
     if not ended:
@@ -164,17 +164,17 @@ def _lines(path: Path) -> Iterator[_Line]:
 
 
 def _cells(line: str, heads: Sequence[tuple[int, str]], mark: Mark) -> Iterator[tuple[str, str]]:
-    found = [(cell.start(), cell[0]) for cell in re.finditer(r"\S+", line)]
-    if len(found) == len(heads):
-        yield from ((name, cell) for (_, name), (_, cell) in zip(heads, found, strict=True))
+    cells = [(cell.start(), cell[0]) for cell in re.finditer(r"\S+", line)]
+    if len(cells) == len(heads):
+        yield from ((name, cell) for (_, name), (_, cell) in zip(heads, cells, strict=True))
         return
-    seen = set()
-    for start, cell in found:
+    names_seen = set()
+    for start, cell in cells:
         name = [name for place, name in heads if place <= start][-1:] or [""]
-        if name[0] in seen or not name[0]:
+        if name[0] in names_seen or not name[0]:
             text = f'"{shorten(cell)}" stands under no column of its own; align the columns'
             raise mark.refused(text)
-        seen.add(name[0])
+        names_seen.add(name[0])
         yield name[0], cell
 
 

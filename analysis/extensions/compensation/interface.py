@@ -58,11 +58,17 @@ def compensation(
 
     ensure_one_of(get_args(TableFormatName), format=str(format))
     ensure_one_of(get_args(TableSense), sense=sense)
-    given = map_or_path("machine", machine)
-    if isinstance(given, Path):
-        label, (source, remarks) = given.stem, tabled_machine(given, allow_lack_of_fit)
+    machine_given = map_or_path("machine", machine)
+    if isinstance(machine_given, Path):
+        label, (source, remarks) = (
+            machine_given.stem,
+            tabled_machine(machine_given, allow_lack_of_fit),
+        )
     else:
-        label, (source, remarks) = given.title, of_map(given, given.title, allow_lack_of_fit)
+        label, (source, remarks) = (
+            machine_given.title,
+            of_map(machine_given, machine_given.title, allow_lack_of_fit),
+        )
     lengths = _metres("pitch", pitch), _metres("origin", origin)
     flags = volumetric, without_rotations
     return made_compensation(source, label, format, *lengths, sense, *flags, remarks)
@@ -97,24 +103,24 @@ def read_compensation(
     ensure_one_of(get_args(TableSense), sense=sense)
     ensure_type(str, "an arrangement, such as MB2", arrangement=arrangement)
     several = [files] if isinstance(files, str | os.PathLike) else files
-    paths = [Path(one) for one in several]
+    paths = [Path(path) for path in several]
     if not paths:
         raise ValueError("files: no file; give one at least")
     return read_compensation_files(paths, format, sense, arrangement, _metres("origin", origin))
 
 
-def _metres(name: str, given: str | Sequence[float] | None) -> tuple[float, ...] | None:
+def _metres(name: str, stated: str | Sequence[float] | None) -> tuple[float, ...] | None:
     """Lengths in metres, of a text with units or of numbers."""
     from .compensation_tables import parse_lengths
 
-    if given is None:
+    if stated is None:
         return None
-    if isinstance(given, str):
+    if isinstance(stated, str):
         try:
-            return parse_lengths(given)
+            return parse_lengths(stated)
         except QuantityError as error:
             raise ValueError(f"{name}: {error}") from None
-    found = tuple(given) if isinstance(given, Iterable) else (given,)
-    if not all(isinstance(one, int | float) and math.isfinite(one) for one in found):
-        raise TypeError(f"{name}={given!r}; give lengths in metres, or a text with units")
-    return tuple(float(one) for one in found)
+    values = tuple(stated) if isinstance(stated, Iterable) else (stated,)
+    if not all(isinstance(value, int | float) and math.isfinite(value) for value in values):
+        raise TypeError(f"{name}={stated!r}; give lengths in metres, or a text with units")
+    return tuple(float(value) for value in values)

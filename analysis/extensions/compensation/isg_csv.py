@@ -81,9 +81,9 @@ def _write(table: Table, sense: Sense, stem: str) -> dict[str, str]:
     remarks.append(f"// chain {chain}, workpiece_axes 0, from the workpiece to the tool")
     remarks.append("// squareness is in the straightness errors: position errors are zero")
     lines = list(remarks)
-    for k, one in enumerate(table.axes):
-        heads = (AXES[one.axis].upper(), *names_of(one.axis))
-        lines += [*(["#"] if k else []), *_aligned(heads, one.positions[:, None], one.values)]
+    for k, axis in enumerate(table.axes):
+        heads = (AXES[axis.axis].upper(), *names_of(axis.axis))
+        lines += [*(["#"] if k else []), *_aligned(heads, axis.positions[:, None], axis.values)]
     return {".csv": "\n".join([*lines, ""])}
 
 
@@ -107,8 +107,8 @@ def _aligned(heads: Sequence[str], positions: Array, values: Array) -> list[str]
         cells = [f"{1e3 * value:.10g}" for value in place]
         for name, value in zip(heads[arguments:], row, strict=True):
             is_angle = AXIS_ERRORS[name].is_rotation
-            told = f"{value:.{ANGLE_DIGITS}f}" if is_angle else f"{1e3 * value:.{LENGTH_DIGITS}f}"
-            cells.append("0" if float(told) == 0.0 else told)
+            number = f"{value:.{ANGLE_DIGITS}f}" if is_angle else f"{1e3 * value:.{LENGTH_DIGITS}f}"
+            cells.append("0" if float(number) == 0.0 else number)
         rows.append(cells)
     return in_columns(rows)
 
@@ -195,10 +195,13 @@ def _number(cell: str, name: str, mark: Mark, messages: list[Message]) -> float:
 
 
 def _wrong_names(names: Sequence[str], mark: Mark) -> list[Message]:
-    known = (*AXES_LETTERS, *AXIS_ERRORS)
-    wrong = [name for name in names if name not in known and not POSITION_ERROR.fullmatch(name)]
+    names_known = (*AXES_LETTERS, *AXIS_ERRORS)
+    wrong = [
+        name for name in names if name not in names_known and not POSITION_ERROR.fullmatch(name)
+    ]
     texts = [
-        f'the column "{shorten(name)}" is no linear axis and no error of one; {hint(name, known)}'
+        f'the column "{shorten(name)}" is no linear axis and no error of one;'
+        f" {hint(name, names_known)}"
         for name in wrong
     ]
     texts += [
@@ -221,7 +224,7 @@ def _wrong_names(names: Sequence[str], mark: Mark) -> list[Message]:
 
 def _axes(blocks: Sequence[_Block], path: Path) -> tuple[AxisTable, ...]:
     """Tables of axes, and squareness errors as slopes of their straightness errors."""
-    found: dict[int, AxisTable] = {}
+    axes: dict[int, AxisTable] = {}
     slopes = np.zeros((3, 3))
     for block in blocks:
         for name in block.names:
@@ -242,16 +245,16 @@ def _axes(blocks: Sequence[_Block], path: Path) -> tuple[AxisTable, ...]:
                 for name in names_of(axis)
             ]
         )
-        if axis in found:
+        if axis in axes:
             text = f"a second table of {AXES[axis]}; put the columns of both into one"
             raise block.mark.refused(text)
-        found[axis] = AxisTable(axis, positions, values)
-    if sorted(found) not in ([0, 1], [0, 1, 2]):
-        missing = [AXES[k] for k in range(3) if k not in found]
+        axes[axis] = AxisTable(axis, positions, values)
+    if sorted(axes) not in ([0, 1], [0, 1, 2]):
+        missing = [AXES[k] for k in range(3) if k not in axes]
         raise refused(path, f"has no table of {listing(missing)}; name the files of all axes")
-    for axis, table in found.items():
+    for axis, table in axes.items():
         table.values[:, :3] += table.positions[:, None] * slopes[axis]
-    return tuple(found[axis] for axis in sorted(found))
+    return tuple(axes[axis] for axis in sorted(axes))
 
 
 def _add_slope(block: _Block, name: str, slopes: Array) -> None:
@@ -282,18 +285,18 @@ def _grid(block: _Block) -> VolumeTable:
             f" which carries the tool; {listing(wrong or ['X'])} cannot be read"
         )
         raise block.mark.refused(text)
-    counts = tuple(len(one) for one in nodes)
+    counts = tuple(len(node) for node in nodes)
     if min(counts) < 2 or int(np.prod(counts)) != len(block.rows):
         grid = " x ".join(map(str, counts))
         text = f"{len(block.rows)} rows are no grid of {grid} points; give each point once"
         raise block.mark.refused(text)
     places = tuple(
-        np.searchsorted(one, block.column(name)) for one, name in zip(nodes, "XYZ", strict=False)
+        np.searchsorted(node, block.column(name)) for node, name in zip(nodes, "XYZ", strict=False)
     )
     values = np.zeros((*counts, 6))
-    seen = np.zeros(counts, bool)
-    seen[places] = True
-    if not seen.all():
+    is_seen = np.zeros(counts, bool)
+    is_seen[places] = True
+    if not is_seen.all():
         raise block.mark.refused("a point of the grid stands twice; leave one out")
     for name in single:
         error = AXIS_ERRORS[name]

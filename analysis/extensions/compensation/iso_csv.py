@@ -44,18 +44,18 @@ def _write(table: Table, sense: Sense, stem: str) -> dict[str, str]:
         f"# origin: {point}",
         "# straightness errors keep their slopes: squareness is in them",
     ]
-    found = {}
-    for one in table.axes:
+    contents = {}
+    for axis in table.axes:
         names = [
             f"{name}_{'urad' if AXIS_ERRORS[name].is_rotation else 'um'}"
-            for name in names_of(one.axis)
+            for name in names_of(axis.axis)
         ]
         lines = [*head, ",".join(["position_mm", *names])]
-        for position, values in zip(one.positions.tolist(), one.values.tolist(), strict=True):
+        for position, values in zip(axis.positions.tolist(), axis.values.tolist(), strict=True):
             cells = (f"{1e6 * value + 0.0:.3f}" for value in values)
             lines.append(",".join([f"{1e3 * position:.10g}", *cells]))
-        found[f"-{AXES[one.axis]}.csv"] = "\n".join([*lines, ""])
-    return found
+        contents[f"-{AXES[axis.axis]}.csv"] = "\n".join([*lines, ""])
+    return contents
 
 
 def _read(paths: Sequence[Path]) -> StatedTable:
@@ -64,13 +64,13 @@ def _read(paths: Sequence[Path]) -> StatedTable:
     :raises ExperimentError: faults of the files, or they do not go together.
     """
     axes: dict[int, AxisTable] = {}
-    stated: dict[str, object] = {}
+    statements: dict[str, object] = {}
     silent = []
     messages: list[Message] = []
     for path in paths:
         try:
             table = _axis(path)
-            said = _comments(path)
+            comments = _comments(path)
         except ExperimentError as error:
             messages += error.messages
             continue
@@ -78,12 +78,12 @@ def _read(paths: Sequence[Path]) -> StatedTable:
             text = f"a second table of {AXES[table.axis]}; name one file for each axis"
             messages.append(Message(str(path), 0, 0, "", text))
         axes[table.axis] = table
-        silent += [] if "sense" in said else [path]
-        for key, value in said.items():
-            if stated.setdefault(key, value) != value:
+        silent += [] if "sense" in comments else [path]
+        for key, value in comments.items():
+            if statements.setdefault(key, value) != value:
                 text = f"its {key} is not that of {paths[0]}; let all files of a table say the same"
                 messages.append(Message(str(path), 0, 0, "", text))
-    if "sense" in stated:
+    if "sense" in statements:
         text = (
             f"does not state whether values are {' or '.join(SENSES)}, as others do; add # states:"
         )
@@ -94,7 +94,7 @@ def _read(paths: Sequence[Path]) -> StatedTable:
         raise refused(paths[0], text)
     if messages:
         raise ExperimentError(messages)
-    sense, arrangement, origin = (stated.get(key) for key in ("sense", "arrangement", "origin"))
+    sense, arrangement, origin = (statements.get(key) for key in ("sense", "arrangement", "origin"))
     return StatedTable(
         tuple(axes[k] for k in sorted(axes)),
         sense=sense,  # type: ignore[arg-type]
@@ -119,7 +119,7 @@ def _comments(path: Path) -> dict[str, Sense | Arrangement | Corner]:
 
     :raises ExperimentError: they say what cannot be.
     """
-    found: dict[str, Sense | Arrangement | Corner] = {}
+    statements: dict[str, Sense | Arrangement | Corner] = {}
     messages = []
     for number, line in enumerate(read_text(path).splitlines(), start=1):
         match = COMMENT.match(line)
@@ -132,16 +132,16 @@ def _comments(path: Path) -> dict[str, Sense | Arrangement | Corner]:
                 sense = stated_sense(match[1])
                 if sense is None:
                     raise ValueError("unknown sense; write corrections or errors of indication")
-                found["sense"] = sense
+                statements["sense"] = sense
             elif key == "arrangement":
-                found["arrangement"] = parse_arrangement(text)
+                statements["arrangement"] = parse_arrangement(text)
             elif key == "origin":
-                found["origin"] = parse_point(text)
+                statements["origin"] = parse_point(text)
         except (LineError, ValueError) as error:
             messages.append(mark.message("", f"{key}: {error}"))
     if messages:
         raise ExperimentError(messages)
-    return found
+    return statements
 
 
 ISO_CSV = TableFormat(

@@ -174,7 +174,7 @@ def _volumetric(
 ) -> VolumeTable:
     if not made.has_volumes:
         raise CannotMakeError(f"{made.name} has tables of single axes only; isg has others")
-    count = int(np.prod([len(one) for one in nodes]))
+    count = int(np.prod([len(node) for node in nodes]))
     if count > MOST_GRID_NODES:
         raise CannotMakeError(
             f"{count} nodes are too many; at most {MOST_GRID_NODES} are possible: choose a larger"
@@ -201,8 +201,8 @@ def _of_axes(
     zero[: machine.dimension] = origin
     levers = np.zeros(3) if made.from_zero else zero
     within = tuple(
-        np.clip(one, low, high)
-        for one, low, high in zip(nodes, machine.lower, machine.upper, strict=True)
+        np.clip(node, low, high)
+        for node, low, high in zip(nodes, machine.lower, machine.upper, strict=True)
     )
     exact = tabulated(functions, within, zero, tuple(levers.tolist()))
     exact = _continued(exact, nodes)
@@ -213,7 +213,7 @@ def _of_axes(
 
 def _refused_rotations(exact: AxisTables, made: TableFormat) -> Iterator[str]:
     """Rotations of axes that a format has no room for."""
-    largest = max(float(np.abs(one.values[:, 3:]).max()) for one in exact.axes)
+    largest = max(float(np.abs(axis.values[:, 3:]).max()) for axis in exact.axes)
     if largest > made.angle_step:
         yield (
             f"its axes turn by up to {1e6 * largest:.4g} µrad, for which {made.name} tables have no"
@@ -225,21 +225,23 @@ def _continued(tables: AxisTables, nodes: tuple[Array, ...]) -> AxisTables:
     """Tables whose first and last nodes lie beyond the ends of an axis, with the values on the line
     through the node before and that at the end.
     """
-    found = []
-    for own, table in zip(nodes, tables.axes, strict=True):
+    tables_continued = []
+    for axis_nodes, table in zip(nodes, tables.axes, strict=True):
         values = table.values.copy()
         for end, inner in ((0, 1), (-1, -2)):
-            if own[end] != table.positions[end]:
-                part = (own[end] - own[inner]) / (table.positions[end] - own[inner])
+            if axis_nodes[end] != table.positions[end]:
+                part = (axis_nodes[end] - axis_nodes[inner]) / (
+                    table.positions[end] - axis_nodes[inner]
+                )
                 values[end] = values[inner] + part * (values[end] - values[inner])
-        found.append(AxisTable(table.axis, own, values))
-    return AxisTables(tables.arrangement, tables.origin, tuple(found))
+        tables_continued.append(AxisTable(table.axis, axis_nodes, values))
+    return AxisTables(tables.arrangement, tables.origin, tuple(tables_continued))
 
 
 def _rounded(table: Table, made: TableFormat) -> Table:
     if isinstance(table, VolumeTable):
         return VolumeTable(table.nodes, rounded(table.values, made))
-    return table.changed(lambda one: rounded(one.values, made))
+    return table.changed(lambda table: rounded(table.values, made))
 
 
 def correction(table: Table, x: Array, p: Array) -> Array:
@@ -264,7 +266,9 @@ def _compared(
     without = exact
     if not made.has_rotations:
         assert isinstance(exact, AxisTables)
-        without = exact.changed(lambda one: one.values * (np.arange(6) < 3))
+        without = exact.changed(
+            lambda correction_values: correction_values.values * (np.arange(6) < 3)
+        )
     sides = [_places(machine, exact, k, origin, probes) for k in range(d)]
     grid = grid_points(sides)
     generator = np.random.default_rng(np.random.SeedSequence(0))
@@ -275,11 +279,19 @@ def _compared(
     for offset in probes:
         p = np.broadcast_to(offset, x.shape)
         true = machine.model.error(x, machine.a, p)
-        ideal, kept, rough = (correction(one, x, p) for one in (exact, without, written))
-        pairs = ((ideal, true), (kept, rough), (rough, true), (kept, ideal))
-        apart = [one - other for one, other in pairs]
+        ideal, corrections, rough = (
+            correction(correction_values, x, p) for correction_values in (exact, without, written)
+        )
+        pairs = ((ideal, true), (corrections, rough), (rough, true), (corrections, ideal))
+        apart = [
+            correction_values - reference_values for correction_values, reference_values in pairs
+        ]
         largest = np.maximum(
-            largest, [np.linalg.norm(one - one[-1], axis=1).max() for one in apart]
+            largest,
+            [
+                np.linalg.norm(correction_values - correction_values[-1], axis=1).max()
+                for correction_values in apart
+            ],
         )
     interpolation, rounding, total, left_out = largest.tolist()
     return MadeTable(written, origin, interpolation, rounding, total, left_out, len(x) - 1, probes)
@@ -290,10 +302,10 @@ def _places(machine: TabledMachine, table: Table, axis: int, origin: Array, prob
     where the machine's errors bend; of many, those where the two differ most beside three lines,
     with all probes.
     """
-    own = table.nodes[axis] if isinstance(table, VolumeTable) else table.axes[axis].positions
+    axis_nodes = table.nodes[axis] if isinstance(table, VolumeTable) else table.axes[axis].positions
     low, high = float(machine.lower[axis]), float(machine.upper[axis])
     bends = machine.bends[axis] if machine.bends else np.zeros(0)
-    every = np.concatenate([own, 0.5 * (own[:-1] + own[1:]), bends])
+    every = np.concatenate([axis_nodes, 0.5 * (axis_nodes[:-1] + axis_nodes[1:]), bends])
     every = np.unique(np.clip(every, low, high))
     if len(every) <= PLACES:
         return every

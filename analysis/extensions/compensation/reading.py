@@ -58,18 +58,18 @@ def read_table_files(
 
     :raises ExperimentError: the files are invalid, say otherwise, or leave open what nobody says.
     """
-    stated = made.read(paths)
-    meant = _sense(stated, sense, paths[0])
-    if stated.volume is not None:
+    statements = made.read(paths)
+    meant = _sense(statements, sense, paths[0])
+    if statements.volume is not None:
         if arrangement is not None:
             text = "a table of the whole volume has no arrangement of axes; leave it out"
             raise refused(paths[0], text)
-        return ReadTable(with_sense(stated.volume, meant), meant, stated.notes)
-    own = _arrangement(stated, made, arrangement, paths[0])
+        return ReadTable(with_sense(statements.volume, meant), meant, statements.notes)
+    own_arrangement = _arrangement(statements, made, arrangement, paths[0])
     tables = AxisTables(
-        own,
-        _origin(stated, made, origin, paths[0]),
-        stated.axes,
+        own_arrangement,
+        _origin(statements, made, origin, paths[0]),
+        statements.axes,
     )
     if arrangement is not None:
         try:
@@ -78,52 +78,54 @@ def read_table_files(
             raise refused(
                 paths[0], f"cannot be told in that arrangement: {error}; name another"
             ) from None
-    notes = stated.notes
+    notes = statements.notes
     if not made.has_rotations:
         notes = (*notes, f"{made.name} tables have no rotations: there are none in what is read")
     return ReadTable(with_sense(tables, meant), meant, notes)
 
 
-def _sense(stated: StatedTable, sense: Sense | None, path: Path) -> Sense:
-    if stated.sense is None and sense is None:
+def _sense(statements: StatedTable, sense: Sense | None, path: Path) -> Sense:
+    if statements.sense is None and sense is None:
         raise refused(
             path,
             f"does not state whether values are {' or '.join(SENSES)}; say so, since the other"
             " sign would double the machine's errors",
         )
-    if None not in (stated.sense, sense) and stated.sense != sense:
-        raise refused(path, f"states {stated.sense}, not {sense}; leave the sense to the file")
-    found = stated.sense or sense
-    assert found is not None
-    return found
+    if None not in (statements.sense, sense) and statements.sense != sense:
+        raise refused(path, f"states {statements.sense}, not {sense}; leave the sense to the file")
+    chosen_sense = statements.sense or sense
+    assert chosen_sense is not None
+    return chosen_sense
 
 
 def _arrangement(
-    stated: StatedTable, made: TableFormat, wanted: Arrangement | None, path: Path
+    statements: StatedTable, made: TableFormat, wanted: Arrangement | None, path: Path
 ) -> Arrangement:
     """The arrangement that the values are told in."""
-    if stated.arrangement is not None:
-        own = stated.arrangement
+    if statements.arrangement is not None:
+        own_arrangement = statements.arrangement
     elif wanted is not None:
-        own = Arrangement(tool_chain(wanted)) if made.from_zero else wanted
+        own_arrangement = Arrangement(tool_chain(wanted)) if made.from_zero else wanted
     else:
         raise refused(
             path,
             "does not state which axis carries which; name the machine's arrangement, such as"
             " MB2 or FB1",
         )
-    return own
+    return own_arrangement
 
 
-def _origin(stated: StatedTable, made: TableFormat, origin: Corner | None, path: Path) -> Corner:
-    if stated.origin is not None and origin not in (None, stated.origin):
+def _origin(
+    statements: StatedTable, made: TableFormat, origin: Corner | None, path: Path
+) -> Corner:
+    if statements.origin is not None and origin not in (None, statements.origin):
         raise refused(path, "states its origin itself; leave it out")
-    found = stated.origin or origin
-    turns = any(one.values[:, 3:].any() for one in stated.axes)
-    if found is None and turns:
+    chosen_origin = statements.origin or origin
+    turns = any(axis.values[:, 3:].any() for axis in statements.axes)
+    if chosen_origin is None and turns:
         raise refused(path, "does not state from which point levers of rotations count; give it")
-    corner = [float(one.positions[0]) for one in stated.axes]
-    return found or (*corner, *[0.0] * (3 - len(corner)))
+    corner = [float(axis.positions[0]) for axis in statements.axes]
+    return chosen_origin or (*corner, *[0.0] * (3 - len(corner)))
 
 
 def machine_files(tables: AxisTables, title: str, stem: str) -> dict[str, str]:
@@ -140,11 +142,11 @@ def machine_files(tables: AxisTables, title: str, stem: str) -> dict[str, str]:
     reference = np.clip(tables.origin, tables.lower, tables.upper)
     machine = tables.machine()
     functions = axis_functions(machine.model, machine.a)
-    nodes = tuple(one.positions for one in tables.axes)
+    nodes = tuple(axis.positions for axis in tables.axes)
     there = tabulated(functions, nodes, reference, tuple(reference.tolist()))
-    straight = [_without_slopes(one, float(reference[one.axis])) for one in there.axes]
+    straight = [_without_slopes(axis, float(reference[axis.axis])) for axis in there.axes]
     slopes = np.array([slope for _, slope in straight])
-    found: dict[str, str] = {}
+    files: dict[str, str] = {}
     errors = []
     for table, _ in straight:
         for name, values in zip(names_of(table.axis), table.values.T, strict=True):
@@ -155,7 +157,7 @@ def machine_files(tables: AxisTables, title: str, stem: str) -> dict[str, str]:
                     for position, value in zip(table.positions, values, strict=True)
                 ]
                 ending = f"-{name}.csv"
-                found[ending] = "\n".join([f"position_mm,{name}_{unit}", *rows, ""])
+                files[ending] = "\n".join([f"position_mm,{name}_{unit}", *rows, ""])
                 errors.append(f'  {name}: {{file: "{stem}{ending}"}}')
     lines = [
         f"title: {json.dumps(title)}",
@@ -166,8 +168,8 @@ def machine_files(tables: AxisTables, title: str, stem: str) -> dict[str, str]:
     lines += ["errors:", *errors] if errors else []
     square = squareness(slopes)
     lines += ["squareness:", *(f"  {name}: {1e6 * v:.9g} urad" for name, v in square.items() if v)]
-    found[".yaml"] = "\n".join([*(lines if any(square.values()) else lines[:-1]), ""])
-    return found
+    files[".yaml"] = "\n".join([*(lines if any(square.values()) else lines[:-1]), ""])
+    return files
 
 
 def squareness(slopes: Array) -> dict[str, float]:
@@ -180,8 +182,11 @@ def squareness(slopes: Array) -> dict[str, float]:
     -3e-06
     """
     return {
-        name: float(one.sign * (slopes[one.axis, one.to] + slopes[one.to, one.axis]))
-        for name, one in SQUARENESS_ERRORS.items()
+        name: float(
+            error_name.sign
+            * (slopes[error_name.axis, error_name.to] + slopes[error_name.to, error_name.axis])
+        )
+        for name, error_name in SQUARENESS_ERRORS.items()
     }
 
 
@@ -199,12 +204,12 @@ def _without_slopes(table: AxisTable, reference: float) -> tuple[AxisTable, Arra
 
 
 def _arrangement_lines(arrangement: Arrangement) -> list[str]:
-    for name, known in ARRANGEMENTS.items():
-        if known == arrangement:
+    for name, named_arrangement in ARRANGEMENTS.items():
+        if named_arrangement == arrangement:
             return [f"arrangement: {name}"]
     sides = {"probe_side": arrangement.probe_side, "workpiece_side": arrangement.workpiece_side}
-    told = ", ".join(f"{key}: [{', '.join(axes)}]" for key, axes in sides.items())
-    return [f"arrangement: {{{told}}}"]
+    sides_text = ", ".join(f"{key}: [{', '.join(axes)}]" for key, axes in sides.items())
+    return [f"arrangement: {{{sides_text}}}"]
 
 
 def _volume_line(tables: AxisTables) -> str:

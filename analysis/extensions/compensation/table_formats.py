@@ -84,8 +84,8 @@ class TableFormat:
 def rounded(values: Array, made: TableFormat) -> Array:
     """Values (..., 6) as the format writes them."""
     steps = np.repeat([made.length_step, made.angle_step], 3)
-    found = np.round(values / steps) * steps
-    return np.asarray(found if made.has_rotations else found * (np.arange(6) < 3))
+    rounded_values = np.round(values / steps) * steps
+    return np.asarray(rounded_values if made.has_rotations else rounded_values * (np.arange(6) < 3))
 
 
 def with_sense(table: Table, sense: Sense) -> Table:
@@ -94,7 +94,7 @@ def with_sense(table: Table, sense: Sense) -> Table:
         return table
     if isinstance(table, VolumeTable):
         return replace(table, values=-table.values)
-    return table.changed(lambda one: -one.values)
+    return table.changed(lambda sense_name: -sense_name.values)
 
 
 def stated_sense(comment: str) -> Sense | None:
@@ -104,7 +104,9 @@ def stated_sense(comment: str) -> Sense | None:
     ('errors of indication', None)
     """
     match = re.match(r"\s*states:\s*(.*)", comment)
-    return next((one for one in SENSES if match and match[1].startswith(one)), None)
+    return next(
+        (sense_name for sense_name in SENSES if match and match[1].startswith(sense_name)), None
+    )
 
 
 def arrangement_words(arrangement: Arrangement) -> str:

@@ -39,7 +39,7 @@ class VolumeTable:
         """Corrections (m, d) at scale readings x (m, d) with probe offsets p (m, d), linear in each
         co-ordinate between nodes.
         """
-        found = np.zeros((len(x), 6))
+        errors = np.zeros((len(x), 6))
         cells, parts = [], []
         for k, nodes in enumerate(self.nodes):
             cell = np.clip(np.searchsorted(nodes, x[:, k], "right") - 1, 0, len(nodes) - 2)
@@ -51,10 +51,10 @@ class VolumeTable:
             for k, one in enumerate(corner):
                 weight = weight * (parts[k] if one else 1.0 - parts[k])
             index = tuple(cell + one for cell, one in zip(cells, corner, strict=True))
-            found += weight[:, None] * self.values[index]
+            errors += weight[:, None] * self.values[index]
         offset = np.zeros((len(x), 3))
         offset[:, : self.dimension] = p
-        turned = found[:, :3] + np.cross(found[:, 3:], offset)
+        turned = errors[:, :3] + np.cross(errors[:, 3:], offset)
         return np.asarray(turned[:, : self.dimension] + p)
 
 
@@ -64,20 +64,20 @@ def volume_table(model: ErrorModel, a: Array, nodes: tuple[Array, ...], zero: Ar
     What a probe offset changes is taken as a turn of the probe; what it stretches is left out.
     """
     values = _at(model, a, grid_points(nodes)) - _at(model, a, zero[None])
-    return VolumeTable(nodes, values.reshape(*(len(one) for one in nodes), 6))
+    return VolumeTable(nodes, values.reshape(*(len(node) for node in nodes), 6))
 
 
 def _at(model: ErrorModel, a: Array, x: Array) -> Array:
     """Displacement and turn (m, 6) at x (m, d)."""
     m, d = x.shape
     still = np.zeros((m, d))
-    found = np.zeros((m, 6))
-    found[:, :d] = model.error(x, a, still)
+    errors = np.zeros((m, 6))
+    errors[:, :d] = model.error(x, a, still)
     by_offset = np.zeros((m, 3, 3))
     for k in range(d):
         p = np.tile(OFFSET * np.eye(d)[k], (m, 1))
-        by_offset[:, :d, k] = (model.error(x, a, p) - p - found[:, :d]) / OFFSET
+        by_offset[:, :d, k] = (model.error(x, a, p) - p - errors[:, :d]) / OFFSET
     for k in range(3):
         i, j = (k + 1) % 3, (k + 2) % 3
-        found[:, 3 + k] = 0.5 * (by_offset[:, j, i] - by_offset[:, i, j])
-    return found
+        errors[:, 3 + k] = 0.5 * (by_offset[:, j, i] - by_offset[:, i, j])
+    return errors

@@ -175,20 +175,18 @@ def budget(
 
     :raises ValueError: the fit has not converged.
     """
-    linearisation_and_x, x = (
+    linearisation, x = (
         (linearise(lay_out(experiment)), None)
         if fit is None
         else (fit.functions.at, fit.observed.x)
     )
     sigma = 1.0 if fit is None else fit.sigma
-    sums = source_sums(
-        linearisation_and_x, x, sources_of(linearisation_and_x.design, experiment, by)
-    )
+    sums = source_sums(linearisation, x, sources_of(linearisation.design, experiment, by))
     caution = ""
     if fit is not None and fit.sigma_is_estimated:
         remedy = "--sigma given takes the uncertainties as stated"
         caution = few_degrees_of_freedom(fit.degrees_of_freedom, "sigma", remedy)
-    names, figures = _largest_first(sums.names, tuple(_figures(linearisation_and_x, sums, sigma)))
+    names, figures = _largest_first(sums.names, tuple(_figures(linearisation, sums, sigma)))
     return UncertaintyBudget(
         experiment.label,
         experiment.title,

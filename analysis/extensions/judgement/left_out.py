@@ -160,7 +160,7 @@ def rest_of(design: Design, x: Array, group: LeftGroup) -> RestFit | None:
     place = np.full(len(is_out), -1)
     place[rows] = np.arange(len(rows))
     d, balls = design_left.dimension, len(design_left.balls.names)
-    common, zero_parts = (
+    common, own_rows = (
         np.zeros((len(rows), linearisation.balls.common.shape[2])),
         np.zeros((len(rows), balls * d)),
     )
@@ -169,8 +169,8 @@ def rest_of(design: Design, x: Array, group: LeftGroup) -> RestFit | None:
         common[place[some.rows[mine]]] = some.common[mine]
         alone = mine[some.ball[mine] >= 0]
         columns = d * some.ball[alone][:, None] + np.arange(d)
-        zero_parts[place[some.rows[alone]][:, None], columns] = some.own[alone]
-    root = np.concatenate([common, zero_parts[:, zero_parts.any(axis=0)]], axis=1)
+        own_rows[place[some.rows[alone]][:, None], columns] = some.own[alone]
+    root = np.concatenate([common, own_rows[:, own_rows.any(axis=0)]], axis=1)
     hat = root @ root.T
     residual_projector = np.eye(len(rows)) - hat
     variances = (residual_projector**2).sum(axis=1) + OUT**2 * np.einsum(

@@ -76,9 +76,9 @@ def source_sums(
     of_lengths = np.zeros((lengths.stop - lengths.start, rank))
     sums = np.zeros((len(sources), rank, rank))
     for some in hat_rows(linearisation, x):
-        common, common_rows = some.common[:, :rank], member[some.rows]
-        for k in np.unique(common_rows[common_rows >= 0]):
-            sums[k] += common[common_rows == k].T @ common[common_rows == k]
+        common, own_member = some.common[:, :rank], member[some.rows]
+        for k in np.unique(own_member[own_member >= 0]):
+            sums[k] += common[own_member == k].T @ common[own_member == k]
         is_length = (some.rows >= lengths.start) & (some.rows < lengths.stop)
         of_lengths[some.rows[is_length] - lengths.start] = common[is_length]
     names = [source.name for source in sources]

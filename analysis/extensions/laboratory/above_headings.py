@@ -24,7 +24,7 @@ def said_above(lines: Iterable[str]) -> dict[str, str]:
 
     :raises HeadingError: they say two things.
     """
-    found: dict[str, str] = {}
+    statements: dict[str, str] = {}
     for text in (text[:LONGEST_LINE] for text in lines):
         for role, pattern in ABOVE.items():
             match = re.match(
@@ -34,9 +34,10 @@ def said_above(lines: Iterable[str]) -> dict[str, str]:
             )
             if match is None or not match[1]:
                 continue
-            if found.setdefault(role, match[1]) != match[1]:
+            if statements.setdefault(role, match[1]) != match[1]:
                 raise HeadingError(
-                    f'two lines above the headings state a {role}, "{shorten(found[role])}" and'
+                    f'two lines above the headings state a {role}, "{shorten(statements[role])}"'
+                    " and"
                     f' "{shorten(match[1])}"; write which under readings'
                 )
-    return found
+    return statements

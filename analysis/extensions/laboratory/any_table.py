@@ -137,16 +137,18 @@ class _Reader:
             above = said_above(self.form.above)
         except HeadingError as error:
             raise self.error(str(error)) from None
-        texts, told = self._texts(above)
+        texts, texts_above = self._texts(above)
         units = self._units(above)
-        found = [row for group in form.headings.groups for row in self._rows(group, texts, units)]
+        rows_found = [
+            row for group in form.headings.groups for row in self._rows(group, texts, units)
+        ]
         # In the order that they were read in, also where several stand side by side.
-        found.sort(key=lambda one: one[0].mark.line)
-        rows, diameters = [row for row, _ in found], tuple(d for _, d in found)
+        rows_found.sort(key=lambda row: row[0].mark.line)
+        rows, diameters = [row for row, _ in rows_found], tuple(d for _, d in rows_found)
         self._refuse_doubtful(rows, is_possible)
         hints = self._of_positions(texts.get("position", ""))
-        said = (self._told(units, told),)
-        return TableRows(tuple(rows), said, diameters, hints, times=self._times())
+        notes = (self._told(units, texts_above),)
+        return TableRows(tuple(rows), notes, diameters, hints, times=self._times())
 
     def _refuse_wrong(self) -> None:
         form, headings = self.form, self.form.headings
@@ -170,28 +172,28 @@ class _Reader:
 
         :raises ExperimentError: nothing says which position it is.
         """
-        texts, told = {}, []
+        texts, notes = {}, []
         every = {role for group in self.form.headings.groups for role in group.texts}
         for role in ("position", "probe"):
             column = self.form.headings.roles.get(role)
-            known = getattr(self.words, f"{role}s")
+            names_known = getattr(self.words, f"{role}s")
             if column is not None:
                 if column.constant is not None:
                     texts[role] = column.constant
             elif role in above:
                 texts[role] = above[role]
-                told.append(f'{role} "{shorten(above[role])}" above the headings')
+                notes.append(f'{role} "{shorten(above[role])}" above the headings')
             elif role in every:
                 continue
-            elif len(known) == 1:
-                texts[role] = known[0]
+            elif len(names_known) == 1:
+                texts[role] = names_known[0]
             elif role == "position":
                 name = Path(self.source.name).stem
                 if name == self.source.name:
                     raise self.error(missing_columns(self.form.headings.cells, [role]))
                 texts[role] = name
-                told.append(f'position "{shorten(name)}" by the name of the file')
-        return texts, told
+                notes.append(f'position "{shorten(name)}" by the name of the file')
+        return texts, notes
 
     def _of_positions(self, position: str) -> tuple[Message, ...]:
         """What to say where positions are not known, since one is by the name of the file alone.
@@ -201,11 +203,11 @@ class _Reader:
         headings = self.form.headings
         if position != Path(self.source.name).stem or "position" in headings.roles:
             return ()
-        known = {folded(name) for name in self.words.positions}
+        names_known = {folded(name) for name in self.words.positions}
         for i, cell in enumerate(headings.cells):
-            if i in headings.used or not cell or folded(position) in known:
+            if i in headings.used or not cell or folded(position) in names_known:
                 continue
-            if {folded(cells[i]) for _, cells in self.form.rows} <= known:
+            if {folded(cells[i]) for _, cells in self.form.rows} <= names_known:
                 name = shorten(cell)
                 raise self.error(
                     f'the column "{name}" has names of positions; if it is that of positions, give'
@@ -226,24 +228,25 @@ class _Reader:
 
         :raises ExperimentError: one has none, or two.
         """
-        stated = None if self.settings.unit is None else plain_unit(self.settings.unit)
+        unit_stated = None if self.settings.unit is None else plain_unit(self.settings.unit)
         once = unit_of(above.get("unit", "").rstrip("."))
-        if stated and once and stated != once:
+        if unit_stated and once and unit_stated != once:
             raise self.error(
-                f"the table says that lengths are in {once}, the experiment file {stated}; correct"
+                f"the table says that lengths are in {once}, the experiment file {unit_stated};"
+                " correct"
                 " readings.unit"
             )
-        found: dict[int, str] = {}
+        units: dict[int, str] = {}
         without: list[int] = []
         roles = self.form.headings.roles
         axes = [axis for group in self.form.headings.groups for axis in group.axes]
-        others = [roles[role] for role in ("u", "diameter") if role in roles]
-        lengths = [*axes, *(column for column in others if column.constant is None)]
+        other_columns = [roles[role] for role in ("u", "diameter") if role in roles]
+        lengths = [*axes, *(column for column in other_columns if column.constant is None)]
         for column in lengths:
-            unit = column.unit or self.form.units.get(column.place) or stated or once
-            if unit is None and column is roles.get("diameter") and found:
+            unit = column.unit or self.form.units.get(column.place) or unit_stated or once
+            if unit is None and column is roles.get("diameter") and units:
                 # Of what stands beside co-ordinates in one unit, as an uncertainty may not.
-                unit = next(iter(found.values())) if len(set(found.values())) == 1 else None
+                unit = next(iter(units.values())) if len(set(units.values())) == 1 else None
             if unit is None and column is roles.get("u") and not without:
                 cells = self.form.headings.cells
                 named = f'"{shorten(cells[column.place])}"' if cells else str(column.place + 1)
@@ -254,7 +257,7 @@ class _Reader:
             if unit is None:
                 without.append(column.place)
             else:
-                found[column.place] = unit
+                units[column.place] = unit
         if without:
             cells = self.form.headings.cells
             names = listing(f'"{cells[i]}"' if cells else str(i + 1) for i in without)
@@ -262,7 +265,7 @@ class _Reader:
                 f"no unit is stated for the columns {names}; write it under readings: {{unit: mm}}"
                 " in the experiment file, or give --unit mm"
             )
-        return found
+        return units
 
     def _rows(
         self, group: Group, texts: Mapping[str, str], units: Mapping[int, str]
@@ -273,11 +276,11 @@ class _Reader:
         axes = [axis.place for axis in group.axes]
         factors = {i: (LENGTH_UNITS[u], power_of_ten(LENGTH_UNITS[u])) for i, u in units.items()}
         further = [roles.get(name) for name in self.words.further]
-        for name, known in self.words.further.items():
+        for name, names_known in self.words.further.items():
             if name in roles and (unit := roles[name].unit) is not None:
-                factors[roles[name].place] = known[unit], power_of_ten(known[unit])
+                factors[roles[name].place] = names_known[unit], power_of_ten(names_known[unit])
         places = {role: roles[role].place for role in TEXTS if role in roles}
-        found: list[tuple[FileRow, float]] = []
+        rows: list[tuple[FileRow, float]] = []
         messages: list[Message] = []
 
         def number(cells: Sequence[str], i: int, mark: Mark) -> float:
@@ -308,22 +311,25 @@ class _Reader:
             mark = Mark(file, line, 1)
             names = []
             for role in TEXTS:
-                own = group.texts.get(role) or texts.get(role) or ""
+                text = group.texts.get(role) or texts.get(role) or ""
                 if role in places and places[role] >= 0:
-                    own = text_of_cell(cells[places[role]])
-                    if not own:
+                    text = text_of_cell(cells[places[role]])
+                    if not text:
                         messages.append(mark.message("", f"no {role}; write its name"))
-                names.append(own)
+                names.append(text)
             x = [number(cells, i, mark) for i in axes]
             x.append(of_all if u is None else number(cells, u, mark))
             if "k" in roles and not math.isnan(x[-1]):
                 x[-1] /= _coverage_factor(roles["k"], cells, sign, mark, messages)
-            x += [math.nan if one is None else number(cells, one.place, mark) for one in further]
+            x += [
+                math.nan if column is None else number(cells, column.place, mark)
+                for column in further
+            ]
             size = math.nan if diameter is None else number(cells, diameter, mark)
-            found.append((FileRow(mark, tuple(names), tuple(x)), size))
+            rows.append((FileRow(mark, tuple(names), tuple(x)), size))
         if messages:
             raise ExperimentError(messages)
-        return found
+        return rows
 
     def _times(self) -> tuple[ReadTime, ...]:
         """Clock times of rows, which have been read."""
@@ -353,14 +359,15 @@ class _Reader:
         cell = doubtful_decimals(self.form)
         x = np.array([row.lengths[: len(self.words.axes)] for row in rows])
         if cell and is_possible(1e3 * x):
-            other = cell.replace(".", "").replace(",", "")
+            digits_only = cell.replace(".", "").replace(",", "")
             raise self.error(
-                f'"{cell}" could be {cell.replace(",", ".")} or {other}, as could all numbers here;'
+                f'"{cell}" could be {cell.replace(",", ".")} or {digits_only}, as could all'
+                " numbers here;"
                 f" write under readings: {{decimal: {self.form.decimal}}} if it is"
                 f" {cell.replace(',', '.')}, otherwise export without signs between thousands"
             )
 
-    def _told(self, units: Mapping[int, str], others: Sequence[str]) -> str:
+    def _told(self, units: Mapping[int, str], notes_above: Sequence[str]) -> str:
         """How the table was read, in a sentence."""
         form, headings = self.form, self.form.headings
         parts = [SEPARATORS[form.separator][1], f"decimal {form.decimal}s"]
@@ -378,9 +385,9 @@ class _Reader:
         if "u" in headings.roles and (u := headings.roles["u"].constant) is not None:
             parts.append(f"u is {u} in all rows")
         if len(headings.groups) > 1:
-            of = listing((" ".join(group.texts.values()) for group in headings.groups), 6)
-            parts.append(f"co-ordinates of {of} side by side")
-        parts += others
+            groups_text = listing((" ".join(group.texts.values()) for group in headings.groups), 6)
+            parts.append(f"co-ordinates of {groups_text} side by side")
+        parts += notes_above
         if headings.unused:
             names = listing(f'"{shorten(cell)}"' for cell in headings.unused)
             warm = any("temperature" in cell.casefold() for cell in headings.unused)

@@ -50,15 +50,15 @@ def clock_time(text: str) -> ClockTime:
     try:
         if len(plain) > LONGEST or ":" not in plain:
             raise ValueError(plain)
-        found = datetime.fromisoformat(plain)
+        moment = datetime.fromisoformat(plain)
     except ValueError:
         raise ClockError(
             f'"{shorten(text)}" is no time of a clock; write 10:05:30 or 2026-11-22T10:05:30, or'
             " name the column with the unit of its numbers, such as time_s"
         ) from None
-    if found.tzinfo is None:
-        return ClockTime(OF_DATE, found.replace(tzinfo=UTC).timestamp())
-    return ClockTime(OF_ZONE, found.timestamp())
+    if moment.tzinfo is None:
+        return ClockTime(OF_DATE, moment.replace(tzinfo=UTC).timestamp())
+    return ClockTime(OF_ZONE, moment.timestamp())
 
 
 # Where a time stands, as it is written, and what it is.

@@ -43,35 +43,35 @@ SHIFTED = 0.25
 
 
 def poses_found(
-    design: Design, readings: Readings, seen: Array
+    design: Design, readings: Readings, seen_places: Array
 ) -> dict[int, tuple[float, float]] | None:
     """By position, the angle (degrees) and the distance (m) of readings' places seen (m, d) from
     where the artefact was planned; None where those of a position are not of the artefact.
 
     Only positions of plates count, of which balls were read that fix the pose.
     """
-    pitch, found = ball_pitches(design), {}
+    pitch, poses = ball_pitches(design), {}
     for k, rows, nominal in read_in_positions(design, readings):
         is_plate = design.artefacts.is_plate[design.positions.artefact[k]]
         if not is_plate or not fixes_pose(nominal):
             continue
         reach = AGAINST_DRAWING * pitch[readings.ball[rows]]
-        rotation, _, agreeing = consensus_motion(nominal, seen[rows], reach)
+        rotation, _, agreeing = consensus_motion(nominal, seen_places[rows], reach)
         if 4 * agreeing.sum() <= 3 * len(rows):
             return None
         planned = design.positions.rotations[k]
         there = nominal.mean(axis=0) @ planned.T + design.positions.origins[k]
-        shift = seen[rows].mean(axis=0) - there
+        shift = seen_places[rows].mean(axis=0) - there
         turn = planned.T @ rotation
         cosine = turn[0, 0] if design.dimension == 2 else (np.trace(turn) - 1.0) / 2.0
         angle = float(np.degrees(np.arccos(np.clip(cosine, -1.0, 1.0))))
-        found[int(k)] = angle, float(np.sqrt(shift @ shift))
-    return found
+        poses[int(k)] = angle, float(np.sqrt(shift @ shift))
+    return poses
 
 
-def _as_planned(design: Design, readings: Readings, seen: Array) -> bool:
-    found = poses_found(design, readings, seen)
-    return bool(found) and all(angle < TURNED for angle, _ in (found or {}).values())
+def _as_planned(design: Design, readings: Readings, seen_places: Array) -> bool:
+    poses = poses_found(design, readings, seen_places)
+    return bool(poses) and all(angle < TURNED for angle, _ in (poses or {}).values())
 
 
 def common_cause(design: Design, x: Array, settings: ReadingsSettings) -> str:
@@ -84,22 +84,22 @@ def common_cause(design: Design, x: Array, settings: ReadingsSettings) -> str:
     if settings.coordinates in ("ball centres", "part"):
         # What is wrong with centres is wrong before the controller's offsets are taken off.
         applied = controller_offsets(design, settings)[readings.probe]
-        given, offsets = x + applied, offsets - applied
+        places_given, offsets = x + applied, offsets - applied
     else:
-        given = x
+        places_given = x
     if settings.coordinates == "part":
         # Of these only the unit tells: they may be turned in any way.
-        changes = ((text, ratio * given) for text, ratio in _units())
+        changes = ((text, ratio * places_given) for text, ratio in _units())
         fitting = [text for text, changed in changes if poses_found(design, readings, changed)]
         return ", or ".join(fitting)
     causes = [
         text
-        for text, changed in _changed(given)
+        for text, changed in _changed(places_given)
         if _as_planned(design, readings, changed + offsets)
     ]
     if not causes:
-        found = poses_found(design, readings, given)
-        if found and any(angle > TURNED for angle, _ in found.values()):
+        poses = poses_found(design, readings, places_given)
+        if poses and any(angle > TURNED for angle, _ in poses.values()):
             causes.append(
                 "if they are centres in co-ordinates of a part, another in each position; then"
                 " write readings: {coordinates: part}"
@@ -125,15 +125,15 @@ def _changed(x: Array) -> Iterator[tuple[str, Array]]:
 
 
 def _units() -> Iterator[tuple[str, float]]:
-    for ratio, what in RATIOS.items():
-        yield f"if lengths are in {what}", ratio
+    for ratio, unit_name in RATIOS.items():
+        yield f"if lengths are in {unit_name}", ratio
 
 
-def mistaken_positions(design: Design, readings: Readings, seen: Array) -> dict[int, int]:
+def mistaken_positions(design: Design, readings: Readings, seen_places: Array) -> dict[int, int]:
     """Positions of plates most of whose places seen (m, d) are where another one was planned, and
     not where their own was, each with that other one.
     """
-    reach, found = AGAINST_DRAWING * ball_pitches(design), {}
+    reach, mistaken = AGAINST_DRAWING * ball_pitches(design), {}
     artefacts = design.positions.artefact
     for k in np.unique(readings.position).tolist():
         rows = np.flatnonzero(readings.position == k)
@@ -142,12 +142,12 @@ def mistaken_positions(design: Design, readings: Readings, seen: Array) -> dict[
         apart = {}
         for j in np.flatnonzero(is_same).tolist():
             there = nominal_places(design, j, ball)
-            off = np.sqrt(((seen[rows] - there) ** 2).sum(axis=1))
+            off = np.sqrt(((seen_places[rows] - there) ** 2).sum(axis=1))
             apart[j] = float(np.median(off / reach[ball]))
         nearest = min(apart, key=lambda j: apart[j], default=k)
         if apart.get(k, 0.0) > 1.0 and apart[nearest] <= 1.0:
-            found[k] = nearest
-    return found
+            mistaken[k] = nearest
+    return mistaken
 
 
 def words_of_mistaken(design: Design, mistaken: Mapping[int, int]) -> str:
@@ -155,8 +155,8 @@ def words_of_mistaken(design: Design, mistaken: Mapping[int, int]) -> str:
     names = design.positions.names
     pairs = listing(f"{names[k]} where {names[j]}" for k, j in mistaken.items())
     is_exchange = set(mistaken) == set(mistaken.values())
-    what = "exchange the names of positions" if is_exchange else "correct the names of positions"
-    return f"readings are where other positions were planned, {pairs}: {what}, or what is planned"
+    advice = "exchange the names of positions" if is_exchange else "correct the names of positions"
+    return f"readings are where other positions were planned, {pairs}: {advice}, or what is planned"
 
 
 def doubts_about_poses(design: Design, x: Array) -> tuple[str, ...]:
@@ -164,11 +164,11 @@ def doubts_about_poses(design: Design, x: Array) -> tuple[str, ...]:
     are the cause of; none where they stood about as planned.
     """
     readings = design.readings
-    seen = x + design.probes.offsets[readings.probe]
-    found = poses_found(design, readings, seen) or {}
+    places = x + design.probes.offsets[readings.probe]
+    poses = poses_found(design, readings, places) or {}
     size = float(design.machine.volume.size.max())
-    far = {k: pose for k, pose in found.items() if pose[0] > TURNED or pose[1] > SHIFTED * size}
-    mistaken = mistaken_positions(design, readings, seen)
+    far = {k: pose for k, pose in poses.items() if pose[0] > TURNED or pose[1] > SHIFTED * size}
+    mistaken = mistaken_positions(design, readings, places)
     if mistaken:
         return (words_of_mistaken(design, mistaken),)
     if not far:

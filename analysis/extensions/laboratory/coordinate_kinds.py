@@ -80,12 +80,13 @@ def doubts_about_copies(design: Design, readings: Readings, x: Array) -> tuple[s
         for k in np.unique(readings.position).tolist()
     }
     doubts = []
-    for one, other in combinations(of_position, 2):
-        own = of_position[one]
-        if len(own) > design.dimension and own == of_position[other]:
+    for first, second in combinations(of_position, 2):
+        readings_of_first = of_position[first]
+        if len(readings_of_first) > design.dimension and readings_of_first == of_position[second]:
             names = design.positions.names
             doubts.append(
-                f'positions "{names[one]}" and "{names[other]}" have the same readings to the last'
+                f'positions "{names[first]}" and "{names[second]}" have the same readings to the'
+                " last"
                 " digit; if one is a copy of the other, give what was read there"
             )
     return tuple(doubts)

@@ -46,15 +46,19 @@ def doubts_about_digits(design: Design, x: Array, uncertainty: Array | None) -> 
 
     Rounding to steps of q has the standard uncertainty q / sqrt(12) (GUM, 4.3.7).
     """
-    known = x[~np.isnan(x)]
-    if len(known) < FEWEST:
+    values = x[~np.isnan(x)]
+    if len(values) < FEWEST:
         return ()
-    step = last_digit(known)
+    step = last_digit(values)
     rounding = step / np.sqrt(12.0)
-    stated = float(np.median(design.machine.repeatability if uncertainty is None else uncertainty))
-    if rounding <= NOTABLE * stated:
+    uncertainty_stated = float(
+        np.median(design.machine.repeatability if uncertainty is None else uncertainty)
+    )
+    if rounding <= NOTABLE * uncertainty_stated:
         return ()
-    shown = [format_length(float(f"{one:.3g}")) for one in (step, rounding, stated)]
+    shown = [
+        format_length(float(f"{amount:.3g}")) for amount in (step, rounding, uncertainty_stated)
+    ]
     return (
         f"the readings have no digit below {shown[0]}; such rounding has a standard uncertainty of"
         f" {shown[1]}, beside the {shown[2]} that are stated of readings: give more digits, or"
@@ -66,10 +70,15 @@ def doubts_about_units(design: Design, uncertainty: Array) -> tuple[str, ...]:
     """A sentence about standard uncertainties (m,) that a table has of its readings, if they are
     so much larger or smaller than the repeatability that they are rather in another unit.
     """
-    found, stated = float(np.median(uncertainty)), float(np.median(design.machine.repeatability))
-    if stated / OTHER_UNIT < found < stated * OTHER_UNIT:
+    stated_uncertainty, repeatability = (
+        float(np.median(uncertainty)),
+        float(np.median(design.machine.repeatability)),
+    )
+    if repeatability / OTHER_UNIT < stated_uncertainty < repeatability * OTHER_UNIT:
         return ()
-    shown = [format_length(float(f"{one:.3g}")) for one in (found, stated)]
+    shown = [
+        format_length(float(f"{amount:.3g}")) for amount in (stated_uncertainty, repeatability)
+    ]
     return (
         f"the table states a standard uncertainty of {shown[0]} of its readings, beside a"
         f" repeatability of {shown[1]}: check the unit of its column",

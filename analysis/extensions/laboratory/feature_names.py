@@ -76,15 +76,15 @@ def without_point(rule: str) -> tuple[str, re.Pattern[str] | None]:
     """
     if not rule.endswith("{point}"):
         return rule, None
-    rest = rule.removesuffix("{point}")
-    end = rest.rfind("}") + 1
-    return rest[:end], re.compile(rf"(.+){re.escape(rest[end:])}([0-9]+)", re.DOTALL)
+    beginning = rule.removesuffix("{point}")
+    end = beginning.rfind("}") + 1
+    return beginning[:end], re.compile(rf"(.+){re.escape(beginning[end:])}([0-9]+)", re.DOTALL)
 
 
 def _split(name: str, rule: str, file: str) -> Parts | None:
     """The parts of a name, of which nothing is known; None where it is not of the rule."""
     pieces = PLACE.split(rule)
-    found = []
+    parts = []
     for quantifier in ("+?", "+"):
         pattern = "".join(
             f"(?P<{piece}>.{quantifier})" if i % 2 else re.escape(piece)
@@ -93,14 +93,14 @@ def _split(name: str, rule: str, file: str) -> Parts | None:
         match = re.fullmatch(pattern, name[:LONGEST_NAME])
         if match is None or len(name) > LONGEST_NAME:
             return None
-        found.append(match.groupdict())
-    if found[0] != found[1]:
+        parts.append(match.groupdict())
+    if parts[0] != parts[1]:
         text = (
             f'the name "{shorten(name)}" can be parted as {rule} in several ways; name the'
             " experiment with --for, or another rule with --name"
         )
         raise refused(file, text)
-    return found[0]
+    return parts[0]
 
 
 def _likely(names: Sequence[str], file: str) -> str:
@@ -125,7 +125,7 @@ def _lookup(rule: str, design: Design, numbered: Sequence[str]) -> dict[str, Par
     places = [name for name in PLACE.findall(rule) if name != "point"]
     positions = enumerate(design.positions.names) if "position" in places else ((-1, ""),)
     probes = design.probes.names if "probe" in places else ("",)
-    found: dict[str, Parts | None] = {}
+    parts_by_name: dict[str, Parts | None] = {}
     for (k, position), probe in product(positions, probes):
         artefacts = [int(design.positions.artefact[k])] if k >= 0 else design.artefacts.plates
         for artefact in artefacts:
@@ -135,8 +135,8 @@ def _lookup(rule: str, design: Design, numbered: Sequence[str]) -> dict[str, Par
                 written = {**every, **{name: numbers[name] for name in numbered}}
                 parts = {name: every[name] for name in places}
                 key = fold(rule.format(**written))
-                found[key] = None if found.get(key, parts) != parts else parts
-    return found
+                parts_by_name[key] = None if parts_by_name.get(key, parts) != parts else parts
+    return parts_by_name
 
 
 def _known(names: Sequence[str], rule: str | None, design: Design, file: str) -> Named:
@@ -146,14 +146,23 @@ def _known(names: Sequence[str], rule: str | None, design: Design, file: str) ->
     folded = [fold(name) for name in names]
     for numbered in ((), ("ball",), ("position", "ball")):
         prefixes = ("",) if numbered else PREFIXES
-        rules = [rule] if rule else [prefix + one for one in RULES for prefix in prefixes]
-        found = _fitting(folded, [one for one in rules if _has(one, numbered)], design, numbered)
-        if len(found) > 1:
-            told = " and ".join(one.rule for one in found[:2])
-            text = f"the names can be read as {told}; state the one that is right with --name"
+        rules = (
+            [rule]
+            if rule
+            else [prefix + candidate_rule for candidate_rule in RULES for prefix in prefixes]
+        )
+        fitting = _fitting(
+            folded,
+            [candidate_rule for candidate_rule in rules if _has(candidate_rule, numbered)],
+            design,
+            numbered,
+        )
+        if len(fitting) > 1:
+            rules_text = " and ".join(candidate_rule.rule for candidate_rule in fitting[:2])
+            text = f"the names can be read as {rules_text}; state the one that is right with --name"
             raise refused(file, text)
-        if found:
-            return found[0]
+        if fitting:
+            return fitting[0]
     if strange := _strange(names, rule, design, file):
         return strange
     some = listing((shorten(name, 30) for name in names), 3)
@@ -174,15 +183,15 @@ def _strange(names: Sequence[str], rule: str | None, design: Design, file: str) 
     if design.positions.across is not None:
         return None
     try:
-        found = named(names, rule, None, file)
+        strange = named(names, rule, None, file)
     except ExperimentError:
         return None
-    parts = [part for part in found.parts if part is not None and "ball" in part]
+    parts = [part for part in strange.parts if part is not None and "ball" in part]
     is_clear = rule is not None or all(re.search("[0-9]", part["ball"]) for part in parts)
     whole = {tuple(part.values()) for part in parts}
-    if not is_clear or "{position}" not in found.rule or len(parts) < 2 or len(whole) < 2:
+    if not is_clear or "{position}" not in strange.rule or len(parts) < 2 or len(whole) < 2:
         return None
-    return Named(found.rule, found.parts, strange=True)
+    return Named(strange.rule, strange.parts, strange=True)
 
 
 def _has(rule: str, places: Sequence[str]) -> bool:
@@ -195,7 +204,7 @@ def _fitting(
     """The rules by which the most names are those of an experiment, one for each way to read
     them.
     """
-    found: list[Named] = []
+    fitting: list[Named] = []
     best = 1
     for rule in rules:
         beginning = fold(PLACE.split(rule)[0])
@@ -205,10 +214,10 @@ def _fitting(
         parts = tuple(lookup.get(name) for name in folded)
         count = sum(part is not None for part in parts)
         if count > best:
-            found, best = [], count
-        if count == best and all(other.parts != parts for other in found):
-            found.append(Named(rule, parts, tuple(numbered)))
-    return found
+            fitting, best = [], count
+        if count == best and all(candidate.parts != parts for candidate in fitting):
+            fitting.append(Named(rule, parts, tuple(numbered)))
+    return fitting
 
 
 def position_of_file(stem: str, design: Design | None, file: str) -> str:
@@ -226,9 +235,10 @@ def position_of_file(stem: str, design: Design | None, file: str) -> str:
     if len(names) != 1 and len(design.positions.names) == 1:
         names = list(design.positions.names)
     if len(names) != 1:
-        told = "none" if not names else " and ".join(names)
+        names_text = "none" if not names else " and ".join(names)
         text = (
-            f"neither names of features nor the file's name tell the position ({told}); put it into"
+            f"neither names of features nor the file's name tell the position ({names_text}); put"
+            " it into"
             " the file's name, or state the rule with --name"
         )
         raise refused(file, text)

@@ -32,7 +32,7 @@ def refuse_gross_errors(
     positions, readings = find_gross_errors(design, x)
     mistakes = wrong_offsets(design, design.readings, x) if positions or readings else []
     if mistakes:
-        causes = ", or if ".join(one.words(design) for one in mistakes)
+        causes = ", or if ".join(mistake.words(design) for mistake in mistakes)
         text = (
             f"the readings with different probes fit one another only if {causes}: correct the"
             " offsets under probes, or the names of probes in the readings"
@@ -43,8 +43,8 @@ def refuse_gross_errors(
             text += f"; or the artefact moved in position {name} between the probes: read it again"
         raise marks[0].refused(text)
     if positions:
-        seen = x + design.probes.offsets[design.readings.probe]
-        mistaken = mistaken_positions(design, design.readings, seen)
+        places = x + design.probes.offsets[design.readings.probe]
+        mistaken = mistaken_positions(design, design.readings, places)
         if {wrong.position for wrong in positions} <= set(mistaken):
             raise marks[0].refused(words_of_mistaken(design, mistaken))
     if 2 * len(positions) > len(np.unique(design.readings.position)) > 1:
@@ -56,17 +56,17 @@ def refuse_gross_errors(
             )
             raise marks[0].refused(text)
     messages = [_of_position(design, wrong, marks) for wrong in positions]
-    told: set[int] = set()
+    handled: set[int] = set()
     for wrong in readings:
-        if wrong.reading not in told:
+        if wrong.reading not in handled:
             messages.append(_of_reading(design, wrong, marks))
-            told |= {wrong.reading, wrong.partner}
+            handled |= {wrong.reading, wrong.partner}
     if not messages:
         doubtful = doubtful_lengths(design, x)
         messages = [
-            marks[one.reading].message("", _of_length(design, one))
-            for one in doubtful
-            if one.is_impossible
+            marks[mistake.reading].message("", _of_length(design, mistake))
+            for mistake in doubtful
+            if mistake.is_impossible
         ]
     if messages:
         raise ExperimentError(sorted(messages, key=lambda message: (message.line, message.text)))
@@ -82,23 +82,23 @@ def with_names_swapped(
     of_plates = replace(design, readings=readings.select(plate)).observed(
         design.of(Lengths).select(np.zeros(0, np.int64))
     )
-    ball, told = readings.ball.copy(), []
+    ball, notes = readings.ball.copy(), []
     for wrong in find_gross_errors(of_plates, x[plate])[1]:
         i, j = int(plate[wrong.reading]), int(plate[wrong.partner])
         if wrong.other_ball < 0 or wrong.partner < wrong.reading:
             continue
         ball[i], ball[j] = readings.ball[j], readings.ball[i]
         names = " and ".join(design.ball_label(int(readings.ball[k])) for k in (i, j))
-        told.append(
+        notes.append(
             f"the names of balls {names} in position {design.positions.names[readings.position[i]]}"
             f" were swapped (lines {marks[i].line} and {marks[j].line})"
         )
-    return replace(readings, ball=ball), tuple(told)
+    return replace(readings, ball=ball), tuple(notes)
 
 
 def doubts_about_lengths(design: Design, x: Array) -> tuple[str, ...]:
     """Sentences about standards whose lengths are all off by a factor that machines hardly have."""
-    return tuple(_of_length(design, one) for one in doubtful_lengths(design, x))
+    return tuple(_of_length(design, length) for length in doubtful_lengths(design, x))
 
 
 def doubts_about_volume(design: Design, x: Array, marks: Sequence[Mark]) -> tuple[str, ...]:
@@ -130,18 +130,28 @@ def doubts_about_volume(design: Design, x: Array, marks: Sequence[Mark]) -> tupl
     )
 
 
-def _of_length(design: Design, one: LengthRatio) -> str:
-    name = design.artefacts.names[one.artefact]
-    what, verb = ("radius", "is") if one.is_radius else ("lengths", "are")
-    word = "stated" if one.is_known else "drawn"
-    stated = f"the {word} {format_length(one.stated)}" if one.is_radius else f"the {word} ones"
-    why = (
-        "no machine has such a scale error" if one.is_impossible else "it passes for a scale error"
+def _of_length(design: Design, length_error: LengthRatio) -> str:
+    name = design.artefacts.names[length_error.artefact]
+    subject, verb = ("radius", "is") if length_error.is_radius else ("lengths", "are")
+    word = "stated" if length_error.is_known else "drawn"
+    stated_text = (
+        f"the {word} {format_length(length_error.stated)}"
+        if length_error.is_radius
+        else f"the {word} ones"
     )
-    ratio = f"{one.ratio:.3g}" if one.is_impossible else f"{one.ratio:.4f}"
+    why = (
+        "no machine has such a scale error"
+        if length_error.is_impossible
+        else "it passes for a scale error"
+    )
+    ratio = (
+        f"{length_error.ratio:.3g}" if length_error.is_impossible else f"{length_error.ratio:.4f}"
+    )
     return (
-        f"{name}: the read {what} {verb} {ratio} of {stated}{f'; {why}' if one.is_known else ''}:"
-        f" correct the {'radius' if one.is_radius else 'length'} in the experiment file, or the"
+        f"{name}: the read {subject} {verb} {ratio} of"
+        f" {stated_text}{f'; {why}' if length_error.is_known else ''}:"
+        f" correct the {'radius' if length_error.is_radius else 'length'} in the experiment file,"
+        " or the"
         " unit of the readings"
     )
 
@@ -177,8 +187,8 @@ def _of_reading(design: Design, wrong: WrongReading, marks: Sequence[Mark]) -> M
             " lines"
         )
     elif wrong.other_ball >= 0:
-        other = design.ball_label(wrong.other_ball)
-        text = f"ball {ball} in position {position} is where ball {other} should be; "
+        alternative = design.ball_label(wrong.other_ball)
+        text = f"ball {ball} in position {position} is where ball {alternative} should be; "
         if wrong.partner >= 0:
             text += (
                 f"swap the names of the balls in lines {marks[i].line} and"
@@ -187,12 +197,13 @@ def _of_reading(design: Design, wrong: WrongReading, marks: Sequence[Mark]) -> M
         else:
             text += "correct its name, or remove the line"
     elif wrong.other_probe >= 0:
-        probe, other = (
+        probe, alternative = (
             design.probes.names[readings.probe[i]],
             design.probes.names[wrong.other_probe],
         )
         text = (
-            f"ball {ball} in position {position} fits the probe {other}, not {probe}; correct the"
+            f"ball {ball} in position {position} fits the probe {alternative}, not {probe};"
+            " correct the"
             " name of the probe"
         )
     else:

@@ -91,33 +91,33 @@ def find_gross_errors(design: Design, x: Array) -> tuple[list[WrongPosition], li
         of_others = replace(design, readings=design.readings.select(compared)).observed(
             design.of(Lengths).select(np.zeros(0, np.int64))
         )
-        positions, found = _gross_errors(of_others, x[compared]) if len(compared) else ([], [])
+        positions, errors = _gross_errors(of_others, x[compared]) if len(compared) else ([], [])
         back = np.append(compared, -1)
         return positions, [
-            replace(one, reading=int(back[one.reading]), partner=int(back[one.partner]))
-            for one in found
+            replace(error, reading=int(back[error.reading]), partner=int(back[error.partner]))
+            for error in errors
         ]
     return _gross_errors(design, x)
 
 
 def _gross_errors(design: Design, x: Array) -> tuple[list[WrongPosition], list[WrongReading]]:
     readings = design.readings
-    seen = seen_places(design, readings, x)
+    places = seen_places(design, readings, x)
     pitch = ball_pitches(design)
-    found, positions = _against_drawing(design, seen, pitch)
+    gross, positions = _against_drawing(design, places, pitch)
     lost = np.isin(readings.position, [wrong.position for wrong in positions])
-    wrong = ~found.agreeing & ~lost
+    wrong = ~gross.agreeing & ~lost
     shape = design.balls.places
     pairs: list[tuple[int, int]] = []
     if not positions:
-        found, shape, wrong, pairs = _against_readings(design, x, seen, pitch, found, wrong)
-    named = _explained(design, seen, pitch, found, shape, np.flatnonzero(wrong))
+        gross, shape, wrong, pairs = _against_readings(design, x, places, pitch, gross, wrong)
+    named = _explained(design, places, pitch, gross, shape, np.flatnonzero(wrong))
     for first, second in pairs:
-        apart = _in_frame(found, readings.position, seen)
+        apart = _in_frame(gross, readings.position, places)
         named.append(
             WrongReading(first, apart[first] - apart[second], partner=second, undecided=True)
         )
-    return positions, sorted(named, key=lambda one: one.reading)
+    return positions, sorted(named, key=lambda reading: reading.reading)
 
 
 def ball_pitches(design: Design) -> Array:
@@ -128,16 +128,16 @@ def ball_pitches(design: Design) -> Array:
 
     pitch = np.full(len(design.balls.places), np.inf)
     for artefact in np.unique(design.balls.artefact):
-        own = design.balls.of(artefact)
-        if len(own) > 1:
-            pitch[own] = cKDTree(design.balls.places[own]).query(design.balls.places[own], 2)[0][
-                :, 1
-            ]
+        members = design.balls.of(artefact)
+        if len(members) > 1:
+            pitch[members] = cKDTree(design.balls.places[members]).query(
+                design.balls.places[members], 2
+            )[0][:, 1]
     return pitch
 
 
 def _against_drawing(
-    design: Design, seen: Array, pitch: Array
+    design: Design, places: Array, pitch: Array
 ) -> tuple[_Motions, list[WrongPosition]]:
     readings = design.readings
     rotations, origins = design.positions.rotations.copy(), design.positions.origins.copy()
@@ -145,10 +145,10 @@ def _against_drawing(
     wrong = []
     for k, rows, nominal in read_in_positions(design, readings):
         if len(np.unique(readings.ball[rows])) < 2:
-            origins[k] = (seen[rows] - nominal @ rotations[k].T).mean(axis=0)
+            origins[k] = (places[rows] - nominal @ rotations[k].T).mean(axis=0)
             continue
         reach = AGAINST_DRAWING * pitch[readings.ball[rows]]
-        rotations[k], origins[k], agreeing[rows] = consensus_motion(nominal, seen[rows], reach)
+        rotations[k], origins[k], agreeing[rows] = consensus_motion(nominal, places[rows], reach)
         count = int(agreeing[rows].sum())
         if 2 * count <= len(rows):
             wrong.append(WrongPosition(k, "", count, len(rows)))
@@ -171,27 +171,34 @@ def _turned_onto_itself(design: Design, position: int, rotation: Array, pitch: A
     """
     from scipy.spatial import cKDTree
 
-    own = design.balls.of(design.positions.artefact[position])
-    balls = design.balls.places[own]
+    members = design.balls.of(design.positions.artefact[position])
+    balls = design.balls.places[members]
     turn = design.positions.rotations[position].T @ rotation
     centre = balls.mean(axis=0)
     apart, nearest = cKDTree(balls).query((balls - centre) @ turn.T + centre)
-    if (nearest == np.arange(len(own))).all() or (apart > AGAINST_DRAWING * pitch[own]).any():
+    if (nearest == np.arange(len(members))).all() or (
+        apart > AGAINST_DRAWING * pitch[members]
+    ).any():
         return ""
     if design.dimension == 3 and turn[2, 2] < 0.5:
         return "over"
     return f"by {round(np.degrees(np.arctan2(turn[1, 0], turn[0, 0]))) % 360} degrees"
 
 
-def _in_frame(motions: _Motions, position: Integers, seen: Array) -> Array:
+def _in_frame(motions: _Motions, position: Integers, places: Array) -> Array:
     """Places seen (m, d) in the frames of the artefacts."""
     return np.asarray(
-        np.einsum("mji,mj->mi", motions.rotations[position], seen - motions.origins[position])
+        np.einsum("mji,mj->mi", motions.rotations[position], places - motions.origins[position])
     )
 
 
 def _against_readings(
-    design: Design, x: Array, seen: Array, pitch: Array, found: _Motions, wrong: NDArray[np.bool_]
+    design: Design,
+    x: Array,
+    places_seen: Array,
+    pitch: Array,
+    motions_found: _Motions,
+    wrong: NDArray[np.bool_],
 ) -> tuple[_Motions, Array, NDArray[np.bool_], list[tuple[int, int]]]:
     """Compare readings of the same ball, after assembling each plate from its positions.
 
@@ -204,10 +211,12 @@ def _against_readings(
     start = initial_state(replace(design, readings=readings.select(right)), x[right])
     rotations, origins, shape = start.rotations.copy(), start.origins.copy(), start.balls.copy()
     for k in np.flatnonzero(~design.artefacts.is_plate[design.positions.artefact]).tolist():
-        rotations[k], origins[k] = found.rotations[k], found.origins[k]
+        rotations[k], origins[k] = motions_found.rotations[k], motions_found.origins[k]
     off_drawing = np.zeros(len(readings))
     for k, rows, nominal in read_in_positions(design, readings):
-        off_drawing[rows] = distances(nominal, seen[rows], found.rotations[k], found.origins[k])
+        off_drawing[rows] = distances(
+            nominal, places_seen[rows], motions_found.rotations[k], motions_found.origins[k]
+        )
     limit = (
         AGAINST_READINGS * pitch[readings.ball]
         + TIMES_OFFSET * _offset_uncertainties(design)[readings.probe]
@@ -217,7 +226,7 @@ def _against_readings(
     apart = np.zeros(len(readings))
     for sweep in range(12):
         motions = _Motions(rotations, origins, ~wrong)
-        local = _in_frame(motions, readings.position, seen)
+        local = _in_frame(motions, readings.position, places_seen)
         use = np.flatnonzero(~wrong)
         shape, count = _medians(local[use], readings.ball[use], shape)
         apart = np.sqrt(((local - shape[readings.ball]) ** 2).sum(axis=1))
@@ -248,18 +257,20 @@ def _against_readings(
                 places = shape[readings.ball[rows]]
                 if sweep < 2:
                     # What is wrong has spread to all motions; most readings agree on better ones.
-                    rotations[k], origins[k], _ = consensus_motion(places, seen[rows], limit[rows])
+                    rotations[k], origins[k], _ = consensus_motion(
+                        places, places_seen[rows], limit[rows]
+                    )
                 else:
-                    rotations[k], origins[k] = fit_motion(places, seen[rows])
+                    rotations[k], origins[k] = fit_motion(places, places_seen[rows])
     return _Motions(rotations, origins, ~wrong), shape, wrong, undecided
 
 
 def _offset_uncertainties(design: Design) -> Array:
     """Standard uncertainties (l,) of the probes' offsets in all, infinite where one is unknown."""
     variance = np.where(design.probes.free, np.inf, 0.0)
-    known = np.flatnonzero(design.of(Priors).probe >= 0)
-    probe, axis = design.of(Priors).probe[known], design.of(Priors).component[known]
-    variance[probe, axis] = design.of(Priors).uncertainty[known] ** 2
+    uncertain = np.flatnonzero(design.of(Priors).probe >= 0)
+    probe, axis = design.of(Priors).probe[uncertain], design.of(Priors).component[uncertain]
+    variance[probe, axis] = design.of(Priors).uncertainty[uncertain] ** 2
     return np.asarray(np.sqrt(variance.sum(axis=1)))
 
 
@@ -287,7 +298,7 @@ def _worst_of_each_ball(
 
 
 def _explained(
-    design: Design, seen: Array, pitch: Array, motions: _Motions, shape: Array, wrong: Integers
+    design: Design, places: Array, pitch: Array, motions: _Motions, shape: Array, wrong: Integers
 ) -> list[WrongReading]:
     """What the wrong readings probably are: of another ball, with another probe, or simply
     wrong.
@@ -296,14 +307,14 @@ def _explained(
 
     readings = design.readings
     named: list[WrongReading] = []
-    local = _in_frame(motions, readings.position, seen)
+    local = _in_frame(motions, readings.position, places)
     other_ball = np.full(len(readings), -1)
     for artefact in np.unique(design.balls.artefact[readings.ball[wrong]]):
-        own = design.balls.of(artefact)
-        tree = cKDTree(shape[own])
+        members = design.balls.of(artefact)
+        tree = cKDTree(shape[members])
         rows = wrong[design.balls.artefact[readings.ball[wrong]] == artefact]
         apart, nearest = tree.query(local[rows])
-        ball = own[nearest]
+        ball = members[nearest]
         misfit = np.sqrt(((local[rows] - shape[readings.ball[rows]]) ** 2).sum(axis=1))
         there = (apart < np.minimum(AGAINST_DRAWING * pitch[ball], EXPLAINED * misfit)) & (
             ball != readings.ball[rows]
@@ -321,7 +332,7 @@ def _explained(
             int(readings.ball[i]),
         )
         should = motions.rotations[position] @ shape[ball_of] + motions.origins[position]
-        misfit_of = seen[i] - should
+        misfit_of = places[i] - should
         size = float(np.sqrt(misfit_of @ misfit_of))
         with_probe = np.sqrt(
             ((misfit_of + design.probes.offsets - design.probes.offsets[probe]) ** 2).sum(axis=1)
@@ -330,15 +341,15 @@ def _explained(
         other_probe = int(with_probe.argmin())
         if with_probe[other_probe] > min(EXPLAINED * size, AGAINST_DRAWING * pitch[ball_of]):
             other_probe = -1
-        other = int(other_ball[i])
-        if other >= 0 and other_probe >= 0:
-            left = local[i] - shape[other]
-            if with_probe[other_probe] < np.sqrt(left @ left):
-                other = -1
+        other_index = int(other_ball[i])
+        if other_index >= 0 and other_probe >= 0:
+            remainder = local[i] - shape[other_index]
+            if with_probe[other_probe] < np.sqrt(remainder @ remainder):
+                other_index = -1
             else:
                 other_probe = -1
-        partner = key.get((position, probe, other), -1) if other >= 0 else -1
+        partner = key.get((position, probe, other_index), -1) if other_index >= 0 else -1
         if partner >= 0 and other_ball[partner] != ball_of:
             partner = -1
-        named.append(WrongReading(i, misfit_of, other, other_probe, partner))
+        named.append(WrongReading(i, misfit_of, other_index, other_probe, partner))
     return named

@@ -88,15 +88,18 @@ class Vocabulary:
     @cached_property
     def beside_axes(self) -> dict[str, dict[str, str]]:
         """What a heading may say besides an axis, folded, and which texts of a reading that is."""
-        found: dict[str, dict[str, str]] = {"": {}}
+        names_by_cell: dict[str, dict[str, str]] = {"": {}}
         probes = {folded(name): {"probe": name} for name in self.probes}
         positions = {folded(name): {"position": name} for name in self.positions}
-        found |= {word: texts for word, texts in (probes | positions).items() if word}
+        names_by_cell |= {word: texts for word, texts in (probes | positions).items() if word}
         if len(probes) * len(positions) <= 10_000:
-            for one, texts in positions.items():
-                for other, more in probes.items():
-                    found |= {f"{one} {other}": texts | more, f"{other} {one}": texts | more}
-        return found
+            for position_name, texts in positions.items():
+                for probe_name, more in probes.items():
+                    names_by_cell |= {
+                        f"{position_name} {probe_name}": texts | more,
+                        f"{probe_name} {position_name}": texts | more,
+                    }
+        return names_by_cell
 
 
 def read_headings(cells: Sequence[str], words: Vocabulary) -> Headings | None:
@@ -105,67 +108,73 @@ def read_headings(cells: Sequence[str], words: Vocabulary) -> Headings | None:
     :raises HeadingError: it does, but in more than one way, or lacks what is stated.
     """
     parsed = [heading(cell) for cell in cells]
-    stated = words.stated
+    columns_stated = words.stated
     groups = _stated_groups(cells, words) or _found_groups(cells, words)
     if groups is None:
         return None
-    taken = {axis.place for group in groups for axis in group.axes}
+    columns_taken = {axis.place for group in groups for axis in group.axes}
     roles: dict[str, HeadedColumn] = {}
     for role in (*TEXTS, "u", "diameter"):
-        name = getattr(stated, role, None)
+        name = getattr(columns_stated, role, None)
         if name is not None:
             roles[role] = _stated_column(name, cells)
-            taken.add(roles[role].place)
+            columns_taken.add(roles[role].place)
     for name, units in words.further.items():
-        found = {
+        units_found = {
             i: unit
             for i, cell in enumerate(cells)
             if (unit := unit_of_further(cell, name)) is not None
         }
-        if len(found) > 1:
-            raise HeadingError(_which(name, [cells[i] for i in found]))
-        for i, unit in found.items():
+        if len(units_found) > 1:
+            raise HeadingError(_which(name, [cells[i] for i in units_found]))
+        for i, unit in units_found.items():
             if is_clock(unit, units):
                 roles[name] = HeadedColumn(i)
-                taken.add(i)
+                columns_taken.add(i)
                 continue
             if unit not in units:
                 text = f'the unit in the column "{shorten(cells[i])}" is not known'
                 raise HeadingError(f"{text}; write {listing(units)}")
             roles[name] = HeadedColumn(i, unit)
-            taken.add(i)
+            columns_taken.add(i)
     for words_of in (WORDS, LESS_CLEAR):
-        for role, known in words_of.items():
+        for role, words_known in words_of.items():
             if role in roles:
                 continue
-            places = [i for i, (name, _) in enumerate(parsed) if name in known and i not in taken]
+            places = [
+                i
+                for i, (name, _) in enumerate(parsed)
+                if name in words_known and i not in columns_taken
+            ]
             if len(places) > 1:
                 raise HeadingError(_which(role, [cells[i] for i in places]))
             if places:
                 roles[role] = HeadedColumn(places[0], parsed[places[0]][1])
-                taken.add(places[0])
+                columns_taken.add(places[0])
     if "u" in roles:
         _refuse_expanded(roles["u"], cells)
     else:
-        roles |= _uncertainty(cells, taken)
+        roles |= _uncertainty(cells, columns_taken)
     return Headings(roles, groups, tuple(cells))
 
 
-def _uncertainty(cells: Sequence[str], taken: set[int]) -> dict[str, HeadedColumn]:
+def _uncertainty(cells: Sequence[str], columns_taken: set[int]) -> dict[str, HeadedColumn]:
     """The column u of uncertainties by what its heading says, and k of their coverage factors where
     they are expanded.
 
     :raises HeadingError: several columns could be it, or one does not say which uncertainty it is.
     """
-    found = {
-        i: said
+    headings_found = {
+        i: uncertainty_kind
         for i, cell in enumerate(cells)
-        if i not in taken
+        if i not in columns_taken
         and len(cell) <= LONGEST
-        and (said := headed_uncertainty(cell, heading)) is not None
+        and (uncertainty_kind := headed_uncertainty(cell, heading)) is not None
     }
     for kind in ("standard", "expanded", "unclear"):
-        places = [i for i, said in found.items() if said.kind == kind]
+        places = [
+            i for i, uncertainty_kind in headings_found.items() if uncertainty_kind.kind == kind
+        ]
         if len(places) > 1:
             raise HeadingError(_which("u", [cells[i] for i in places]))
         if places:
@@ -173,33 +182,35 @@ def _uncertainty(cells: Sequence[str], taken: set[int]) -> dict[str, HeadedColum
     else:
         return {}
     (place,) = places
-    named, said = shorten(cells[place]), found[place]
-    unit = said.unit or "um"
-    column = {"u": HeadedColumn(place, said.unit)}
+    named, uncertainty_kind = shorten(cells[place]), headings_found[place]
+    unit = uncertainty_kind.unit or "um"
+    column = {"u": HeadedColumn(place, uncertainty_kind.unit)}
     if kind == "standard":
         return column
     factors = [
         i
         for i, cell in enumerate(cells)
-        if i not in taken and i != place and heading(cell)[0] in FACTORS
+        if i not in columns_taken and i != place and heading(cell)[0] in FACTORS
     ]
-    if kind == "unclear" and (said.factor is not None or not factors):
+    if kind == "unclear" and (uncertainty_kind.factor is not None or not factors):
         raise HeadingError(
             f'"{named}" does not say which uncertainty it is; call it standard_uncertainty_{unit},'
             f" or expanded_uncertainty_{unit} beside a column k, or something else where it is"
             " none; or name it as the standard uncertainty under readings:"
             f" {{columns: {{u: {named}}}}}"
         )
-    if len(factors) + (said.factor is not None) > 1:
+    if len(factors) + (uncertainty_kind.factor is not None) > 1:
         raise HeadingError(
             f'the coverage factor of "{named}" is stated more than once; remove all but one'
         )
-    if not factors and said.factor is None:
+    if not factors and uncertainty_kind.factor is None:
         raise HeadingError(
             f'"{named}" has no coverage factor; add a column k, or write it in the heading, as in'
             f" expanded_uncertainty (k=2) [{unit}]"
         )
-    return column | {"k": HeadedColumn(factors[0] if factors else -1, constant=said.factor)}
+    return column | {
+        "k": HeadedColumn(factors[0] if factors else -1, constant=uncertainty_kind.factor)
+    }
 
 
 def _refuse_expanded(column: HeadedColumn, cells: Sequence[str]) -> None:
@@ -208,8 +219,8 @@ def _refuse_expanded(column: HeadedColumn, cells: Sequence[str]) -> None:
     :raises HeadingError: it does.
     """
     cell = cells[column.place][:LONGEST] if column.place >= 0 else ""
-    said = headed_uncertainty(cell, heading)
-    if said is not None and said.kind == "expanded":
+    uncertainty_kind = headed_uncertainty(cell, heading)
+    if uncertainty_kind is not None and uncertainty_kind.kind == "expanded":
         raise HeadingError(
             f'"{shorten(cell)}" is an expanded uncertainty, and readings: columns: u names standard'
             " uncertainties; leave u out there: the heading says what it is"
@@ -278,11 +289,15 @@ def _stated_groups(cells: Sequence[str], words: Vocabulary) -> tuple[Group, ...]
 
     :raises HeadingError: it names some that are not there, or not all.
     """
-    stated = {axis: getattr(words.stated, axis, None) for axis in words.axes}
-    given = {axis: columns for axis, columns in stated.items() if columns is not None}
-    if not given:
+    columns_stated = {axis: getattr(words.stated, axis, None) for axis in words.axes}
+    columns_given = {
+        axis: columns for axis, columns in columns_stated.items() if columns is not None
+    }
+    if not columns_given:
         return None
-    of_probes = [set(columns) if isinstance(columns, dict) else {""} for columns in given.values()]
+    of_probes = [
+        set(columns) if isinstance(columns, dict) else {""} for columns in columns_given.values()
+    ]
     if any(probes != of_probes[0] for probes in of_probes):
         raise HeadingError("columns of x, y and z are of different probes; name the same")
     parsed = [heading(cell) for cell in cells]
@@ -290,10 +305,10 @@ def _stated_groups(cells: Sequence[str], words: Vocabulary) -> tuple[Group, ...]
     for probe in sorted(of_probes[0]):
         axes = []
         for axis in words.axes:
-            named = given.get(axis, axis)
+            named = columns_given.get(axis, axis)
             name = named[probe] if isinstance(named, dict) else named
             places = [i for i, (word, _) in enumerate(parsed) if word == axis]
-            if axis not in given and len(places) == 1:
+            if axis not in columns_given and len(places) == 1:
                 axes.append(HeadedColumn(places[0], parsed[places[0]][1]))
             elif name.startswith("="):
                 raise HeadingError(f"{axis} is a co-ordinate of each reading; name its column")
@@ -309,20 +324,22 @@ def _found_groups(cells: Sequence[str], words: Vocabulary) -> tuple[Group, ...] 
     :raises HeadingError: two columns could be the same co-ordinate.
     """
     parsed = [heading(cell) for cell in cells]
-    found: dict[str, dict[str, list[int]]] = {}
+    columns_by_group: dict[str, dict[str, list[int]]] = {}
     for i, (name, _) in enumerate(parsed):
         parts = name.split()
         for k, axis in enumerate(parts):
-            others = [*parts[:k], *parts[k + 1 :]]
-            beside = " ".join(others)
+            other_parts = [*parts[:k], *parts[k + 1 :]]
+            beside = " ".join(other_parts)
             if beside not in words.beside_axes:
-                beside = " ".join(word for word in others if word not in MEASURED)
+                beside = " ".join(word for word in other_parts if word not in MEASURED)
             if axis in words.axes and beside in words.beside_axes:
-                found.setdefault(beside, {}).setdefault(axis, []).append(i)
-    groups = {beside: axes for beside, axes in found.items() if set(axes) == set(words.axes)}
+                columns_by_group.setdefault(beside, {}).setdefault(axis, []).append(i)
+    groups = {
+        beside: axes for beside, axes in columns_by_group.items() if set(axes) == set(words.axes)
+    }
     if not groups:
         # With one axis missing, the heading of another stands where it should be.
-        for axes in found.values():
+        for axes in columns_by_group.values():
             for axis, places in axes.items():
                 named = [cells[i] for i in places]
                 if len(axes) == len(words.axes) - 1 and len(named) > len(set(named)):
@@ -338,8 +355,10 @@ def _found_groups(cells: Sequence[str], words: Vocabulary) -> tuple[Group, ...] 
             f"there are co-ordinates by themselves and of {names}; name those that are meant under"
             " readings: columns"
         )
-    if "" not in groups and len(groups) < len(found):
-        names = listing(beside or "the others" for beside in found if beside not in groups)
+    if "" not in groups and len(groups) < len(columns_by_group):
+        names = listing(
+            beside or "the others" for beside in columns_by_group if beside not in groups
+        )
         text = f"not all of {listing(words.axes)} are there of {names}"
         raise HeadingError(f"{text}; add the others, or name those meant under readings: columns")
     return tuple(

@@ -82,19 +82,19 @@ def run(options: Namespace) -> int:
     from .interface import read_report
 
     experiment = single(options) if options.files else None
-    found = read_report(
+    report = read_report(
         options.reports, experiment, options.name, options.form, options.unit, options.circles
     )
-    imported = found.imported
+    imported = report.imported
     if str(options.output) == "-":
         imported.write(sys.stdout, options.uncertainty)
     else:
         print_to = text_writer(lambda stream: imported.write(stream, options.uncertainty))
         if not write(options, {options.output: print_to}):
             return 0
-    for line in found.told:
+    for line in report.told:
         note(options, line)
-    for line in found.remarks:
+    for line in report.remarks:
         complain(line)
     note(options, f"{len(imported.readings)} readings written to {options.output}; {imported.key}")
     return 0

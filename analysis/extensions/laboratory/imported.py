@@ -78,18 +78,18 @@ class ImportedReadings:
         """
         rows = self.readings
         columns: dict[str, list[str] | list[float]] = {
-            "position": [one.position for one in rows],
-            "ball": [one.ball for one in rows],
+            "position": [row.position for row in rows],
+            "ball": [row.ball for row in rows],
         }
-        if any(one.probe for one in rows):
-            columns["probe"] = [one.probe for one in rows]
+        if any(row.probe for row in rows):
+            columns["probe"] = [row.probe for row in rows]
         for i, axis in enumerate("xyz"[: self.dimension]):
             columns[f"{axis}_mm"] = [
-                math.nan if one.across == i else round(1e3 * one.centre[i], DECIMALS)
-                for one in rows
+                math.nan if row.across == i else round(1e3 * row.centre[i], DECIMALS)
+                for row in rows
             ]
-        if uncertainties and all(one.uncertainty is not None for one in rows):
-            columns["u_um"] = [1e6 * (one.uncertainty or 0.0) for one in rows]
+        if uncertainties and all(row.uncertainty is not None for row in rows):
+            columns["u_um"] = [1e6 * (row.uncertainty or 0.0) for row in rows]
         return columns
 
     def write(self, stream: TextIO, uncertainties: bool = False) -> None:
@@ -144,24 +144,24 @@ class _Taken:
     def leave(self, features: Sequence[Feature], why: str) -> None:
         """Leave features for a reason, which is told with their names."""
         if features:
-            self.left.update(f"{one.kind} ({why})" for one in features)
-            names = listing((f'"{shorten(one.name, 30)}"' for one in features), 5)
+            self.left.update(f"{feature.kind} ({why})" for feature in features)
+            names = listing((f'"{shorten(feature.name, 30)}"' for feature in features), 5)
             self.remarks.append(f"{self.report.file}: {len(features)} left, {why}: {names}")
 
-    def centred(self, one: Feature) -> tuple[Feature, SphereFit | None] | None:
+    def centred(self, feature: Feature) -> tuple[Feature, SphereFit | None] | None:
         """A feature with its centre, and the closest sphere where that is of points; None, and
         left, where there is none.
         """
-        if one.lacks or one.points is None:
-            return None if one.lacks else (one, None)
-        fit = closest_sphere(one.points)
+        if feature.lacks or feature.points is None:
+            return None if feature.lacks else (feature, None)
+        fit = closest_sphere(feature.points)
         if fit is None:
-            few = len(one.points) < FEWEST_POINTS
-            why = f"has {len(one.points)} points, of which a sphere needs {FEWEST_POINTS}"
-            self.leave([one], why if few else "has points about in a plane")
+            few = len(feature.points) < FEWEST_POINTS
+            why = f"has {len(feature.points)} points, of which a sphere needs {FEWEST_POINTS}"
+            self.leave([feature], why if few else "has points about in a plane")
             return None
         x, y, z = fit.centre.tolist()
-        return replace(one, centre=(x, y, z)), fit
+        return replace(feature, centre=(x, y, z)), fit
 
 
 def report_readings(
@@ -172,34 +172,34 @@ def report_readings(
     :raises ExperimentError: a file cannot be read, is of no known format or wrong, or has no
         reading.
     """
-    found = [
+    taken_reports = [
         _taken(read_report(path, settings.form, settings.unit), path, settings) for path in paths
     ]
-    fits = [fit for one in found for _, _, fit in one.features if fit is not None]
+    fits = [fit for item in taken_reports for _, _, fit in item.features if fit is not None]
     freedom = sum(fit.degrees_of_freedom for fit in fits)
     squares = sum(float((fit.residuals**2).sum()) for fit in fits)
     variance = squares / freedom if freedom else 0.0
     readings = [
         reading
-        for one, path in zip(found, paths, strict=True)
-        for reading in _readings(one, path, variance, settings.design)
+        for item, path in zip(taken_reports, paths, strict=True)
+        for reading in _readings(item, path, variance, settings.design)
     ]
-    told = [_told(one) for one in found]
+    notes = [_told(item) for item in taken_reports]
     if fits:
-        worst = max(one.uncertainty or 0.0 for one in readings)
-        told.append(
+        worst = max(item.uncertainty or 0.0 for item in readings)
+        notes.append(
             f"{len(fits)} {'centre is' if len(fits) == 1 else 'centres are'} of points on the"
             " surface, which leave"
             f" {1e6 * variance**0.5:.3g} µm ({freedom} degrees of freedom):"
             f" standard uncertainty of a co-ordinate of a centre up to {1e6 * worst:.3g} µm"
         )
-    left_out = sum(one.across >= 0 for one in readings)
+    left_out = sum(item.across >= 0 for item in readings)
     if left_out:
-        told.append(
+        notes.append(
             f"the co-ordinates across plates that are read in their plane, {left_out}, are left out"
         )
-    remarks = [remark for one in found for remark in (*one.report.remarks, *one.remarks)]
-    systems = {feature.system for one in found for feature, _, _ in one.features}
+    remarks = [remark for item in taken_reports for remark in (*item.report.remarks, *item.remarks)]
+    systems = {feature.system for item in taken_reports for feature, _, _ in item.features}
     if {"machine", "part"} <= systems:
         remarks.append(
             "warning: centres in the machine's and in a part's system; import each apart"
@@ -207,67 +207,76 @@ def report_readings(
     coordinates: Coordinate = "part" if systems == {"part"} else "ball centres"
     dimension = 3 if settings.design is None else settings.design.dimension
     return ImportedReadings(
-        tuple(readings), tuple(told), tuple(dict.fromkeys(remarks)), coordinates, dimension
+        tuple(readings), tuple(notes), tuple(dict.fromkeys(remarks)), coordinates, dimension
     )
 
 
 def _taken(report: Report, path: Path | GivenText, settings: ImportSettings) -> _Taken:
     """The features of a report that are readings."""
-    found, kinds = _Taken(report), settings.kinds
-    found.left.update(one.kind for one in report.features if one.kind not in kinds)
-    found.left.update(report.others)
+    taken_report, kinds = _Taken(report), settings.kinds
+    taken_report.left.update(
+        feature.kind for feature in report.features if feature.kind not in kinds
+    )
+    taken_report.left.update(report.others)
     rule, apart = without_point(settings.rule or "")
-    candidates = [one for one in report.features if one.kind in kinds]
+    candidates = [feature for feature in report.features if feature.kind in kinds]
     if apart is not None:
-        candidates = _grouped(candidates, apart, found)
+        candidates = _grouped(candidates, apart, taken_report)
     else:
-        candidates = _with_points(candidates, report, found)
-    for why in dict.fromkeys(one.lacks for one in candidates if one.lacks):
-        found.leave([one for one in candidates if one.lacks == why], why)
-    complete = [one for one in map(found.centred, candidates) if one is not None]
+        candidates = _with_points(candidates, report, taken_report)
+    for why in dict.fromkeys(feature.lacks for feature in candidates if feature.lacks):
+        taken_report.leave([feature for feature in candidates if feature.lacks == why], why)
+    complete = [feature for feature in map(taken_report.centred, candidates) if feature is not None]
     if not complete:
-        told = ", ".join(_counted(found.left)) or "nothing"
+        left_text = ", ".join(_counted(taken_report.left)) or "nothing"
         text = (
-            f"no measured centre of a sphere in this {report.title}, which holds {told}; give a"
+            f"no measured centre of a sphere in this {report.title}, which holds {left_text}; give"
+            " a"
             " report of measured spheres"
         )
         raise refused(report.file, text)
-    features = [one for one, _ in complete]
+    features = [feature for feature, _ in complete]
     names, whose = _named(features, rule or None, settings.design, report.file)
     is_of_file = "{position}" not in names.rule
     position = (
         position_of_file(Path(str(path)).stem, settings.design, str(path)) if is_of_file else ""
     )
-    others = [one for one, own in zip(features, names.parts, strict=True) if own is None]
-    found.leave(others, f"the name is not of {names.rule}")
-    known: set[tuple[object, ...]] = set()
-    for (one, fit), own in zip(complete, names.parts, strict=True):
-        if own is None:
+    unnamed = [
+        feature for feature, parts in zip(features, names.parts, strict=True) if parts is None
+    ]
+    taken_report.leave(unnamed, f"the name is not of {names.rule}")
+    keys_seen: set[tuple[object, ...]] = set()
+    for (feature, fit), parts in zip(complete, names.parts, strict=True):
+        if parts is None:
             continue
-        if (one.name, one.centre) in known:
-            found.left[f"{one.kind} (printed again)"] += 1
+        if (feature.name, feature.centre) in keys_seen:
+            taken_report.left[f"{feature.kind} (printed again)"] += 1
             continue
-        known.add((one.name, one.centre))
-        found.features.append((one, {"position": position, "probe": "", **own}, fit))
+        keys_seen.add((feature.name, feature.centre))
+        taken_report.features.append((feature, {"position": position, "probe": "", **parts}, fit))
     source = f'; position "{position}" by the name of the file' if is_of_file else ""
     if names.strange:
         source += "; they are not the experiment's, and fit matches them by number and place"
     for place in names.numbered:
         source += f"; {place}s by their numbers, from 1 in the experiment's order"
-    found.remarks.append(f"{report.file}: names{whose} are read as {names.rule}{source}")
-    found.remarks += _about_systems(report.file, [one for one, _, _ in found.features])
-    return found
+    taken_report.remarks.append(f"{report.file}: names{whose} are read as {names.rule}{source}")
+    taken_report.remarks += _about_systems(
+        report.file, [feature for feature, _, _ in taken_report.features]
+    )
+    return taken_report
 
 
 def _about_systems(file: str, features: Sequence[Feature]) -> list[str]:
     """What co-ordinates are in, where that is not the machine's system throughout."""
     remarks = []
-    systems = Counter(one.system for one in features)
+    systems = Counter(feature.system for feature in features)
     for system, count in systems.items():
-        names = dict.fromkeys(one.of for one in features if one.system == system and one.of)
-        of = f" ({listing(names, 5)})" if names else ""
+        names = dict.fromkeys(
+            feature.of for feature in features if feature.system == system and feature.of
+        )
+        names_text = f" ({listing(names, 5)})" if names else ""
         if system != "machine":
-            remarks.append(f"{file}: {count} centres are in {IN_WORDS[system]}{of}")
+            remarks.append(f"{file}: {count} centres are in {IN_WORDS[system]}{names_text}")
     return remarks
 
 
@@ -278,56 +287,62 @@ def _named(
     it is in the latter case.
     """
     try:
-        return named([one.name for one in features], rule, design, file), ""
+        return named([feature.name for feature in features], rule, design, file), ""
     except ExperimentError:
-        others = [one.dimension for one in features]
-        if all(others):
+        other_dimensions = [feature.dimension for feature in features]
+        if all(other_dimensions):
             with suppress(ExperimentError):
-                return named(others, rule, design, file), " of dimensions"
+                return named(other_dimensions, rule, design, file), " of dimensions"
         raise
 
 
-def _with_points(candidates: list[Feature], report: Report, found: _Taken) -> list[Feature]:
+def _with_points(candidates: list[Feature], report: Report, taken_report: _Taken) -> list[Feature]:
     """Spheres that were not measured, with the points that have their names and a number; without
     any sphere, all points that have the same name except their number.
     """
-    lacking = {one.name: one for one in candidates if one.lacks}
+    lacking = {feature.name: feature for feature in candidates if feature.lacks}
     points: dict[str, list[Feature]] = {}
-    for one in report.features:
-        match = NUMBERED.fullmatch(one.name[:LONGEST_NAME]) if one.kind == POINT else None
-        if match is not None and one.centre is not None and (match[1] in lacking or not candidates):
-            points.setdefault(match[1], []).append(one)
-    found.left[POINT] -= sum(map(len, points.values()))
-    found.left += Counter()
-    made = [one for one in candidates if not (one.lacks and one.name in points)]
+    for feature in report.features:
+        match = NUMBERED.fullmatch(feature.name[:LONGEST_NAME]) if feature.kind == POINT else None
+        if (
+            match is not None
+            and feature.centre is not None
+            and (match[1] in lacking or not candidates)
+        ):
+            points.setdefault(match[1], []).append(feature)
+    taken_report.left[POINT] -= sum(map(len, points.values()))
+    taken_report.left += Counter()
+    made = [feature for feature in candidates if not (feature.lacks and feature.name in points)]
     return [*made, *(_of_points(name, several) for name, several in points.items())]
 
 
 def _of_points(name: str, points: Sequence[Feature]) -> Feature:
-    places = np.array([one.centre for one in points])
+    places = np.array([point.centre for point in points])
     return replace(points[0], name=name, kind=SPHERE, centre=None, points=places)
 
 
-def _grouped(candidates: list[Feature], apart: re.Pattern[str], found: _Taken) -> list[Feature]:
+def _grouped(
+    candidates: list[Feature], apart: re.Pattern[str], taken_report: _Taken
+) -> list[Feature]:
     """Spheres of points that have the same name except the number of the point."""
     groups: dict[str, list[Feature]] = {}
-    others = []
-    for one in candidates:
-        match = apart.fullmatch(one.name[:LONGEST_NAME])
-        if match is None or one.centre is None:
-            others.append(one)
+    others_grouped = []
+    for candidate in candidates:
+        match = apart.fullmatch(candidate.name[:LONGEST_NAME])
+        if match is None or candidate.centre is None:
+            others_grouped.append(candidate)
         else:
-            groups.setdefault(match[1], []).append(one)
-    found.leave(others, "the name has no number of a point")
+            groups.setdefault(match[1], []).append(candidate)
+    taken_report.leave(others_grouped, "the name has no number of a point")
     return [_of_points(name, points) for name, points in groups.items()]
 
 
 def _readings(
-    one: _Taken, path: Path | GivenText, variance: float, design: Design | None
+    taken_report: _Taken, path: Path | GivenText, variance: float, design: Design | None
 ) -> list[ImportedReading]:
     """The readings of a report, with the probe that its names, its sensors or the plan tell."""
     readings = []
-    for feature, parts, fit in one.features:
+    for feature, parts, fit in taken_report.features:
         uncertainty = None
         if fit is not None:
             uncertainty = float(np.sqrt(variance * np.diag(fit.cofactor).max()))
@@ -366,9 +381,9 @@ def _probe(feature: Feature, position: str, design: Design | None, file: str) ->
     possible = planned or set(names)
     if len(possible) == 1:
         return possible.pop()
-    told = f'the sensor "{shorten(feature.probe, 30)}"' if feature.probe else "no sensor"
+    sensor_text = f'the sensor "{shorten(feature.probe, 30)}"' if feature.probe else "no sensor"
     text = (
-        f"{told} tells which probe read"
+        f"{sensor_text} tells which probe read"
         f' "{shorten(feature.name, 30)}": {listing(sorted(possible))}; name features or sensors'
         " by the experiment's probes, or state the rule with --name"
     )
@@ -386,12 +401,13 @@ def _counted(counts: Counter[str]) -> list[str]:
     return words
 
 
-def _told(one: _Taken) -> str:
+def _told(taken: _Taken) -> str:
     """What was taken of a file and what was left, counted by kind."""
-    taken = Counter(
+    kinds_taken = Counter(
         "centre" if feature.kind == UNSTATED else f"{feature.kind} centre"
-        for feature, _, _ in one.features
+        for feature, _, _ in taken.features
     )
-    counts = ", ".join(number_of(count, kind) for kind, count in taken.items())
-    left = ", ".join(_counted(one.left)) or "nothing"
-    return f"{one.report.file}: {one.report.title}; taken: {counts or 'nothing'}; left: {left}"
+    counts = ", ".join(number_of(count, kind) for kind, count in kinds_taken.items())
+    left_text = ", ".join(_counted(taken.left)) or "nothing"
+    head = f"{taken.report.file}: {taken.report.title}"
+    return f"{head}; taken: {counts or 'nothing'}; left: {left_text}"

@@ -51,11 +51,11 @@ class ReadReport(Result):
             "remarks": list(self.remarks),
             "readings": [
                 {
-                    **picked(one, "position", "ball"),
-                    "probe": one.probe or None,
-                    "centre": list(one.centre[: self.imported.dimension]),
-                    "uncertainty": one.uncertainty,
+                    **picked(reading, "position", "ball"),
+                    "probe": reading.probe or None,
+                    "centre": list(reading.centre[: self.imported.dimension]),
+                    "uncertainty": reading.uncertainty,
                 }
-                for one in self.imported.readings
+                for reading in self.imported.readings
             ],
         }

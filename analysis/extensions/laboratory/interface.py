@@ -52,12 +52,12 @@ def read_report(
     if not paths:
         raise ValueError("reports=[]; name at least one file")
     ensure_type(str, "a rule such as {position}_{ball}", name=name)
-    ensure_one_of([one.name for one in FORMATS], form=form)
+    ensure_one_of([known_format.name for known_format in FORMATS], form=form)
     ensure_one_of(("mm", "cm", "m", "in"), unit=unit)
     ensure_type(bool, "True or False", circles=circles)
     design = None if experiment is None else lay_out(experiment_of(experiment))
     rule = None if name is None else check_rule(name)
     factor = None if unit is None else LENGTH_UNITS[unit]
     settings = ImportSettings(design, rule, form, factor, circles)
-    found = import_readings([Path(path) for path in paths], settings)
-    return ReadReport(Path(paths[0]).stem, found)
+    imported = import_readings([Path(path) for path in paths], settings)
+    return ReadReport(Path(paths[0]).stem, imported)

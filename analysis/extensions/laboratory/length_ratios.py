@@ -49,42 +49,47 @@ def doubtful_lengths(design: Design, x: Array) -> tuple[LengthRatio, ...]:
 
     Of unknown lengths the drawn ones, if they are off by more than 30 %.
     """
-    given, readings = design.of(Lengths), design.readings
-    known = np.ones(len(given), bool) if given.free is None else given.free < 0
-    seen = x + design.probes.offsets[readings.probe]
-    artefact = design.balls.artefact[readings.ball[given.first]]
-    found = []
-    for one in np.unique(artefact):
-        mine = np.flatnonzero(artefact == one)
-        is_known = bool(known[mine[0]])
-        is_radius = bool(given.to_pivot[mine[0]])
+    lengths, readings = design.of(Lengths), design.readings
+    is_certified = np.ones(len(lengths), bool) if lengths.free is None else lengths.free < 0
+    places = x + design.probes.offsets[readings.probe]
+    artefact = design.balls.artefact[readings.ball[lengths.first]]
+    doubtful = []
+    for number in np.unique(artefact):
+        mine = np.flatnonzero(artefact == number)
+        is_known = bool(is_certified[mine[0]])
+        is_radius = bool(lengths.to_pivot[mine[0]])
         if is_radius:
-            ratios = _of_radii(design, seen, mine)
+            ratios = _of_radii(design, places, mine)
         else:
-            apart = seen[given.first[mine]] - seen[given.second[mine]]
+            apart = places[lengths.first[mine]] - places[lengths.second[mine]]
             size = np.sqrt((apart**2).sum(axis=1))
-            along = np.abs((apart * given.direction[mine]).sum(axis=1))
-            ratios = np.where(given.projected[mine], along, size) / given.value[mine]
+            along = np.abs((apart * lengths.direction[mine]).sum(axis=1))
+            ratios = np.where(lengths.projected[mine], along, size) / lengths.value[mine]
         if not len(ratios):
             continue
         ratio = float(np.median(ratios))
         agree = float(np.median(np.abs(ratios - ratio))) < AGREEMENT * abs(ratio - 1.0)
         if abs(ratio - 1.0) > (DOUBTFUL if is_known else OFF_DRAWING) and agree:
             first = mine[0]
-            stated, reading = float(given.value[first]), int(given.first[first])
-            found.append(LengthRatio(int(one), ratio, stated, reading, is_radius, is_known))
-    return tuple(found)
+            stated_value, reading = (
+                float(lengths.value[first]),
+                int(lengths.first[first]),
+            )
+            doubtful.append(
+                LengthRatio(int(number), ratio, stated_value, reading, is_radius, is_known)
+            )
+    return tuple(doubtful)
 
 
-def _of_radii(design: Design, seen: Array, rows: np.ndarray) -> Array:
+def _of_radii(design: Design, places: Array, rows: np.ndarray) -> Array:
     """Radii of the spheres through the readings over the stated one, without those that the
     readings hardly show.
     """
-    given = design.of(Lengths)
-    position = design.readings.position[given.first[rows]]
-    found = []
+    lengths = design.of(Lengths)
+    position = design.readings.position[lengths.first[rows]]
+    ratios = []
     for k in np.unique(position):
-        points = seen[given.first[rows[position == k]]]
+        points = places[lengths.first[rows[position == k]]]
         centre, radius = fit_sphere(points, design.positions.origins[k])
         away = points - centre
         size = np.sqrt((away**2).sum(axis=1))
@@ -99,7 +104,7 @@ def _of_radii(design: Design, seen: Array, rows: np.ndarray) -> Array:
             continue
         scatter = np.sqrt(((size - radius) ** 2).sum() / (len(points) - len(values)))
         uncertainty = scatter * np.sqrt(((vh[:, -1] / values) ** 2).sum())
-        ratio = radius / given.value[rows[0]]
-        if abs(ratio - 1.0) * given.value[rows[0]] > 10.0 * uncertainty:
-            found.append(ratio)
-    return np.array(found)
+        ratio = radius / lengths.value[rows[0]]
+        if abs(ratio - 1.0) * lengths.value[rows[0]] > 10.0 * uncertainty:
+            ratios.append(ratio)
+    return np.array(ratios)

@@ -48,7 +48,7 @@ def with_known_names(
     `places` makes places of balls in the machine, in metres, of rows; None where the table does
     not have them.
     """
-    found = Names()
+    names = Names()
     positions, balls, probes = design.positions.names, set(design.balls.names), design.probes.names
     used = [list(dict.fromkeys(row.texts[i] for row in rows)) for i in range(3)]
     strange = [
@@ -57,53 +57,60 @@ def with_known_names(
         [name for name in used[2] if name not in probes and name],
     ]
     if not any(strange) and "" not in used[2]:
-        return tuple(rows), found
+        return tuple(rows), names
     if strange[2]:
-        rows = _renamed(rows, 2, _alike("probes", used[2], probes, found))
+        rows = _renamed(rows, 2, _alike("probes", used[2], probes, names))
     if strange[1]:
-        rows = _renamed(rows, 1, _alike("balls", used[1], list(design.balls.names), found))
+        rows = _renamed(rows, 1, _alike("balls", used[1], list(design.balls.names), names))
     if strange[0]:
-        rows = _renamed(rows, 0, _alike("positions", used[0], positions, found))
-    rows = _matched_positions(rows, design, places, found)
-    rows = _planned_probes(rows, design, found)
-    rows = _matched_balls(rows, design, places, found)
-    return tuple(rows), found
+        rows = _renamed(rows, 0, _alike("positions", used[0], positions, names))
+    rows = _matched_positions(rows, design, places, names)
+    rows = _planned_probes(rows, design, names)
+    rows = _matched_balls(rows, design, places, names)
+    return tuple(rows), names
 
 
 def _renamed(rows: Sequence[FileRow], role: int, names: Mapping[str, str]) -> Sequence[FileRow]:
     """Rows with other names in one role."""
     if not names:
         return rows
-    known: dict[tuple[str, ...], tuple[str, ...]] = {}
+    names_by_texts: dict[tuple[str, ...], tuple[str, ...]] = {}
     for row in rows:
-        if row.texts not in known:
-            own = names.get(row.texts[role], row.texts[role])
-            known[row.texts] = (*row.texts[:role], own, *row.texts[role + 1 :])
-    return [replace(row, texts=known[row.texts]) for row in rows]
+        if row.texts not in names_by_texts:
+            name = names.get(row.texts[role], row.texts[role])
+            names_by_texts[row.texts] = (*row.texts[:role], name, *row.texts[role + 1 :])
+    return [replace(row, texts=names_by_texts[row.texts]) for row in rows]
 
 
 def _pairs(names: Mapping[str, str], limit: int = 4) -> str:
     return listing(
-        (f"{shorten(one)} = {other}" for one, other in names.items() if one != other), limit
+        (
+            f"{shorten(from_name)} = {to_name}"
+            for from_name, to_name in names.items()
+            if from_name != to_name
+        ),
+        limit,
     )
 
 
-def _alike(what: str, used: Sequence[str], known: Sequence[str], found: Names) -> dict[str, str]:
+def _alike(
+    noun: str, used: Sequence[str], names_known: Sequence[str], names: Names
+) -> dict[str, str]:
     """Names that are the same except case, signs and zeros; none unless all of them are."""
     by_folded: dict[str, set[str]] = {}
-    for name in known:
+    for name in names_known:
         by_folded.setdefault(folded(name), set()).add(name)
     matched = {}
     for name in used:
         if not name:
             continue
-        options = {name} if name in known else by_folded.get(folded(name), set())
+        options = {name} if name in names_known else by_folded.get(folded(name), set())
         if len(options) != 1:
             return {}
         matched[name] = options.pop()
     if len(set(matched.values())) < len(matched):
         return {}
-    found.told.append(f"{what} matched by name but for case and signs: {_pairs(matched)}")
+    names.told.append(f"{noun} matched by name but for case and signs: {_pairs(matched)}")
     return matched
 
 
@@ -118,7 +125,7 @@ def _numbers(names: Sequence[str], most: int) -> dict[str, int] | None:
     return numbers if len(set(numbers.values())) == len(numbers) else None
 
 
-def _planned_probes(rows: Sequence[FileRow], design: Design, found: Names) -> Sequence[FileRow]:
+def _planned_probes(rows: Sequence[FileRow], design: Design, names: Names) -> Sequence[FileRow]:
     """Rows without a probe's name with the only probe that is planned in their position."""
     if all(row.texts[2] for row in rows):
         return rows
@@ -127,46 +134,49 @@ def _planned_probes(rows: Sequence[FileRow], design: Design, found: Names) -> Se
         probes = np.unique(design.readings.probe[design.readings.position == k])
         if len(probes) == 1:
             only[name] = design.probes.names[probes[0]]
-    known = [replace(row, texts=(*row.texts[:2], only.get(row.texts[0], ""))) for row in rows]
-    missing = sorted({row.texts[0] for row in known if not row.texts[2]})
+    rows_completed = [
+        replace(row, texts=(*row.texts[:2], only.get(row.texts[0], ""))) for row in rows
+    ]
+    missing = sorted({row.texts[0] for row in rows_completed if not row.texts[2]})
     if missing:
-        found.asked.append(
+        names.asked.append(
             f"no column says which probe was used in {listing(map(shorten, missing))}, where"
             " several are planned; name one: readings: {columns: {probe: …}}"
         )
         return rows
-    found.told.append("probes are those planned for each position")
-    return known
+    names.told.append("probes are those planned for each position")
+    return rows_completed
 
 
 def _matched_positions(
     rows: Sequence[FileRow],
     design: Design,
     places: Callable[[Sequence[FileRow]], Array] | None,
-    found: Names,
+    names: Names,
 ) -> Sequence[FileRow]:
     """Rows whose positions are known by number, or by place."""
-    known = design.positions.names
+    names_known = design.positions.names
     used = list(dict.fromkeys(row.texts[0] for row in rows))
-    strange = [name for name in used if name not in known]
+    strange = [name for name in used if name not in names_known]
     if 2 * len(strange) <= len(used):
-        return _others_by_place(rows, used, strange, design, places, found)
-    numbers = _numbers(used, len(known)) or {}
-    by_number = {name: known[k] for name, k in numbers.items()}
-    if places is None and len(by_number) == len(known):
-        found.told.append(f"positions matched by number alone: {_pairs(by_number, 8)}")
+        return _others_by_place(rows, used, strange, design, places, names)
+    numbers = _numbers(used, len(names_known)) or {}
+    by_number = {name: names_known[k] for name, k in numbers.items()}
+    if places is None and len(by_number) == len(names_known):
+        names.told.append(f"positions matched by number alone: {_pairs(by_number, 8)}")
         return _renamed(rows, 0, by_number)
     doubt = "part co-ordinates do not tell where they are"
     if places is not None:
         by_place, doubt = _positions_by_place(rows, used, design, places, by_number)
         if by_place:
             how = "by number, and by place" if by_number else "by place"
-            found.told.append(f"positions matched {how}: {_pairs(by_place, 8)}")
+            names.told.append(f"positions matched {how}: {_pairs(by_place, 8)}")
             return _renamed(rows, 0, by_place)
-    told = listing(f'"{shorten(name)}"' for name in strange)
-    found.asked.append(
-        f"the positions {told} are not in the experiment, and their places do not tell which they"
-        f" are ({doubt}); write the names that it has: {listing(known)}"
+    names_listed = listing(f'"{shorten(name)}"' for name in strange)
+    names.asked.append(
+        f"the positions {names_listed} are not in the experiment, and their places do not tell"
+        " which they"
+        f" are ({doubt}); write the names that it has: {listing(names_known)}"
     )
     return rows
 
@@ -177,7 +187,7 @@ def _others_by_place(
     strange: Sequence[str],
     design: Design,
     places: Callable[[Sequence[FileRow]], Array] | None,
-    found: Names,
+    names: Names,
 ) -> Sequence[FileRow]:
     """Rows of a table most of whose positions are known, with the others known by place.
 
@@ -188,7 +198,7 @@ def _others_by_place(
     by_place, _ = _positions_by_place(rows, strange, design, places, {})
     if not by_place or not set(by_place.values()).isdisjoint(used):
         return rows
-    found.told.append(f"positions matched by place among those left: {_pairs(by_place, 8)}")
+    names.told.append(f"positions matched by place among those left: {_pairs(by_place, 8)}")
     return _renamed(rows, 0, by_place)
 
 
@@ -206,35 +216,39 @@ def _positions_by_place(
     names = {name: i for i, name in enumerate(design.balls.names)}
     matched: dict[str, str] = {}
     for name in used:
-        own = [row for row in rows if row.texts[0] == name]
-        seen = places(own)
+        rows_of_name = [row for row in rows if row.texts[0] == name]
+        places_of_name = places(rows_of_name)
         apart = []
-        for k, known in enumerate(design.positions.names):
+        for k, known_name in enumerate(design.positions.names):
             balls = design.balls.of(design.positions.artefact[k])
             nominal = nominal_places(design, k, balls)
-            index = [names.get(row.texts[1], -1) for row in own]
+            index = [names.get(row.texts[1], -1) for row in rows_of_name]
             if all(i in balls for i in index):
                 there = nominal[np.searchsorted(balls, index)]
-                distance = np.sqrt(((seen - there) ** 2).sum(axis=1))
+                distance = np.sqrt(((places_of_name - there) ** 2).sum(axis=1))
             else:
-                distance = _nearest(seen, nominal)[0]
+                distance = _nearest(places_of_name, nominal)[0]
             limit = BY_PLACE * _pitch(design.balls.places[balls])
-            apart.append((float(np.sqrt((distance**2).mean())), limit, known))
+            apart.append((float(np.sqrt((distance**2).mean())), limit, known_name))
         apart.sort()
-        (first, limit, known), second = apart[0], apart[1] if len(apart) > 1 else (np.inf, 0, "")
+        (first, limit, known_name), second = (
+            apart[0],
+            apart[1] if len(apart) > 1 else (np.inf, 0, ""),
+        )
         if name in expected:
-            if known != expected[name]:
-                return {}, f'"{shorten(name)}" is nearest to {known}, and not {expected[name]}'
-            matched[name] = known
+            if known_name != expected[name]:
+                return {}, f'"{shorten(name)}" is nearest to {known_name}, and not {expected[name]}'
+            matched[name] = known_name
             continue
         if first > limit:
             return {}, (
-                f'"{shorten(name)}" is {format_length(float(f"{first:.3g}"))} from {known}, and may'
+                f'"{shorten(name)}" is {format_length(float(f"{first:.3g}"))} from {known_name},'
+                " and may"
                 f" be {format_length(float(f'{limit:.3g}'))}"
             )
         if second[0] < CLEARER * first or second[0] < limit:
-            return {}, f'"{shorten(name)}" could be {known} or {second[2]}'
-        matched[name] = known
+            return {}, f'"{shorten(name)}" could be {known_name} or {second[2]}'
+        matched[name] = known_name
     if len(set(matched.values())) < len(matched):
         return {}, "two of them would be the same"
     return matched, ""
@@ -247,11 +261,11 @@ def _pitch(places: Array) -> float:
     return float(_nearest(places, places, 2)[0].min())
 
 
-def _nearest(seen: Array, places: Array, which: int = 1) -> tuple[Array, Integers]:
+def _nearest(seen_places: Array, places: Array, position_index: int = 1) -> tuple[Array, Integers]:
     """Distances (m,) to the nearest of some places, or to the second nearest, and which it is."""
     from scipy.spatial import cKDTree
 
-    distance, index = cKDTree(places).query(seen, [which])
+    distance, index = cKDTree(places).query(seen_places, [position_index])
     return distance[:, 0], index[:, 0]
 
 
@@ -259,27 +273,27 @@ def _matched_balls(
     rows: Sequence[FileRow],
     design: Design,
     places: Callable[[Sequence[FileRow]], Array] | None,
-    found: Names,
+    known_matches: Names,
 ) -> Sequence[FileRow]:
     """Rows whose balls are known by number, or by place, artefact by artefact."""
     positions = {name: k for k, name in enumerate(design.positions.names)}
-    if found.asked or any(row.texts[0] not in positions for row in rows):
+    if known_matches.asked or any(row.texts[0] not in positions for row in rows):
         return rows
     artefacts = np.array([design.positions.artefact[positions[row.texts[0]]] for row in rows])
     matched = list(rows)
     for artefact in np.unique(artefacts):
-        own = np.flatnonzero(artefacts == artefact)
+        members = np.flatnonzero(artefacts == artefact)
         balls = design.balls.of(artefact)
-        known = [design.balls.names[b] for b in balls]
-        of_own = [rows[i] for i in own.tolist()]
+        names_known = [design.balls.names[b] for b in balls]
+        of_own = [rows[i] for i in members.tolist()]
         used = list(dict.fromkeys(row.texts[1] for row in of_own))
-        if 2 * sum(name not in known for name in used) <= len(used):
+        if 2 * sum(name not in names_known for name in used) <= len(used):
             continue
         turned_freely = places is None
-        names = _by_number(of_own, used, balls, design, turned_freely, found) or _by_place(
-            of_own, used, balls, design, places, found
+        names = _by_number(of_own, used, balls, design, turned_freely, known_matches) or _by_place(
+            of_own, used, balls, design, places, known_matches
         )
-        for i, row in zip(own, _renamed(of_own, 1, names), strict=True):
+        for i, row in zip(members, _renamed(of_own, 1, names), strict=True):
             matched[i] = row
     return matched
 
@@ -290,8 +304,8 @@ def _order_read(design: Design, artefact_balls: Integers) -> Integers:
     """
     orders = []
     for k in range(len(design.positions.names)):
-        read = design.readings.ball[design.readings.position == k]
-        order = tuple(dict.fromkeys(int(b) for b in read if b in artefact_balls))
+        balls_read = design.readings.ball[design.readings.position == k]
+        order = tuple(dict.fromkeys(int(b) for b in balls_read if b in artefact_balls))
         if order:
             orders.append(order)
     if len(set(orders)) != 1 or len(orders[0]) < len(artefact_balls):
@@ -308,7 +322,7 @@ def _by_number(
     balls: Integers,
     design: Design,
     turned_freely: bool,
-    found: Names,
+    known_matches: Names,
 ) -> dict[str, str]:
     """Balls by their numbers in reading order, if the readings then fit the artefact as it is
     planned to stand, or however it is turned.
@@ -319,13 +333,13 @@ def _by_number(
     limit, rotations = BY_PLACE * _pitch(design.balls.places[balls]), []
     for name in dict.fromkeys(row.texts[0] for row in rows):
         for probe in dict.fromkeys(row.texts[2] for row in rows if row.texts[0] == name):
-            own = [row for row in rows if row.texts[0] == name and row.texts[2] == probe]
-            places = design.balls.places[[order[numbers[row.texts[1]]] for row in own]]
-            seen = np.array([row.lengths[: design.dimension] for row in own])
+            rows_of_name = [row for row in rows if row.texts[0] == name and row.texts[2] == probe]
+            places = design.balls.places[[order[numbers[row.texts[1]]] for row in rows_of_name]]
+            seen_places = np.array([row.lengths[: design.dimension] for row in rows_of_name])
             if not fixes_pose(places):
                 continue
-            rotation, origin = fit_motion(places, seen)
-            apart = np.sqrt(((places @ rotation.T + origin - seen) ** 2).sum(axis=1))
+            rotation, origin = fit_motion(places, seen_places)
+            apart = np.sqrt(((places @ rotation.T + origin - seen_places) ** 2).sum(axis=1))
             # Most of them: a single wrong reading is no other numbering.
             if float(np.median(apart)) > limit:
                 return {}
@@ -335,8 +349,8 @@ def _by_number(
             rotations.append(rotation)
     names = {name: design.balls.names[order[k]] for name, k in numbers.items()}
     if turned_freely:
-        _doubt_numbers(design.balls.places[balls], rotations, limit, names, found)
-    found.told.append(f"balls matched by number in reading order: {_pairs(names)}")
+        _doubt_numbers(design.balls.places[balls], rotations, limit, names, known_matches)
+    known_matches.told.append(f"balls matched by number in reading order: {_pairs(names)}")
     return names
 
 
@@ -345,26 +359,29 @@ def _doubt_numbers(
     rotations: Sequence[Array],
     limit: float,
     names: Mapping[str, str],
-    found: Names,
+    known_matches: Names,
 ) -> None:
     """Ask about numbers of balls at `places` that co-ordinates of a part, with `rotations` against
     the artefact's axes, contradict, and doubt them where these do not tell.
     """
-    if all(float(np.abs(one - np.eye(len(one))).max()) <= AS_PLANNED for one in rotations):
+    if all(
+        float(np.abs(rotation - np.eye(len(rotation))).max()) <= AS_PLANNED
+        for rotation in rotations
+    ):
         return
     turns = turns_onto_itself(places, limit)
     if not turns:
         return
     pairs = _pairs(names)
-    for one in rotations:
-        if any(float(np.abs(one - turn).max()) <= AS_PLANNED for turn in turns):
-            found.asked.append(
+    for rotation in rotations:
+        if any(float(np.abs(rotation - turn).max()) <= AS_PLANNED for turn in turns):
+            known_matches.asked.append(
                 f"the numbers of balls ({pairs}, in reading order) and the places that they have"
                 " along the part's axes disagree, and the artefact turned onto itself looks the"
                 " same; write the names that balls have in the experiment"
             )
             return
-    found.doubted.append(
+    known_matches.doubted.append(
         f"balls are matched by number in reading order alone ({pairs}): the artefact turned onto"
         " itself looks the same, so that part co-ordinates do not tell whether they are numbered"
         " otherwise; write the names that balls have in the experiment"
@@ -377,40 +394,41 @@ def _by_place(
     balls: Integers,
     design: Design,
     places: Callable[[Sequence[FileRow]], Array] | None,
-    found: Names,
+    known_matches: Names,
 ) -> dict[str, str]:
     """Balls whose nominal places are nearest, if that is one of them for each name."""
-    known = [design.balls.names[b] for b in balls]
-    strange = listing(f'"{shorten(name)}"' for name in used if name not in known)
+    names_known = [design.balls.names[b] for b in balls]
+    strange = listing(f'"{shorten(name)}"' for name in used if name not in names_known)
     text = f"the balls {strange} are not in the experiment, nor numbers in reading order that fit"
     if places is None or len(balls) < 2:
-        found.asked.append(f"{text}; write the names that it has: {listing(known)}")
+        known_matches.asked.append(f"{text}; write the names that it has: {listing(names_known)}")
         return {}
     limit = BY_PLACE * _pitch(design.balls.places[balls])
     index = {name: k for k, name in enumerate(design.positions.names)}
     names: dict[str, str] = {}
     for position in dict.fromkeys(row.texts[0] for row in rows):
-        own, k = [row for row in rows if row.texts[0] == position], index[position]
+        rows_of_position, k = [row for row in rows if row.texts[0] == position], index[position]
         nominal = nominal_places(design, k, balls)
-        apart, nearest = _nearest(places(own), nominal)
-        for row, distance, ball in zip(own, apart, nearest, strict=True):
+        apart, nearest = _nearest(places(rows_of_position), nominal)
+        for row, distance, ball in zip(rows_of_position, apart, nearest, strict=True):
             if distance > limit:
-                shown = (format_length(float(f"{one:.3g}")) for one in (distance, limit))
-                found.asked.append(
+                shown = (format_length(float(f"{amount:.3g}")) for amount in (distance, limit))
+                known_matches.asked.append(
                     f'{text}; "{shorten(row.texts[1])}" in {position} is {next(shown)} from the'
                     f" nearest ball, and may be {next(shown)}; write the names that it has"
                 )
                 return {}
-            if names.setdefault(row.texts[1], known[ball]) != known[ball]:
-                found.asked.append(
+            if names.setdefault(row.texts[1], names_known[ball]) != names_known[ball]:
+                known_matches.asked.append(
                     f'{text}; "{shorten(row.texts[1])}" is {names[row.texts[1]]} in one position'
-                    f" and {known[ball]} in {position} by its place; write the names that it has"
+                    f" and {names_known[ball]} in {position} by its place; write the names that it"
+                    " has"
                 )
                 return {}
     if len(set(names.values())) < len(names):
-        found.asked.append(f"{text}; two of them are at the same place by the plan")
+        known_matches.asked.append(f"{text}; two of them are at the same place by the plan")
         return {}
-    found.told.append(
+    known_matches.told.append(
         f"balls matched by place, within {format_length(float(f'{limit:.3g}'))} of where they are"
         f" planned: {_pairs(names)}"
     )

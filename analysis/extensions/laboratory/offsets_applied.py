@@ -88,22 +88,26 @@ def judge_offsets(
     design.
     """
     plate = np.flatnonzero(design.artefacts.is_plate[design.balls.artefact[readings.ball]])
-    own = readings.select(plate)
+    plate_readings = readings.select(plate)
     # What is not read across a plate is where it was drawn, whatever the offset.
-    is_read = measured(design, own)
-    offsets = np.where(is_read, design.probes.offsets[own.probe], 0.0)
-    x = np.where(is_read, x[plate], locations(design, nominal_state(design), own))
-    telling = _of_several_offsets(own, offsets)
+    is_read = measured(design, plate_readings)
+    offsets = np.where(is_read, design.probes.offsets[plate_readings.probe], 0.0)
+    x = np.where(is_read, x[plate], locations(design, nominal_state(design), plate_readings))
+    telling = _of_several_offsets(plate_readings, offsets)
     if not telling.any():
         return OffsetVerdict({}, None)
-    pitch = ball_pitches(design)[own.ball]
-    left = offsets if applied is None else np.where(is_read, applied[own.probe], 0.0)
-    seen = {
-        one.name: x + (one.times * offsets if one.times else offsets - left) for one in HYPOTHESES
+    pitch = ball_pitches(design)[plate_readings.ball]
+    offsets_left = (
+        offsets if applied is None else np.where(is_read, applied[plate_readings.probe], 0.0)
+    )
+    places_by_hypothesis = {
+        hypothesis.name: x
+        + (hypothesis.times * offsets if hypothesis.times else offsets - offsets_left)
+        for hypothesis in HYPOTHESES
     }
     scatter = {
-        name: float(np.median(_apart(design, own, places)[telling]))
-        for name, places in seen.items()
+        name: float(np.median(_apart(design, plate_readings, places)[telling]))
+        for name, places in places_by_hypothesis.items()
     }
     first, second = sorted(scatter.values())[:2]
     noise = float(np.max(design.machine.repeatability))
@@ -111,7 +115,10 @@ def judge_offsets(
         return OffsetVerdict(scatter, None)
     right = min(scatter, key=lambda name: scatter[name])
     return OffsetVerdict(
-        scatter, right if _is_of_drawing(design, own, seen[right], pitch) else None
+        scatter,
+        right
+        if _is_of_drawing(design, plate_readings, places_by_hypothesis[right], pitch)
+        else None,
     )
 
 
@@ -119,31 +126,31 @@ def _of_several_offsets(readings: Readings, offsets: Array) -> NDArray[np.bool_]
     """Which readings are of positions that were read with offsets that differ: only these tell."""
     telling = np.zeros(len(readings), bool)
     for k in np.unique(readings.position):
-        own = readings.position == k
-        telling[own] = (offsets[own] != offsets[own][0]).any()
+        is_of_position = readings.position == k
+        telling[is_of_position] = (offsets[is_of_position] != offsets[is_of_position][0]).any()
     return telling
 
 
-def _is_of_drawing(design: Design, readings: Readings, seen: Array, pitch: Array) -> bool:
+def _is_of_drawing(design: Design, readings: Readings, places: Array, pitch: Array) -> bool:
     """True if most places seen (m, d) are those of the artefact nominal, position by position."""
     for _, rows, nominal in read_in_positions(design, readings):
         if len(np.unique(readings.ball[rows])) < 2:
             continue
-        _, _, agreeing = consensus_motion(nominal, seen[rows], AGAINST_DRAWING * pitch[rows])
+        _, _, agreeing = consensus_motion(nominal, places[rows], AGAINST_DRAWING * pitch[rows])
         if 2 * agreeing.sum() <= len(rows):
             return False
     return True
 
 
-def _apart(design: Design, readings: Readings, seen: Array) -> Array:
+def _apart(design: Design, readings: Readings, seen_places: Array) -> Array:
     """Distances (m,) of places seen (m, d) from those of their balls in the plates that they are
     assembled to.
     """
     # Places seen are readings of a probe without an offset.
     probes = replace(design.probes, offsets=np.zeros_like(design.probes.offsets))
-    state = initial_state(replace(design, readings=readings, probes=probes), seen)
+    state = initial_state(replace(design, readings=readings, probes=probes), seen_places)
     places = np.einsum("mij,mj->mi", state.rotations[readings.position], state.balls[readings.ball])
-    apart = seen - places - state.origins[readings.position]
+    apart = seen_places - places - state.origins[readings.position]
     return np.asarray(np.sqrt((apart**2).sum(axis=1)))
 
 
@@ -155,35 +162,38 @@ def doubt_about_offsets(
 
     :raises ExperimentError: they clearly are other than stated, or than is taken for granted.
     """
-    stated = settings.coordinates
+    coordinates_stated = settings.coordinates
     is_read = measured(design, readings)
     if not (is_read & (design.probes.offsets[readings.probe] != 0.0)).any():
         return ()
     verdict = judge_offsets(design, readings, x, controller_offsets(design, settings))
-    taken = "ball centres" if stated == "part" else stated or HYPOTHESES[0].name
+    coordinates_taken = (
+        "ball centres" if coordinates_stated == "part" else coordinates_stated or HYPOTHESES[0].name
+    )
     if verdict.right is None:
-        return () if stated else (UNTOLD,)
-    if verdict.right == taken:
+        return () if coordinates_stated else (UNTOLD,)
+    if verdict.right == coordinates_taken:
         return ()
     shown = {
         name: format_length(float(f"{scatter:.2g}")) for name, scatter in verdict.scatter.items()
     }
-    why = "which is stated" if stated else "the default"
-    if stated == "part":
+    why = "which is stated" if coordinates_stated else "the default"
+    if coordinates_stated == "part":
         why = "which part co-ordinates are, and part is stated"
     text = (
         f"readings with different probes agree to {shown[verdict.right]} (the median) as"
-        f" {verdict.right}, but only to {shown[taken]} as {taken}, {why}; {REMEDIES[verdict.right]}"
+        f" {verdict.right}, but only to {shown[coordinates_taken]} as {coordinates_taken}, {why};"
+        f" {REMEDIES[verdict.right]}"
     )
     if verdict.right == "ball centres" and is_read.all():
-        found = poses_found(design, readings, x) or {}
-        if any(angle > TURNED for angle, _ in found.values()):
+        poses = poses_found(design, readings, x) or {}
+        if any(angle > TURNED for angle, _ in poses.values()):
             text += (
                 "; or write part instead, since the artefact stands turned against the plan in them"
             )
-    if taken == HYPOTHESES[0].name and is_read.all():
+    if coordinates_taken == HYPOTHESES[0].name and is_read.all():
         mistakes = wrong_offsets(design, readings, x)
-        text += "".join(f"; or {one.words(design)}" for one in mistakes)
+        text += "".join(f"; or {mistake.words(design)}" for mistake in mistakes)
     raise mark.refused(text)
 
 
@@ -191,19 +201,19 @@ def said_of(settings: ReadingsSettings) -> tuple[str, ...]:
     """What is to be known of estimates where co-ordinates are not scale readings of a machine
     without correction.
     """
-    said = []
+    sentences = []
     if settings.coordinates == "part":
-        said.append(
+        sentences.append(
             "part co-ordinates were placed by the nominal poses: errors are estimated where the"
             " artefact was planned to stand"
         )
     if settings.compensation == "on":
-        said.append(
+        sentences.append(
             "the machine's own correction was on: what is estimated are the errors that it leaves"
         )
     if isinstance(settings.compensation, CompensationSettings):
-        said.append(
+        sentences.append(
             f"the correction of {settings.compensation.file} was taken off: what is estimated are"
             " all errors of the machine"
         )
-    return tuple(said)
+    return tuple(sentences)

@@ -17,11 +17,11 @@ def import_readings(paths: Sequence[Path], settings: ImportSettings) -> Imported
 
     :raises ExperimentError: as `report_readings`.
     """
-    found = report_readings(paths, settings)
+    imported = report_readings(paths, settings)
     if settings.design is None:
-        return found
-    differ = against_plan(found.readings, settings.design)
-    return replace(found, remarks=(*found.remarks, *differ))
+        return imported
+    differ = against_plan(imported.readings, settings.design)
+    return replace(imported, remarks=(*imported.remarks, *differ))
 
 
 def against_plan(readings: Sequence[ImportedReading], design: Design) -> list[str]:
@@ -33,16 +33,16 @@ def against_plan(readings: Sequence[ImportedReading], design: Design) -> list[st
             *(design.readings.position, design.readings.ball, design.readings.probe), strict=True
         )
     }
-    read = {(one.position, one.ball, one.probe) for one in readings}
+    keys_read = {(reading.position, reading.ball, reading.probe) for reading in readings}
     remarks = []
-    missing, more = planned - read, read - planned
+    missing, more = planned - keys_read, keys_read - planned
     if missing:
-        told = f"{len(missing)} of {len(planned)} planned readings are missing"
-        remarks.append(f"{told}: {_summed_up(missing, planned, design)}")
+        problem = f"{len(missing)} of {len(planned)} planned readings are missing"
+        remarks.append(f"{problem}: {_summed_up(missing, planned, design)}")
     if more:
         verb = "reading is" if len(more) == 1 else "readings are"
-        told = f"{len(more)} {verb} not planned"
-        remarks.append(f"{told}: {_summed_up(more, set(), design)}")
+        problem = f"{len(more)} {verb} not planned"
+        remarks.append(f"{problem}: {_summed_up(more, set(), design)}")
     return remarks
 
 
@@ -54,13 +54,15 @@ def _summed_up(
     """
     words = []
     for name in design.positions.names:
-        own = [one for one in some if one[0] == name]
-        if own and len(own) == sum(one[0] == name for one in planned):
+        keys_of_position = [key for key in some if key[0] == name]
+        if keys_of_position and len(keys_of_position) == sum(key[0] == name for key in planned):
             words.append(f"all of {name}")
-        elif own:
+        elif keys_of_position:
             several = len(design.probes.names) > 1
             order = {ball: k for k, ball in enumerate(design.balls.names)}
-            own.sort(key=lambda one: (order[one[1]], one[2]))
-            told = (f"{ball} ({probe})" if several else ball for _, ball, probe in own)
-            words.append(f"{listing(told, 4)} in {name}")
+            keys_of_position.sort(key=lambda key: (order[key[1]], key[2]))
+            balls_text = (
+                f"{ball} ({probe})" if several else ball for _, ball, probe in keys_of_position
+            )
+            words.append(f"{listing(balls_text, 4)} in {name}")
     return listing(words)

@@ -27,8 +27,8 @@ from .offsets_applied import doubt_about_offsets, said_of
 def doubts_about_table(
     design: Design,
     readings: Readings,
-    given: Array,
-    stated: Array | None,
+    values: Array,
+    uncertainties: Array | None,
     settings: ReadingsSettings,
     mark: Mark,
 ) -> tuple[str, ...]:
@@ -37,12 +37,12 @@ def doubts_about_table(
 
     :raises ExperimentError: they clearly are other than stated, or than is taken for granted.
     """
-    doubts = doubt_about_offsets(design, readings, given, settings, mark)
-    doubts += doubts_about_digits(design, given, readings.uncertainty)
-    if stated is not None:
-        doubts += doubts_about_units(design, stated)
+    doubts = doubt_about_offsets(design, readings, values, settings, mark)
+    doubts += doubts_about_digits(design, values, readings.uncertainty)
+    if uncertainties is not None:
+        doubts += doubts_about_units(design, uncertainties)
     if settings.coordinates == "part":
-        doubts += doubts_about_copies(design, readings, given)
+        doubts += doubts_about_copies(design, readings, values)
     return doubts
 
 

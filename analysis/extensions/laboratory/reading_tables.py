@@ -63,7 +63,7 @@ def any_source_rows(
 
     :raises ExperimentError: a table that cannot be read, or names that could be several.
     """
-    sources = [one.source for one in tables_read]
+    sources = [table_read.source for table_read in tables_read]
     names = {
         "position": design.positions.names,
         "ball": design.balls.names,
@@ -77,22 +77,24 @@ def any_source_rows(
 
     d = design.dimension
     tables = [
-        any_table_rows(one, names, settings, messages, is_possible, d, units, empty, of_report)
-        for one in tables_read
+        any_table_rows(
+            table_read, names, settings, messages, is_possible, d, units, empty, of_report
+        )
+        for table_read in tables_read
     ]
     rows = [row for table in tables for row in table.rows]
     if messages:
         return SourceRows(tuple(rows), (), settings)
     _refuse_wrong_times(sources, tables)
-    said: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
     if any(table.coordinates is not None for table in tables):
         from .report_sources import with_coordinates
 
-        settings, said = with_coordinates(settings, sources, tables)
+        settings, notes = with_coordinates(settings, sources, tables)
     diameters = [d for table in tables for d in table.diameters]
 
-    def places(own: Sequence[FileRow]) -> Array:
-        return _places(own, design, settings)
+    def places(rows_of_source: Sequence[FileRow]) -> Array:
+        return _places(rows_of_source, design, settings)
 
     hints = tuple(hint for table in tables for hint in table.hints)
     named, names_found = with_known_names(
@@ -101,11 +103,11 @@ def any_source_rows(
     if names_found.asked:
         asked = [rows[0].mark.message("", text) for text in names_found.asked]
         raise ExperimentError([*asked, *hints])
-    told = [*(text for table in tables for text in table.told), *said]
+    notes_of_all = [*(text for table in tables for text in table.told), *notes]
     if len(diameters) == len(rows):
-        told += _about_diameters(named, np.array(diameters))
+        notes_of_all += _about_diameters(named, np.array(diameters))
     doubts = tuple(names_found.doubted)
-    return SourceRows(named, (*told, *names_found.told), settings, hints, doubts)
+    return SourceRows(named, (*notes_of_all, *names_found.told), settings, hints, doubts)
 
 
 def _refuse_wrong_times(sources: Sequence[Source], tables: Sequence[TableRows]) -> None:
@@ -142,13 +144,13 @@ def any_table_rows(
     axes = AXIS_NAMES[:dimension]
     source, text, encoding = table.source, table.text, table.encoding
     heads = header_names(text)
-    clocks = {name for name, one in units.items() if is_clock("", one)}
+    clocks = {name for name, unit in units.items() if is_clock("", unit)}
     # Plain tables have standard uncertainties only, and times in seconds or the like.
-    others = any(headed_uncertainty(name, heading) for name in heads - {"u"})
-    others |= not clocks.isdisjoint(header_texts(text))
+    has_others = any(headed_uncertainty(name, heading) for name in heads - {"u"})
+    has_others |= not clocks.isdisjoint(header_texts(text))
     wrong: list[Message] = []
     rows: tuple[FileRow, ...] = ()
-    if is_plain(table, settings, axes) and not others:
+    if is_plain(table, settings, axes) and not has_others:
         rows = plain_rows(table, names, axes, wrong, units, empty)
         if not wrong:
             return TableRows(rows)
@@ -163,8 +165,8 @@ def any_table_rows(
         from .other_files import what_it_is
 
         # Who names columns knows what the file is.
-        if settings.columns is None and (other := what_it_is(text)):
-            raise refused(source, other, line=1) from None
+        if settings.columns is None and (other_meaning := what_it_is(text)):
+            raise refused(source, other_meaning, line=1) from None
         if not wrong:
             raise
     if not rows:
@@ -186,18 +188,22 @@ def _places(rows: Sequence[FileRow], design: Design, settings: ReadingsSettings)
 
 def _about_diameters(rows: Sequence[FileRow], diameters: Array) -> list[str]:
     """In words which diameters of balls as measured are odd; nothing where none is stated."""
-    known = np.flatnonzero(~np.isnan(diameters))
-    if not len(known):
+    with_diameter = np.flatnonzero(~np.isnan(diameters))
+    if not len(with_diameter):
         return []
     by_ball: dict[str, list[int]] = {}
-    for i in known.tolist():
+    for i in with_diameter.tolist():
         by_ball.setdefault(rows[i].texts[1], []).append(i)
-    usual = float(np.median(diameters[known]))
+    usual = float(np.median(diameters[with_diameter]))
     off = np.zeros(len(rows))
-    for own in by_ball.values():
-        off[own] = diameters[own] - (np.median(diameters[own]) if len(own) >= ENOUGH else usual)
-    limit = max(TIMES_USUAL * 1.4826 * float(np.median(np.abs(off[known]))), LEAST_DEVIATION)
-    odd = known[np.abs(off[known]) > limit]
+    for diameters_of_ball in by_ball.values():
+        off[diameters_of_ball] = diameters[diameters_of_ball] - (
+            np.median(diameters[diameters_of_ball]) if len(diameters_of_ball) >= ENOUGH else usual
+        )
+    limit = max(
+        TIMES_USUAL * 1.4826 * float(np.median(np.abs(off[with_diameter]))), LEAST_DEVIATION
+    )
+    odd = with_diameter[np.abs(off[with_diameter]) > limit]
     odd = odd[np.argsort(-np.abs(off[odd]), kind="stable")]
     text = f"sphere diameters, {format_length(float(f'{usual:.6g}'))} in the middle, are not used"
     if not len(odd):

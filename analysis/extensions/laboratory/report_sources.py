@@ -43,21 +43,21 @@ def report_rows(
     is_file = isinstance(source, Path) and source.is_file()
     unit = None if settings.unit is None else LENGTH_UNITS[plain_unit(settings.unit)]
     of_holes = design.positions.across is not None
-    found = report_readings(
+    imported = report_readings(
         [source if is_file else text],
         ImportSettings(design, settings.names, form.name, unit, circles=of_holes),
     )
-    rows = tuple(_row(one, design.dimension, len(further)) for one in found.readings)
-    told = (*found.told, *found.remarks)
-    if any(one.uncertainty is not None for one in found.readings):
-        told += ("these uncertainties are not used; import --uncertainty writes them for fit",)
-    return TableRows(rows, told, coordinates=found.coordinates)
+    rows = tuple(_row(reading, design.dimension, len(further)) for reading in imported.readings)
+    notes = (*imported.told, *imported.remarks)
+    if any(reading.uncertainty is not None for reading in imported.readings):
+        notes += ("these uncertainties are not used; import --uncertainty writes them for fit",)
+    return TableRows(rows, notes, coordinates=imported.coordinates)
 
 
-def _row(one: ImportedReading, dimension: int, further: int) -> FileRow:
-    x = [math.nan if one.across == i else one.centre[i] for i in range(dimension)]
+def _row(reading: ImportedReading, dimension: int, further: int) -> FileRow:
+    x = [math.nan if reading.across == i else reading.centre[i] for i in range(dimension)]
     blank = [math.nan] * (1 + further)
-    return FileRow(one.mark, (one.position, one.ball, one.probe), (*x, *blank))
+    return FileRow(reading.mark, (reading.position, reading.ball, reading.probe), (*x, *blank))
 
 
 def with_coordinates(
@@ -67,8 +67,10 @@ def with_coordinates(
 
     :raises ExperimentError: reports say other than stated, or some files say it and others do not.
     """
-    found = {str(source): table.coordinates for source, table in zip(sources, tables, strict=True)}
-    reports = [name for name, kind in found.items() if kind is not None]
+    coordinates = {
+        str(source): table.coordinates for source, table in zip(sources, tables, strict=True)
+    }
+    reports = [name for name, kind in coordinates.items() if kind is not None]
     if not reports:
         return settings, ()
     if settings.coordinates == "scale readings":
@@ -79,17 +81,18 @@ def with_coordinates(
         raise refused(reports[0], text)
     if settings.coordinates is not None:
         return settings, ()
-    kinds = {kind for kind in found.values() if kind is not None}
+    kinds = {kind for kind in coordinates.values() if kind is not None}
     if len(kinds) > 1:
-        own = [name for name in reports if found[name] == "part"]
-        others = listing(name for name in reports if name not in own)
+        part_reports = [name for name in reports if coordinates[name] == "part"]
+        others_listed = listing(name for name in reports if name not in part_reports)
         text = (
-            f"centres in a part's co-ordinate system, and others ({others}) in the machine's; state"
+            f"centres in a part's co-ordinate system, and others ({others_listed}) in the"
+            " machine's; state"
             " coordinates if they are all of one kind, or fit each apart"
         )
-        raise refused(own[0], text)
-    if len(reports) < len(found):
-        plain = [name for name, kind in found.items() if kind is None]
+        raise refused(part_reports[0], text)
+    if len(reports) < len(coordinates):
+        plain = [name for name, kind in coordinates.items() if kind is None]
         text = (
             f"a table beside reports ({listing(reports)}), which have ball centres; state what all"
             " co-ordinates are: readings: {coordinates: ball centres}"

@@ -26,19 +26,19 @@ def turns_onto_itself(places: Array, limit: float) -> list[Array]:
     if np.sqrt((across[second] ** 2).sum()) <= limit:
         return []
     between = float(np.sqrt(((local[first] - local[second]) ** 2).sum()))
-    tree, found = cKDTree(local), dict[tuple[int, ...], Array]()
+    tree, turns = cKDTree(local), dict[tuple[int, ...], Array]()
     to_first = np.flatnonzero(np.abs(radius - radius[first]) <= limit)
     to_second = np.flatnonzero(np.abs(radius - radius[second]) <= limit)
-    i, j = (one.ravel() for one in np.meshgrid(to_first, to_second, indexing="ij"))
+    i, j = (grid.ravel() for grid in np.meshgrid(to_first, to_second, indexing="ij"))
     distance = np.sqrt(((local[i] - local[j]) ** 2).sum(axis=1))
     fitting = np.flatnonzero(np.abs(distance - between) <= 2.0 * limit)[:MOST_PAIRS]
     for k in fitting.tolist():
         # About the middle, which stays where it is.
-        own = np.array([np.zeros(local.shape[1]), local[first], local[second]])
+        corners = np.array([np.zeros(local.shape[1]), local[first], local[second]])
         there = np.array([np.zeros(local.shape[1]), local[i[k]], local[j[k]]])
-        rotation, _ = fit_motion(own, there)
+        rotation, _ = fit_motion(corners, there)
         apart, nearest = tree.query(local @ rotation.T)
         if apart.max() <= limit and len(np.unique(nearest)) == len(local):
-            found.setdefault(tuple(nearest.tolist()), rotation)
-    found.pop(tuple(range(len(local))), None)
-    return list(found.values())
+            turns.setdefault(tuple(nearest.tolist()), rotation)
+    turns.pop(tuple(range(len(local))), None)
+    return list(turns.values())

@@ -91,8 +91,8 @@ def split(text: str, separator: str) -> list[str] | None:
         text = text.strip()
         blanks = r"\s+" if separator == " " else r"\s{2,}|\t"
         if '"' in text:
-            found = re.findall(r'"([^"]*)"(?=\s|$)|(\S+)', text)
-            return [quoted or plain for quoted, plain in found]
+            pieces = re.findall(r'"([^"]*)"(?=\s|$)|(\S+)', text)
+            return [quoted or plain for quoted, plain in pieces]
         return re.split(blanks, text)
     if '"' not in text:
         return [cell.strip() for cell in text.split(separator)]
@@ -129,7 +129,7 @@ def forms_of(lines: Sequence[Line], words: Vocabulary, settings: ReadingsSetting
     if settings.separator == "space":
         tried = ["wide", "space"]
     decimals = [settings.decimal] if settings.decimal else list(DECIMALS)
-    found: list[Form] = []
+    forms: list[Form] = []
     reasons: list[NoFormError] = []
     for separator in tried:
         try:
@@ -139,9 +139,9 @@ def forms_of(lines: Sequence[Line], words: Vocabulary, settings: ReadingsSetting
             continue
         for decimal in decimals:
             # Of a table of commas, they separate columns unless quoted.
-            found.append(_form(lines, header, headings, separator, decimal, words.empty))
-    if found:
-        return found
+            forms.append(_form(lines, header, headings, separator, decimal, words.empty))
+    if forms:
+        return forms
     raise max(reasons, key=lambda error: len(error.cells))
 
 
@@ -162,8 +162,8 @@ def _find_headings(
     wrong: NoFormError | None = None
     widest = NoFormError(lines[0][0], "", ())
     comments = [i for i, (_, text) in enumerate(lines[:MOST_ABOVE]) if text.lstrip()[:1] == "#"]
-    others = [i for i in range(min(len(lines), MOST_ABOVE)) if i not in set(comments)]
-    for i in (*others, *comments):
+    candidate_lines = [i for i in range(min(len(lines), MOST_ABOVE)) if i not in set(comments)]
+    for i in (*candidate_lines, *comments):
         number, text = lines[i]
         if settings.header is not None and number != settings.header:
             continue
@@ -207,35 +207,35 @@ def _form(
     remarks: list[int] = []
     wrong: list[tuple[int, str]] = []
     ball = headings.roles["ball"].place if "ball" in headings.roles else 0
-    for at, text in _below(lines, header):
+    for line_number, text in _below(lines, header):
         if len(wrong) > MOST_MESSAGES:
             break
         cells = split(text, sign)
         if cells is None:
-            wrong.append((at, "a quotation mark too many; write one line per row"))
+            wrong.append((line_number, "a quotation mark too many; write one line per row"))
             continue
-        if not rows and not units and (found := _units(cells, places)):
-            units = found
+        if not rows and not units and (form := _units(cells, places)):
+            units = form
             continue
         cells = _padded(cells, width, needed, sign)
         if len(cells) < width or (headings.cells and len(cells) > width):
             if _holds_no_number(cells, places, number):
-                remarks.append(at)
+                remarks.append(line_number)
             else:
                 text = f"{len(cells)} columns instead of {width}; write one line per row"
-                wrong.append((at, text))
+                wrong.append((line_number, text))
             continue
         if all(i >= len(cells) or cells[i].casefold() in NOTHING for i in places):
-            (empty if cells[ball] else remarks).append(at)
+            (empty if cells[ball] else remarks).append(line_number)
             continue
         if reason := _wrong_row(cells, headings, number, decimal, may_be_empty):
-            wrong.append((at, reason))
-        rows.append((at, cells))
+            wrong.append((line_number, reason))
+        rows.append((line_number, cells))
     # In between they may say what is true of the rows below only.
     last = rows[-1][0] if rows else 0
     text = "a line without co-ordinates among the rows; remove it, or say in a column what it says"
-    wrong += [(at, text) for at in remarks if at < last]
-    empty = sorted((*empty, *(at for at in remarks if at > last)))
+    wrong += [(line_number, text) for line_number in remarks if line_number < last]
+    empty = sorted((*empty, *(line_number for line_number in remarks if line_number > last)))
     above = tuple(text for _, text in lines[: max(header, 0)])
     line = lines[header][0] if header >= 0 else 0
     return Form(
@@ -244,10 +244,10 @@ def _form(
 
 
 def _below(lines: Sequence[Line], header: int) -> Iterator[Line]:
-    for at, text in lines[header + 1 :]:
+    for line_number, text in lines[header + 1 :]:
         # A rule below the headings of a table of bars or blanks holds nothing.
         if text.lstrip()[:1] != "#" and not re.fullmatch(r"[\s|+:=_-]+", text):
-            yield at, text
+            yield line_number, text
 
 
 def _units(cells: Sequence[str], places: Sequence[int]) -> dict[int, str]:
@@ -286,10 +286,10 @@ def _wrong_row(
 ) -> str:
     """Faults of a row; empty where nothing is."""
     for group in headings.groups:
-        own = [cells[axis.place] for axis in group.axes]
-        if len(headings.groups) > 1 and all(cell.casefold() in NOTHING for cell in own):
+        cells_of_axes = [cells[axis.place] for axis in group.axes]
+        if len(headings.groups) > 1 and all(cell.casefold() in NOTHING for cell in cells_of_axes):
             continue
-        for name, cell in zip("xyz", own, strict=False):
+        for name, cell in zip("xyz", cells_of_axes, strict=False):
             if name in may_be_empty and cell.casefold() in NOTHING:
                 continue
             if not number.fullmatch(cell):
@@ -303,9 +303,9 @@ def wrong_number(cell: str, name: str, decimal: str) -> str:
         return f"no {name}; write a number, or remove the line"
     if THOUSANDS.fullmatch(cell[:LONGEST]):
         return f'"{shorten(cell)}" has signs between thousands; write it without them'
-    other = "comma" if decimal == "point" else "point"
-    if NUMBERS[other].fullmatch(cell):
-        return f'"{cell}" has a decimal {other}, {OTHER_DECIMALS} {decimal}s; write one kind'
+    other_name = "comma" if decimal == "point" else "point"
+    if NUMBERS[other_name].fullmatch(cell):
+        return f'"{cell}" has a decimal {other_name}, {OTHER_DECIMALS} {decimal}s; write one kind'
     return f'"{shorten(cell)}" is not a number; write for example "500{DECIMALS[decimal]}0003"'
 
 
@@ -319,12 +319,12 @@ def chosen_form(forms: Sequence[Form]) -> Form:
         # Of a number with thousands and decimals, the sign of the decimals is the last one.
         return min(forms, key=lambda form: (_share_wrong(form), _of_other_decimals(form)))
     first = right[0]
-    for other in right[1:]:
-        if other.content() != first.content():
-            one, two = (SEPARATORS[form.separator] for form in (first, other))
+    for alternative in right[1:]:
+        if alternative.content() != first.content():
+            separator, two = (SEPARATORS[form.separator] for form in (first, alternative))
             raise NoFormError(
                 first.header,
-                f"{one[1]} and {two[1]} could both separate the columns; write which under"
+                f"{separator[1]} and {two[1]} could both separate the columns; write which under"
                 " readings: separator",
             )
     return first
@@ -344,7 +344,7 @@ def doubtful_decimals(form: Form) -> str:
     empty where one number tells.
     """
     sign = DECIMALS[form.decimal]
-    found = ""
+    doubtful = ""
     for _, cells in form.rows:
         for group in form.headings.groups:
             for axis in group.axes:
@@ -355,8 +355,8 @@ def doubtful_decimals(form: Form) -> str:
                 elif not EITHER.fullmatch(cell):
                     return ""
                 else:
-                    found = found or cell
-    return found
+                    doubtful = doubtful or cell
+    return doubtful
 
 
 def commas_of_both_kinds(form: Form) -> bool:

@@ -50,12 +50,12 @@ def headed_uncertainty(
     uncertainty is expanded, unless it is called a standard one: these contradict each other.
     """
     match = _FACTOR.search(cell)
-    rest = cell if match is None else f"{cell[: match.start()]} {cell[match.end() :]}".strip()
+    remainder = cell if match is None else f"{cell[: match.start()]} {cell[match.end() :]}".strip()
     factor = None if match is None else match[1].replace(",", ".")
-    name, unit = heading(rest)
+    name, unit = heading(remainder)
     if name in EXPANDED:
         return HeadedUncertainty("expanded", factor, unit)
-    is_capital = name == "u" and rest.lstrip().startswith("U")
+    is_capital = name == "u" and remainder.lstrip().startswith("U")
     if name in UNCLEAR or is_capital:
         return HeadedUncertainty("unclear" if factor is None else "expanded", factor, unit)
     if name in STANDARD:

@@ -75,35 +75,38 @@ class WrongOffsets:
 def stated_offsets(design: Design) -> Array:
     """Offsets (l, d) of probes as they are stated, of uncertain ones too."""
     offsets, priors = design.probes.offsets.copy(), design.of(Priors)
-    known = np.flatnonzero(priors.probe >= 0)
-    offsets[priors.probe[known], priors.component[known]] = priors.value[known]
+    known_priors = np.flatnonzero(priors.probe >= 0)
+    offsets[priors.probe[known_priors], priors.component[known_priors]] = priors.value[known_priors]
     return offsets
 
 
 def with_offsets(design: Design, change: Array) -> Design:
     """The design with other offsets by a change (l, d), as certain as they were."""
     priors = design.of(Priors)
-    value, known = priors.value.copy(), np.flatnonzero(priors.probe >= 0)
-    value[known] += change[priors.probe[known], priors.component[known]]
+    value, indices = priors.value.copy(), np.flatnonzero(priors.probe >= 0)
+    value[indices] += change[priors.probe[indices], priors.component[indices]]
     probes = replace(design.probes, offsets=design.probes.offsets + change)
     return replace(design, probes=probes).observed(priors.given(value=value))
 
 
 def discrete_mistakes(design: Design) -> Iterator[WrongOffsets]:
     """Every sign, or several of one probe, that may be wrong, and every exchange of two probes."""
-    stated = stated_offsets(design)
-    read = np.unique(design.readings.probe[design.plate_readings]).tolist()
-    for probe in read:
-        axes = np.flatnonzero(stated[probe]).tolist()
+    offsets_stated = stated_offsets(design)
+    probes_read = np.unique(design.readings.probe[design.plate_readings]).tolist()
+    for probe in probes_read:
+        axes = np.flatnonzero(offsets_stated[probe]).tolist()
         for some in chain.from_iterable(combinations(axes, n + 1) for n in range(len(axes))):
-            change = np.zeros_like(stated)
-            change[probe, list(some)] = -2.0 * stated[probe, list(some)]
+            change = np.zeros_like(offsets_stated)
+            change[probe, list(some)] = -2.0 * offsets_stated[probe, list(some)]
             yield WrongOffsets((probe,), change, some)
-    for one, other in combinations(range(len(stated)), 2):
-        change = np.zeros_like(stated)
-        change[one], change[other] = stated[other] - stated[one], stated[one] - stated[other]
-        if change.any() and {one, other} & set(read):
-            yield WrongOffsets((one, other), change)
+    for first, second in combinations(range(len(offsets_stated)), 2):
+        change = np.zeros_like(offsets_stated)
+        change[first], change[second] = (
+            offsets_stated[second] - offsets_stated[first],
+            offsets_stated[first] - offsets_stated[second],
+        )
+        if change.any() and {first, second} & set(probes_read):
+            yield WrongOffsets((first, second), change)
 
 
 @dataclass(frozen=True)
@@ -133,12 +136,14 @@ class OffsetDifferences:
 
     def shifts(self, probes: int) -> Array:
         """The least change (l, d) of the offsets that leaves least of the differences."""
-        found = np.zeros((probes, self.places.shape[1]))
+        shifts_found = np.zeros((probes, self.places.shape[1]))
         by_probe = self._centred((self.probe[:, None] == np.arange(probes)).astype(float))
-        plain = self.left(found)
-        for axis, read in enumerate(self.is_read.T):
-            found[:, axis] = -np.linalg.lstsq(by_probe[read], plain[read, axis], rcond=1e-9)[0]
-        return found
+        plain = self.left(shifts_found)
+        for axis, is_axis_read in enumerate(self.is_read.T):
+            shifts_found[:, axis] = -np.linalg.lstsq(
+                by_probe[is_axis_read], plain[is_axis_read, axis], rcond=1e-9
+            )[0]
+        return shifts_found
 
     def shift_of(self, probe: int, probes: int) -> Array:
         """The change (l, d) of one probe's offset alone that they call for, the median over its
@@ -152,9 +157,9 @@ class OffsetDifferences:
                 for k, place in zip(self.position[mine], self.places[mine], strict=True)
             ]
         )
-        for axis, read in enumerate(self.is_read[mine].T):
-            if read.any():
-                change[probe, axis] = np.median(apart[read, axis])
+        for axis, is_axis_read in enumerate(self.is_read[mine].T):
+            if is_axis_read.any():
+                change[probe, axis] = np.median(apart[is_axis_read, axis])
         return change
 
 
@@ -163,21 +168,21 @@ def offset_differences(design: Design, x: Array) -> OffsetDifferences:
     readings x (m, d).
     """
     pitch, readings = ball_pitches(design), design.readings
-    is_read, seen = measured(design, readings), seen_places(design, readings, x)
+    is_read, places_seen = measured(design, readings), seen_places(design, readings, x)
     rows: list[tuple[int, int, Array, Array, int]] = []
     for k, mine, nominal in read_in_positions(design, readings):
         probe = readings.probe[mine]
         several = np.unique(probe)
         if len(several) < 2 or not design.artefacts.is_plate[design.positions.artefact[k]]:
             continue
-        own = probe == int(np.argmax(np.bincount(probe)))
-        reach = AGAINST_DRAWING * pitch[readings.ball[mine[own]]]
-        rotation, _, _ = consensus_motion(nominal[own], seen[mine[own]], reach)
-        apart = seen[mine] - nominal @ rotation.T
-        for one in several.tolist():
-            of_one = probe == one
+        is_common = probe == int(np.argmax(np.bincount(probe)))
+        reach = AGAINST_DRAWING * pitch[readings.ball[mine[is_common]]]
+        rotation, _, _ = consensus_motion(nominal[is_common], places_seen[mine[is_common]], reach)
+        apart = places_seen[mine] - nominal @ rotation.T
+        for probe_index in several.tolist():
+            of_one = probe == probe_index
             place = np.median(apart[of_one], axis=0)
-            rows.append((k, one, place, is_read[mine[0]], int(of_one.sum())))
+            rows.append((k, probe_index, place, is_read[mine[0]], int(of_one.sum())))
     d = design.dimension
     return OffsetDifferences(
         np.array([row[0] for row in rows], np.int64),
@@ -196,25 +201,27 @@ def wrong_offsets(design: Design, readings: Readings, x: Array) -> list[WrongOff
     x, none = x[plates], np.zeros(0, np.int64)
     design = replace(design, readings=readings.select(plates))
     design = design.observed(design.of(Lengths).select(none))
-    found, probes = offset_differences(design, x), len(design.probes.names)
-    plain = np.abs(found.left(np.zeros((probes, design.dimension)))).max(initial=0.0)
+    differences, probes = offset_differences(design, x), len(design.probes.names)
+    plain = np.abs(differences.left(np.zeros((probes, design.dimension)))).max(initial=0.0)
     pitch = float(ball_pitches(design)[design.readings.ball].min(initial=np.inf))
     limit = min(AGAINST_READINGS * pitch, LEFT_WRONG * float(plain))
 
     def wrong(mistake: Array) -> int:
-        positions, others = find_gross_errors(with_offsets(design, mistake), x)
-        lost = np.isin(design.readings.position, [one.position for one in positions])
-        return int(lost.sum()) + len(others)
+        positions, other_errors = find_gross_errors(with_offsets(design, mistake), x)
+        lost = np.isin(design.readings.position, [mistake.position for mistake in positions])
+        return int(lost.sum()) + len(other_errors)
 
     def explains(mistake: WrongOffsets) -> bool:
-        fits = np.abs(found.left(mistake.change)).max(initial=0.0) <= limit
+        fits = np.abs(differences.left(mistake.change)).max(initial=0.0) <= limit
         return bool(fits) and wrong(mistake.change) <= most
 
     most = LEFT_WRONG * wrong(np.zeros_like(design.probes.offsets))
-    count = np.bincount(found.probe, found.count, probes)
+    count = np.bincount(differences.probe, differences.count, probes)
     shown = np.flatnonzero(count >= LEAST_READINGS).tolist()
-    discrete = (one for one in discrete_mistakes(design) if set(one.probes) & set(shown))
-    single = (WrongOffsets((k,), found.shift_of(k, probes)) for k in shown)
+    discrete = (
+        mistake for mistake in discrete_mistakes(design) if set(mistake.probes) & set(shown)
+    )
+    single = (WrongOffsets((k,), differences.shift_of(k, probes)) for k in shown)
     return list(filter(explains, discrete)) or list(filter(explains, single))
 
 

@@ -56,12 +56,12 @@ class Element:
 
     def all(self, *names: str) -> Iterator[Element]:
         """Elements at a path of names below this one, in their order."""
-        for one in self.children:
-            if one.name == names[0]:
+        for child in self.children:
+            if child.name == names[0]:
                 if len(names) == 1:
-                    yield one
+                    yield child
                 else:
-                    yield from one.all(*names[1:])
+                    yield from child.all(*names[1:])
 
     def first(self, *names: str) -> Element | None:
         """The first element at a path of names below this one, or None."""
@@ -69,16 +69,16 @@ class Element:
 
     def text_at(self, *names: str) -> str:
         """The text of the first element at a path of names, empty where there is none."""
-        one = self.first(*names)
-        return "" if one is None else one.text
+        element = self.first(*names)
+        return "" if element is None else element.text
 
     def walk(self) -> Iterator[Element]:
         """This element and all below it, in their order."""
-        left = [self]
-        while left:
-            one = left.pop()
-            yield one
-            left += reversed(one.children)
+        elements_left = [self]
+        while elements_left:
+            element = elements_left.pop()
+            yield element
+            elements_left += reversed(element.children)
 
 
 def read_xml(path: Path | GivenText) -> Element:
@@ -165,13 +165,22 @@ class _Builder:
         if len(self.open) >= DEEPEST:
             raise self._refuse(f"elements within each other more than {DEEPEST} deep")
         namespace, _, local = name.rpartition(_SEPARATOR)
-        own = {key.rpartition(_SEPARATOR)[2]: value for key, value in attributes.items()}
-        self.open.append(_Open(self._mark(), namespace, local, own, [], []))
+        plain_attributes = {
+            key.rpartition(_SEPARATOR)[2]: value for key, value in attributes.items()
+        }
+        self.open.append(_Open(self._mark(), namespace, local, plain_attributes, [], []))
 
     def _end(self, _: str) -> None:
-        one = self.open.pop()
-        text = "".join(one.texts).strip()
-        made = Element(one.mark, one.namespace, one.name, one.attributes, tuple(one.children), text)
+        element = self.open.pop()
+        text = "".join(element.texts).strip()
+        made = Element(
+            element.mark,
+            element.namespace,
+            element.name,
+            element.attributes,
+            tuple(element.children),
+            text,
+        )
         (self.open[-1].children if self.open else self.roots).append(made)
 
     def _text(self, text: str) -> None:

@@ -45,10 +45,10 @@ def volume_layers(design: Design) -> list[Layer]:
             place[k] = lower[k] + share * (upper[k] - lower[k])
             ends.append(place)
             names.append(f"{'xyz'[k]}, mm" if text is None else f"{1e3 * text + 0.0:.6g}")
-    visible_and_hidden, unseen = edges[~hidden].reshape(-1, d), edges[hidden].reshape(-1, d)
+    visible, unseen = edges[~hidden].reshape(-1, d), edges[hidden].reshape(-1, d)
     return [
         Layer("lines", "faint thin dotted", unseen, (2,) * int(hidden.sum())),
-        Layer("lines", "faint thin", visible_and_hidden, (2,) * int((~hidden).sum())),
+        Layer("lines", "faint thin", visible, (2,) * int((~hidden).sum())),
         Layer("labels", "axes", np.array(ends), names=tuple(names)),
     ]
 
@@ -111,24 +111,24 @@ def point_view(linearisation: Linearisation, factor: float, sigma: float = 1.0) 
     """Ellipsoids of the corrected evaluation points, enlarged, with their expanded uncertainties
     as half axes.
     """
-    design, design_and_points = linearisation.design, linearisation.design.evaluation
-    probes = np.full(len(design_and_points.points), design_and_points.probe)
+    design, evaluation = linearisation.design, linearisation.design.evaluation
+    probes = np.full(len(evaluation.points), evaluation.probe)
     rows = correction_rows(
-        design, linearisation.layout, linearisation.state, design_and_points.points, probes
+        design, linearisation.layout, linearisation.state, evaluation.points, probes
     )
     open_ = np.isnan(linearisation.of_shared(rows.reshape(-1, rows.shape[2]))).reshape(
         rows.shape[:2]
     )
     is_determined = ~open_.any(axis=1)
     layers = volume_layers(design)
-    points = design_and_points.points[is_determined]
+    points = evaluation.points[is_determined]
     spread = factor * sigma * (rows[is_determined] @ linearisation.shared)
     size = float(
         np.ptp(np.stack([design.machine.volume.lower, design.machine.volume.upper]), axis=0).max()
     )
     names = "point-view", "points", "Corrected evaluation points"
     return _ellipsoids(
-        layers, points, spread, design_and_points.points[~is_determined], size, names, factor
+        layers, points, spread, evaluation.points[~is_determined], size, names, factor
     )
 
 

@@ -84,7 +84,7 @@ def _map(lengths: QuotedData, chosen: list[int], k: float, of_target: bool, word
     parts = []
     for i, place in zip(chosen, places, strict=True):
         column, row = np.searchsorted(x, place[0]), len(y) - 1 - np.searchsorted(y, place[1])
-        corner, top = LEFT + CELL * column, ABOVE + ROW * row
+        left_edge, top = LEFT + CELL * column, ABOVE + ROW * row
         # What is known of some of its lengths would hide that others are unknown.
         value = None if lengths.data["by_point"][i]["undetermined"] else every[i]
         kind = "open"
@@ -92,7 +92,7 @@ def _map(lengths: QuotedData, chosen: list[int], k: float, of_target: bool, word
             kind = _shade(factor * value, low, high, 1.0 if of_target else np.inf)
         parts.append(
             Html(
-                f'<rect class="{kind}" x="{corner:g}" y="{top:g}" width="{CELL:g}"'
+                f'<rect class="{kind}" x="{left_edge:g}" y="{top:g}" width="{CELL:g}"'
                 f' height="{ROW:g}"/>'
             )
         )
@@ -102,7 +102,7 @@ def _map(lengths: QuotedData, chosen: list[int], k: float, of_target: bool, word
                 "text",
                 shown,
                 class_="place" if value is not None else None,
-                x=f"{corner + CELL / 2:g}",
+                x=f"{left_edge + CELL / 2:g}",
                 y=f"{top + ROW / 2 + 3.5:g}",
                 text_anchor="middle",
                 data_path=None if value is None else lengths.at("by_point", i, name).path,

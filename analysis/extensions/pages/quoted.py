@@ -64,13 +64,13 @@ class QuotedData:
 
     def amount(self, value: str, unit: str, uncertainty: str | None = None) -> tuple[Html, str]:
         """A value with the unit it reads well in; to its uncertainty where that is named."""
-        quoted, unit_text = self.at(value), str(self.data[unit])
+        quantity, unit_text = self.at(value), str(self.data[unit])
         factor, shown = amount_of(1.0, unit_text)
         u = None if uncertainty is None else self.data[uncertainty]
-        if quoted.data is None or uncertainty is None:
-            return quoted.number(factor=factor), shown
-        text = to_uncertainty(factor * quoted.data, math.nan if u is None else factor * u)
-        return quoted._shown(text, factor), shown
+        if quantity.data is None or uncertainty is None:
+            return quantity.number(factor=factor), shown
+        text = to_uncertainty(factor * quantity.data, math.nan if u is None else factor * u)
+        return quantity._shown(text, factor), shown
 
     def share(self, *steps: str | int) -> Html:
         """A share in percent."""

@@ -65,9 +65,9 @@ def covering_set(
         return ()
     stack = np.array([effects[addition] for addition in additions])
     k = stack.shape[2]
-    state, built = np.eye(k), list[Change]()
-    while state.shape[1]:
-        gains = _ranks(stack @ state)
+    unseen, built = np.eye(k), list[Change]()
+    while unseen.shape[1]:
+        gains = _ranks(stack @ unseen)
         possible = [
             i for i, addition in enumerate(additions) if gains[i] and may_be((*built, addition))
         ]
@@ -75,7 +75,7 @@ def covering_set(
             return ()
         best = max(possible, key=lambda i, of=gains: (of[i] / effort(additions[i]), of[i]))  # type: ignore[misc]
         built.append(additions[best])
-        state = state @ open_of(stack[best] @ state)
+        unseen = unseen @ open_of(stack[best] @ unseen)
     for addition in sorted(built, key=effort, reverse=True):
         without = [rival for rival in built if rival is not addition]
         if rank_of([effects[rival] for rival in without]) == k:

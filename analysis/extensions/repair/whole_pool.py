@@ -154,12 +154,12 @@ def spanning(information: Information, candidates: Sequence[Candidate]) -> tuple
     flat = information.matrices[:count].reshape(count, -1)
     while True:
         values, directions = np.linalg.eigh(information.of(few))
-        smallest, shared_places = values.min(initial=1.0), places.intersection(few)
-        is_even = smallest > EVEN * len(few) / count
+        smallest_value, shared_places = values.min(initial=1.0), places.intersection(few)
+        is_even = smallest_value > EVEN * len(few) / count
         if is_even or shared_places == places or len(shared_places) >= MOST_SPANNING:
             return (
                 tuple(sorted(few))
-                if smallest > FAINT and len(shared_places) <= MOST_SPANNING
+                if smallest_value > FAINT and len(shared_places) <= MOST_SPANNING
                 else ()
             )
         scaled = directions / (values.clip(0.0) + FAINT)

@@ -15,15 +15,15 @@ def judged_goals(
 ) -> tuple[tuple[str, ...], tuple[str, ...]]:
     """Return a line per goal, and those that are not met."""
     planned = planned_uncertainty(experiment)
-    parts, missed = [], []
+    lines, missed = [], []
     for goal in goals:
         try:
             check_goal(goal, planned)
         except GoalError as error:
-            parts.append(f"goal not met: {goal}; {error}")
-            missed.append(parts[-1])
+            lines.append(f"goal not met: {goal}; {error}")
+            missed.append(lines[-1])
             continue
         judged = judge(goal, planned)
-        parts.append(f"goal {'met' if judged.is_met else 'not met'}: {goal}; {judged.words}")
-        missed += [] if judged.is_met else [parts[-1]]
-    return tuple(parts), tuple(missed)
+        lines.append(f"goal {'met' if judged.is_met else 'not met'}: {goal}; {judged.words}")
+        missed += [] if judged.is_met else [lines[-1]]
+    return tuple(lines), tuple(missed)

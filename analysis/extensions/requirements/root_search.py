@@ -263,10 +263,10 @@ def _border(trials: _Trials, right: int, wrong: int) -> int:
 
 def _convergence(trials: _Trials, extreme: int) -> list[str]:
     """True if an extreme value is as good as an exact one."""
-    judgements, before = trials.at(extreme).judgement, trials.at(extreme + PER_DECADE).judgement
-    if judgements is None or before is None:
+    judgement, before = trials.at(extreme).judgement, trials.at(extreme + PER_DECADE).judgement
+    if judgement is None or before is None:
         return []
-    if abs(before.distance - judgements.distance) <= CONVERGED * judgements.distance:
+    if abs(before.distance - judgement.distance) <= CONVERGED * judgement.distance:
         return ["an exact one would not be better: ten times that gives the same result"]
     return ["a smaller one would still change the result"]
 

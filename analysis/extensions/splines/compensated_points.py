@@ -93,7 +93,7 @@ def compensated_points(
     if profile is None or curve.points.y_column.kind != "length":
         text = "errors are compensated along a profile; give the columns nominal_x and nominal_z"
         raise SplineError([SplineProblem(text)])
-    problems, lengths, columns = [], [], []
+    problems, lengths, points_kept = [], [], []
     for place in places:
         try:
             length, normal = profile.located(place)
@@ -102,14 +102,14 @@ def compensated_points(
             problems.append(SplineProblem(text, tuple(place.tolist())))
             continue
         lengths.append(length)
-        columns.append(normal)
+        points_kept.append(normal)
     if problems:
         raise SplineError(problems)
     s = np.array(lengths)
     points_found = CompensatedPoints(
         tuple(names),
         places,
-        np.array(columns).reshape(-1, 2) if normals is None else normals,
+        np.array(points_kept).reshape(-1, 2) if normals is None else normals,
         curve.fit.values(s),
         curve.standard_uncertainty(s),
     )
@@ -122,7 +122,7 @@ def _corner(curve: ErrorCurve, corner: float, number: int) -> CompensatedPoints:
     its errors have there.
     """
     assert curve.profile is not None
-    corner_and_index, index = (
+    corner_place, index = (
         np.array([corner]),
         int(np.argmin(np.abs(curve.profile.lengths - corner))),
     )
@@ -136,7 +136,7 @@ def _corner(curve: ErrorCurve, corner: float, number: int) -> CompensatedPoints:
         text = "the features at {0} are nearly tangent; make it a boundary"
         raise SplineError([SplineProblem(text, (corner,))])
     errors, slopes = (
-        np.array([curve.fit.values(corner_and_index, k, side)[0] for side in SIDES]) for k in (0, 1)
+        np.array([curve.fit.values(corner_place, k, side)[0] for side in SIDES]) for k in (0, 1)
     )
     ways = tangents - slopes[:, None] * normals
     starts = -errors[:, None] * normals
@@ -147,7 +147,7 @@ def _corner(curve: ErrorCurve, corner: float, number: int) -> CompensatedPoints:
     # Slopes as small as those of errors change nothing here.
     shares = np.linalg.solve(normals, np.eye(2)).T @ direction
     root = sum(
-        share * curve.fit.space.rows(corner_and_index, 0, side) @ curve.fit.root
+        share * curve.fit.space.rows(corner_place, 0, side) @ curve.fit.root
         for share, side in zip(shares, SIDES, strict=True)
     )
     return CompensatedPoints(

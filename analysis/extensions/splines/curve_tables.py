@@ -159,14 +159,14 @@ def _variable(curve: ErrorCurve, powers: Powers) -> str:
 
 
 def _piece_lines(curve: ErrorCurve, powers: Powers) -> list[str]:
-    piece_coefficients, coefficients = _coefficients(curve, powers)
+    pieces_shown, coefficients = _coefficients(curve, powers)
     x = curve.points.x_column
     head = ["from", "to", *(f"u^{k}" if k else "1" for k in range(coefficients.shape[1]))]
     unit = micro(x.unit)
     units = [unit, unit, *(derivative_unit(curve, k) for k in range(coefficients.shape[1]))]
     rows = [head, units]
     for start, end, row in zip(
-        piece_coefficients.breaks, piece_coefficients.breaks[1:], coefficients, strict=False
+        pieces_shown.breaks, pieces_shown.breaks[1:], coefficients, strict=False
     ):
         # What adds less to the curve than rounding does is told as zero.
         size = NOTHING * float(np.abs(curve.fit.coefficients).max()) / curve.points.y_column.factor
@@ -181,7 +181,7 @@ def _piece_lines(curve: ErrorCurve, powers: Powers) -> list[str]:
     note = []
     if powers == "global":
         note = [
-            f"terms are up to {piece_coefficients.cancellation():.2g} times the curve, and rounding"
+            f"terms are up to {pieces_shown.cancellation():.2g} times the curve, and rounding"
             " as much larger"
         ]
     return [
@@ -260,7 +260,7 @@ def curve_data(curve: ErrorCurve, file: str, powers: Powers, places: np.ndarray)
 
 def coefficients_csv(curve: ErrorCurve, powers: Powers) -> str:
     """The polynomials of all pieces as CSV at full precision, in the units of the data."""
-    piece_coefficients, coefficients = _coefficients(curve, powers)
+    pieces_shown, coefficients = _coefficients(curve, powers)
     x, y = curve.points.x_column, curve.points.y_column
     text = io.StringIO()
     count = coefficients.shape[1]
@@ -272,7 +272,7 @@ def coefficients_csv(curve: ErrorCurve, powers: Powers) -> str:
         for k in range(count)
     ]
     writer.writerow([f"start_{x.unit}", f"end_{x.unit}", *names])
-    breaks = (piece_coefficients.breaks / x.factor).tolist()
+    breaks = (pieces_shown.breaks / x.factor).tolist()
     for start, end, row in zip(breaks, breaks[1:], coefficients.tolist(), strict=False):
         writer.writerow([repr(start), repr(end), *map(repr, row)])
     return text.getvalue()

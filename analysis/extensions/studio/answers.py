@@ -126,14 +126,14 @@ def _motions(
     Their common rigid motion, which no distance shows, is taken out.
     """
     design = linearisation.design
-    volume, volume_and_readings, offsets = (
+    volume, readings, offsets = (
         design.machine.volume,
         design.readings,
         design.probes.offsets,
     )
     nodes = even_grid(volume.lower, volume.upper, [NODES] * len(volume.lower))
     of_nodes = np.full(len(nodes), design.evaluation.probe)
-    of_plates = volume_and_readings.select(design.plate_readings)
+    of_plates = readings.select(design.plate_readings)
     places = np.concatenate(
         [nodes + offsets[of_nodes], locations(design, linearisation.state, of_plates)]
     )

@@ -399,12 +399,12 @@ def _by_pair(
     entries: list[CertificateEntry], layout: BallLayout, references: References
 ) -> dict[frozenset[str], CertificateEntry]:
     """Entries by their balls, after saying which are no distances of two of them, each once."""
-    problems, names_known = references.problems, set(layout.names)
+    problems, known_names = references.problems, set(layout.names)
     by_pair: dict[frozenset[str], CertificateEntry] = {}
     for entry in entries:
         names, distance, mark, place = entry.names, entry.value, entry.mark, entry.steps
         for name in names:
-            if name not in names_known:
+            if name not in known_names:
                 problems.add_at(mark, place, f'unknown ball "{name}"; {hint(name, layout.names)}')
         pair = frozenset(names)
         if len(pair) == 1:

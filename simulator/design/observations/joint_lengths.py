@@ -312,12 +312,10 @@ def joint_whitening(
     )
     by_error = -np.concatenate(errors)
     by_known = by_error @ directions
-    decomposition, values, _ = np.linalg.svd(
-        by_error - by_known @ directions.T, full_matrices=False
-    )
+    left_vectors, values, _ = np.linalg.svd(by_error - by_known @ directions.T, full_matrices=False)
     gain = 1.0 - 1.0 / np.sqrt(1.0 + values**2)
     return JointWhitening(
-        tuple(together), tuple(consistencies), known_directions, by_known, decomposition, gain
+        tuple(together), tuple(consistencies), known_directions, by_known, left_vectors, gain
     )
 
 
@@ -390,8 +388,8 @@ def _independent(equations: Array, told_once: bool) -> tuple[Array, Array]:
         return np.zeros((0, 0)), np.zeros((equations.shape[1], 0))
     if told_once:
         return np.eye(len(equations)), equations.T
-    decomposition, values, right = np.linalg.svd(equations, full_matrices=False)
+    left_vectors, values, right = np.linalg.svd(equations, full_matrices=False)
     is_independent = values > TOLD_TWICE * values[0]
-    return np.asarray(
-        decomposition[:, is_independent].T / values[is_independent, None]
-    ), np.asarray(right[is_independent].T)
+    return np.asarray(left_vectors[:, is_independent].T / values[is_independent, None]), np.asarray(
+        right[is_independent].T
+    )

@@ -309,11 +309,11 @@ def _stated(
     settings: PythonValuesSettings, functions: BallFunctions, steps: Steps, references: References
 ) -> Array | None:
     """Standard uncertainties (m,) of the item, NaN where one is wrong, None without any."""
-    texts_stated, count = settings.standard_uncertainty, len(functions.names)
-    if texts_stated is None:
+    uncertainty, count = settings.standard_uncertainty, len(functions.names)
+    if uncertainty is None:
         return None
     place = (*steps, "standard_uncertainty")
-    texts = (texts_stated,) * count if isinstance(texts_stated, str) else texts_stated
+    texts = (uncertainty,) * count if isinstance(uncertainty, str) else uncertainty
     text = f"has {len(texts)} entries; the functions have {count} values"
     if not references.require(len(texts) == count, place, text):
         return np.full(count, np.nan)

@@ -92,8 +92,8 @@ def _moves(star: Star) -> Array:
 
 def _free(star: Star) -> Array:
     """Orthonormal directions (l d, k) in which its tips move as one body."""
-    decomposition, sizes, _ = np.linalg.svd(_moves(star), full_matrices=False)
-    return np.asarray(decomposition[:, sizes > IN_LINE * sizes.max(initial=0.0)])
+    left_vectors, sizes, _ = np.linalg.svd(_moves(star), full_matrices=False)
+    return np.asarray(left_vectors[:, sizes > IN_LINE * sizes.max(initial=0.0)])
 
 
 def _in_line(star: Star) -> bool:

@@ -116,7 +116,7 @@ def uncertainties_of(
     """Uncertainties of values with `names`: those `stated` (m,) with the item, or those `found`
     (m,) in its file, and those of a covariance; None after reporting faults.
     """
-    problems, own_uncertainty = references.problems, (*steps, "standard_uncertainty")
+    problems, path = references.problems, (*steps, "standard_uncertainty")
     in_file = not np.isnan(uncertainties_read).any()
     matrix = covariance
     if settings.covariance is not None:
@@ -134,9 +134,7 @@ def uncertainties_of(
     states = in_file or (matrix is not None and not is_correlation)
     if stated_uncertainty is not None and states:
         where = settings.values if in_file or not settings.covariance else settings.covariance
-        problems.add(
-            own_uncertainty, f"{where} states uncertainties; remove one of the two", of_key=True
-        )
+        problems.add(path, f"{where} states uncertainties; remove one of the two", of_key=True)
         return None
     of_values = np.diag(matrix[0]) if states and matrix is not None else uncertainties_read
     without = np.flatnonzero(np.isnan(of_values))
@@ -147,7 +145,7 @@ def uncertainties_of(
         return None
     if stated_uncertainty is None and not states:
         text = 'missing; add "standard_uncertainty", or values with their uncertainties'
-        problems.add(own_uncertainty, text)
+        problems.add(path, text)
         return None
     if matrix is None:
         return Uncertainties(

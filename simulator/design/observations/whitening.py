@@ -153,11 +153,11 @@ def covariance_root(covariance: Array, rounding: Array | float = 0.0) -> Covaria
     if inner.any():
         scale = np.outer(variances[inner], variances[inner])
         correlation = covariance[np.ix_(inner, inner)] / scale
-        values, decomposition = np.linalg.eigh((correlation + correlation.T) / 2.0)
+        values, eigenvectors = np.linalg.eigh((correlation + correlation.T) / 2.0)
         share = np.broadcast_to(rounding, covariance.shape)[np.ix_(inner, inner)] / scale
         floor = max(SINGULAR, float(np.sqrt((share**2).sum())))
         if values[0] < -floor * len(values):
             raise IndefiniteError(float(values[0] / values[-1]))
-        vectors[np.ix_(inner, inner)] = decomposition
+        vectors[np.ix_(inner, inner)] = eigenvectors
         deviations[inner] = np.sqrt(np.maximum(values, floor))
     return CovarianceRoot(variances, vectors, deviations)

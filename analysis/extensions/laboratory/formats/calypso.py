@@ -106,11 +106,11 @@ def _table(text: Text) -> _Table | None:
     for number, line in enumerate(text.lines[:MOST_BEFORE], start=1):
         for separator in ("\t", ";", r"\s{2,}", r"\s+"):
             cells = _cells(line, separator)
-            for known, needed in (
+            for columns_known, needed in (
                 (OF_CHARACTERISTICS, {"id", "actual"}),
                 (OF_FEATURES, {"id", "X", "Y", "Z"}),
             ):
-                columns = headings([STATED.sub("", cell) for cell in cells], known)
+                columns = headings([STATED.sub("", cell) for cell in cells], columns_known)
                 if needed <= columns.keys():
                     return _Table(text, separator, columns, number, "X" in needed)
     return None
@@ -179,14 +179,14 @@ class _Reader:
             mark = text.mark(number)
             is_cut = text.is_cut and number == len(text.lines)
             if len(cells) <= needed or (is_cut and len(cells) - 1 in table.columns.values()):
-                told = f"{len(cells)} cells below {width} headings; was the line cut off?"
-                self.problems.add(mark, told)
+                problem = f"{len(cells)} cells below {width} headings; was the line cut off?"
+                self.problems.add(mark, problem)
                 continue
-            found = {name: cells[i] for name, i in table.columns.items() if i < len(cells)}
-            if len(found["id"]) > LONGEST:
-                self.problems.add(mark, f"a name of {len(found['id'])} characters")
+            values = {name: cells[i] for name, i in table.columns.items() if i < len(cells)}
+            if len(values["id"]) > LONGEST:
+                self.problems.add(mark, f"a name of {len(values['id'])} characters")
                 continue
-            yield mark, found
+            yield mark, values
 
     def take(self, mark: Mark, row: dict[str, str]) -> None:
         """Read one row."""
@@ -198,12 +198,12 @@ class _Reader:
             self.others["other characteristic"] += 1
             return
         if not is_number(row["actual"]):
-            told = f'"{shorten(row["actual"])}" is no number'
-            self.problems.add(mark, f"{told}; leave the row out, or measure again")
+            problem = f'"{shorten(row["actual"])}" is no number'
+            self.problems.add(mark, f"{problem}; leave the row out, or measure again")
             return
         if not _agrees(row):
-            told = f"{axis}: the deviation is not actual minus nominal; is the line damaged?"
-            self.problems.add(mark, told)
+            problem = f"{axis}: the deviation is not actual minus nominal; is the line damaged?"
+            self.problems.add(mark, problem)
             return
         self._locate(axis, name, self._length(mark, row, row["actual"]), mark)
 
@@ -215,31 +215,31 @@ class _Reader:
             if word in KINDS
         ]
         kind = kinds[0] if kinds else UNSTATED
-        one = _Located(mark, row["id"], kind, row.get("stylus", ""), row.get("alignment", ""))
+        located = _Located(mark, row["id"], kind, row.get("stylus", ""), row.get("alignment", ""))
         for axis in AXES:
             if is_number(row[axis]):
-                one.axes[axis] = self._length(mark, row, row[axis])
-        self.complete.append(one)
+                located.axes[axis] = self._length(mark, row, row[axis])
+        self.complete.append(located)
 
     def _length(self, mark: Mark, row: dict[str, str], text: str) -> float:
         name = row.get("unit", "").lower()
         unit = UNITS.get(name, None if name else self.unit)
         if unit is None:
-            told = "no column of units; state the unit with --unit mm or --unit in"
-            told = f'unknown unit "{shorten(name)}"' if name else told
-            self.problems.add(mark, told)
+            problem = "no column of units; state the unit with --unit mm or --unit in"
+            problem = f'unknown unit "{shorten(name)}"' if name else problem
+            self.problems.add(mark, problem)
             self.unit = LENGTH_UNITS["mm"]
             return math.nan
         return self.problems.length(with_point(text), unit, mark)
 
     def _locate(self, axis: str, name: str, value: float, mark: Mark) -> None:
         """Add a co-ordinate to its feature; one that it has already begins another reading."""
-        one = self.located.get(name)
-        if one is None or axis in one.axes:
-            one = _Located(mark, name)
-            self.located[name] = one
-            self.complete.append(one)
-        one.axes[axis] = value
+        located = self.located.get(name)
+        if located is None or axis in located.axes:
+            located = _Located(mark, name)
+            self.located[name] = located
+            self.complete.append(located)
+        located.axes[axis] = value
 
 
 def _has_number(cells: list[str]) -> bool:
@@ -251,8 +251,8 @@ def _axis_and_name(row: dict[str, str]) -> tuple[str, str]:
 
     Its type or symbol tells the axis, and a column the feature; else both are in its name.
     """
-    told = (AXIS.fullmatch(row.get(column, "")) for column in ("type", "symbol"))
-    axis = next((found[1].upper() for found in told if found is not None), "")
+    types = (AXIS.fullmatch(row.get(column, "")) for column in ("type", "symbol"))
+    axis = next((axis_match[1].upper() for axis_match in types if axis_match is not None), "")
     feature = row.get("feature", "")
     if axis and feature:
         return axis, feature
@@ -283,16 +283,16 @@ def read(content: bytes, file: str, unit: Fraction | None) -> Report:
     text, problems = read_lines(content, file), ReportProblems(file)
     table = _table(text)
     if table is None:
-        told = "no headings such as id, actual, nominal, or id, type, x, y, z"
-        raise text.mark(1).refused(told)
+        problem = "no headings such as id, actual, nominal, or id, type, x, y, z"
+        raise text.mark(1).refused(problem)
     for line in text.lines[: table.start] if unit is None else ():
-        stated = STATED.search(line)
-        unit = UNITS[(stated[1] or stated[2]).lower()] if stated else unit
+        unit_match = STATED.search(line)
+        unit = UNITS[(unit_match[1] or unit_match[2]).lower()] if unit_match else unit
     reader = _Reader(table, problems, unit)
     for mark, row in reader.rows():
         reader.take(mark, row)
     problems.finish()
-    features = tuple(one.feature() for one in reader.complete)
+    features = tuple(located.feature() for located in reader.complete)
     remarks = text.remarks
     if reader.ends_in_text:
         last = shorten(text.lines[-1].strip(), 30)

@@ -22,16 +22,16 @@ def with_point(text: str) -> str:
     return text.replace(",", ".")
 
 
-def headings(cells: Sequence[str], known: Mapping[str, str]) -> dict[str, int]:
+def headings(cells: Sequence[str], names_known: Mapping[str, str]) -> dict[str, int]:
     """Where each column is that is known by its heading; the first, if several are called so.
 
     >>> headings(["Name", "Ist-Wert"], {"istwert": "actual"})
     {'actual': 1}
     """
-    found: dict[str, int] = {}
+    places_of_columns: dict[str, int] = {}
     for i, cell in enumerate(cells):
         plain = re.sub(r"[^a-z+\-]", "", cell.casefold())
-        name = known.get(plain) or known.get(plain.replace("-", ""))
+        name = names_known.get(plain) or names_known.get(plain.replace("-", ""))
         if name:
-            found.setdefault(name, i)
-    return found
+            places_of_columns.setdefault(name, i)
+    return places_of_columns

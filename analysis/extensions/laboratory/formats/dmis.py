@@ -87,18 +87,20 @@ def statements(text: Text, problems: ReportProblems) -> Iterator[Statement]:
         joined += stripped.removesuffix("$").rstrip()
         if stripped.endswith("$"):
             continue
-        found = STATEMENT.fullmatch(joined)
-        if found is not None:
-            kind, name, word, rest = ((group or "").strip() for group in found.groups())
+        match = STATEMENT.fullmatch(joined)
+        if match is not None:
+            kind, name, word, groups = ((group or "").strip() for group in match.groups())
             last = text.is_cut and number == len(text.lines)
-            yield Statement(text.mark(start), kind.upper(), name, word.upper(), rest, last)
+            yield Statement(text.mark(start), kind.upper(), name, word.upper(), groups, last)
         elif re.match(r"\s*FA?\s*\(", joined, re.IGNORECASE):
-            told = f'"{shorten(joined)}" is no DMIS statement; check whether the file is complete'
-            problems.add(text.mark(start), told)
+            problem = (
+                f'"{shorten(joined)}" is no DMIS statement; check whether the file is complete'
+            )
+            problems.add(text.mark(start), problem)
         joined = ""
     if joined:
-        told = "the file ends within a statement; it was cut off, take a whole copy"
-        problems.add(text.mark(start), told)
+        problem = "the file ends within a statement; it was cut off, take a whole copy"
+        problems.add(text.mark(start), problem)
 
 
 @dataclass
@@ -123,100 +125,111 @@ class _Reader:
     made_of: dict[str, list[str]] = field(default_factory=dict)
     others: Counter[str] = field(default_factory=Counter)
 
-    def take(self, one: Statement) -> None:
+    def take(self, statement: Statement) -> None:
         """Read one statement."""
-        if one.word == "FEAT" and one.kind in ("F", "FA"):
-            self._feature(one)
-        elif one.word == "FEAT" or one.kind in ("F", "FA"):
-            told = f'"{shorten(f"{one.kind}({one.name})={one.word}", 30)}" is no feature of DMIS'
-            self.problems.add(one.mark, f"{told}; write F(name)=FEAT/… or FA(name)=FEAT/…")
-        elif one.word == "UNITS":
-            self._units(one)
-        elif one.word == "SNSLCT":
-            found = LABEL.search(one.rest)
-            self.probe = found[1].strip() if found else one.parts[0]
-        elif one.word == "WKPLAN" and one.parts[0].upper() in PLANES:
-            self.plane = one.parts[0].upper()
-        elif one.word in SYSTEMS or one.word == "RECALL" and DATUM.match(one.rest):
-            self._system(one)
-        elif one.word == "MEAS":
-            found = LABEL.search(one.rest)
-            self.measuring = found[1].strip() if found else ""
-        elif one.word == "ENDMES":
+        if statement.word == "FEAT" and statement.kind in ("F", "FA"):
+            self._feature(statement)
+        elif statement.word == "FEAT" or statement.kind in ("F", "FA"):
+            words = shorten(f"{statement.kind}({statement.name})={statement.word}", 30)
+            text = f'"{words}" is no feature of DMIS'
+            self.problems.add(statement.mark, f"{text}; write F(name)=FEAT/… or FA(name)=FEAT/…")
+        elif statement.word == "UNITS":
+            self._units(statement)
+        elif statement.word == "SNSLCT":
+            label = LABEL.search(statement.rest)
+            self.probe = label[1].strip() if label else statement.parts[0]
+        elif statement.word == "WKPLAN" and statement.parts[0].upper() in PLANES:
+            self.plane = statement.parts[0].upper()
+        elif (
+            statement.word in SYSTEMS or statement.word == "RECALL" and DATUM.match(statement.rest)
+        ):
+            self._system(statement)
+        elif statement.word == "MEAS":
+            label = LABEL.search(statement.rest)
+            self.measuring = label[1].strip() if label else ""
+        elif statement.word == "ENDMES":
             self.measuring = ""
-        elif one.word in ("PTMEAS", "PTDATA") and self.measuring:
-            self.probed.setdefault(self.measuring, []).append(self._place(one, one.parts))
-        elif one.word == "CONST" and one.parts[0].upper() == "SPHERE":
-            names = [name.strip() for name in LABEL.findall(one.rest)]
+        elif statement.word in ("PTMEAS", "PTDATA") and self.measuring:
+            self.probed.setdefault(self.measuring, []).append(
+                self._place(statement, statement.parts)
+            )
+        elif statement.word == "CONST" and statement.parts[0].upper() == "SPHERE":
+            names = [name.strip() for name in LABEL.findall(statement.rest)]
             self.made_of[names[0] if names else ""] = names[1:]
-        elif one.word == "TOL" and one.kind == "TA":
+        elif statement.word == "TOL" and statement.kind == "TA":
             self.others["tolerance"] += 1
-        self.is_program |= one.word in OF_PROGRAMS
-        self.is_ended |= one.word == "ENDFIL"
+        self.is_program |= statement.word in OF_PROGRAMS
+        self.is_ended |= statement.word == "ENDFIL"
 
-    def _units(self, one: Statement) -> None:
-        name = one.parts[0].upper()
+    def _units(self, statement: Statement) -> None:
+        name = statement.parts[0].upper()
         if name not in UNITS:
-            told = f'unknown unit "{shorten(name)}"; DMIS has {", ".join(UNITS)}'
-            self.problems.add(one.mark, told)
+            problem = f'unknown unit "{shorten(name)}"; DMIS has {", ".join(UNITS)}'
+            self.problems.add(statement.mark, problem)
         self.unit = UNITS.get(name, Fraction(1, 1000))
-        self.angle = next((p.upper() for p in one.parts[1:] if p.upper() in ANGLES), self.angle)
+        self.angle = next(
+            (p.upper() for p in statement.parts[1:] if p.upper() in ANGLES), self.angle
+        )
 
-    def _system(self, one: Statement) -> None:
-        found = LABEL.search(one.rest)
-        name = one.name or (found[1].strip() if found and one.word == "RECALL" else "")
-        if one.word == "DATSET" and one.parts[0].upper() == "MCS":
+    def _system(self, statement: Statement) -> None:
+        label = LABEL.search(statement.rest)
+        name = statement.name or (label[1].strip() if label and statement.word == "RECALL" else "")
+        if statement.word == "DATSET" and statement.parts[0].upper() == "MCS":
             self.machine_systems.add(name)
             self.system, self.of = "machine", ""
-        elif one.word == "RECALL" and name in self.machine_systems:
+        elif statement.word == "RECALL" and name in self.machine_systems:
             self.system, self.of = "machine", ""
         else:
             self.system, self.of = "part", name
 
-    def _feature(self, one: Statement) -> None:
-        parts = one.parts
+    def _feature(self, statement: Statement) -> None:
+        parts = statement.parts
         kind = KINDS.get(parts[0].upper(), parts[0].lower())
-        here = Feature(one.mark, one.name, kind, probe=self.probe, system=self.system, of=self.of)
+        here = Feature(
+            statement.mark, statement.name, kind, probe=self.probe, system=self.system, of=self.of
+        )
         if kind in LOCATED:
             if parts[1:2] and parts[1].upper() in ("INNER", "OUTER"):
                 parts = parts[1:]
-            place = self._place(one, parts[1:], 4 if kind == SPHERE else 3)
+            place = self._place(statement, parts[1:], 4 if kind == SPHERE else 3)
             here = replace(here, centre=place)
-        if one.kind == "FA":
-            self.actual.setdefault(one.name, []).append(here)
-            self.measuring = one.name if kind == SPHERE else ""
+        if statement.kind == "FA":
+            self.actual.setdefault(statement.name, []).append(here)
+            self.measuring = statement.name if kind == SPHERE else ""
         else:
-            self.nominal[one.name] = here
+            self.nominal[statement.name] = here
 
-    def _place(self, one: Statement, parts: list[str], least: int = 3) -> Place:
+    def _place(self, statement: Statement, parts: list[str], least: int = 3) -> Place:
         """The co-ordinates of a statement in metres, NaN after a message."""
         nowhere = math.nan, math.nan, math.nan
         form, *numbers = parts or [""]
         if self.unit is None:
-            told = "no UNITS/ before the first feature; state the unit with --unit mm or --unit in"
-            self.problems.add(one.mark, told)
+            problem = (
+                "no UNITS/ before the first feature; state the unit with --unit mm or --unit in"
+            )
+            self.problems.add(statement.mark, problem)
             self.unit = Fraction(1, 1000)
         if form.upper() not in ("CART", "POL"):
-            told = f'"{shorten(form)}" where CART or POL is expected'
-            self.problems.add(one.mark, told)
+            problem = f'"{shorten(form)}" where CART or POL is expected'
+            self.problems.add(statement.mark, problem)
             return nowhere
-        if len(numbers) < least or one.is_cut:
-            told = f"{len(numbers)} numbers instead of {least}; was the file cut off?"
+        if len(numbers) < least or statement.is_cut:
+            problem = f"{len(numbers)} numbers instead of {least}; was the file cut off?"
             if len(numbers) >= least:
-                told = "the file ends within this line; end it, or take a whole copy"
-            self.problems.add(one.mark, told)
+                problem = "the file ends within this line; end it, or take a whole copy"
+            self.problems.add(statement.mark, problem)
             return nowhere
         if _has_decimal_commas(numbers) or (least == 4 and not _is_sphere(numbers)):
-            told = f"{len(numbers)} numbers where DMIS has {least}; are commas meant as decimal"
-            self.problems.add(one.mark, f"{told} points? DMIS has points: export it so")
+            problem = f"{len(numbers)} numbers where DMIS has {least}; are commas meant as decimal"
+            self.problems.add(statement.mark, f"{problem} points? DMIS has points: export it so")
             return nowhere
         for text in numbers[3:least]:
-            self.problems.length(text, self.unit, one.mark)
+            self.problems.length(text, self.unit, statement.mark)
         if form.upper() == "CART":
-            return self.problems.place(numbers[:3], self.unit, one.mark)
-        radius = self.problems.length(numbers[0], self.unit, one.mark)
-        height = self.problems.length(numbers[2], self.unit, one.mark)
-        angle = self._angle(numbers[1], one.mark)
+            return self.problems.place(numbers[:3], self.unit, statement.mark)
+        radius = self.problems.length(numbers[0], self.unit, statement.mark)
+        height = self.problems.length(numbers[2], self.unit, statement.mark)
+        angle = self._angle(numbers[1], statement.mark)
         place = [0.0, 0.0, 0.0]
         values = radius * math.cos(angle), radius * math.sin(angle), height
         for axis, value in zip(PLANES[self.plane], values, strict=True):
@@ -242,7 +255,7 @@ def _has_decimal_commas(numbers: list[str]) -> bool:
     >>> _has_decimal_commas(["0.00121", "00749.998", "0"])
     False
     """
-    return any(re.fullmatch(r"[+-]?0[0-9]+", one) for one in numbers)
+    return any(re.fullmatch(r"[+-]?0[0-9]+", number) for number in numbers)
 
 
 def _is_sphere(numbers: list[str]) -> bool:
@@ -264,11 +277,11 @@ def _of_points(reader: _Reader) -> Iterator[Feature]:
         lacks = "nominal only, not measured"
         if points and reader.is_program:
             points, lacks = [], "PTMEAS of a program are where to probe, not what was measured"
-        for other in reader.made_of.get(name, ()):
-            points += [one.centre for one in reader.actual.get(other, ()) if one.centre]
-        found = np.array(points) if points else None
+        for part in reader.made_of.get(name, ()):
+            points += [point.centre for point in reader.actual.get(part, ()) if point.centre]
+        points_array = np.array(points) if points else None
         lacks = "" if points else lacks
-        yield replace(nominal, centre=None, points=found, lacks=lacks)
+        yield replace(nominal, centre=None, points=points_array, lacks=lacks)
 
 
 def read(content: bytes, file: str, unit: Fraction | None) -> Report:
@@ -278,12 +291,12 @@ def read(content: bytes, file: str, unit: Fraction | None) -> Report:
     """
     text = read_lines(content, file)
     reader = _Reader(ReportProblems(file), unit)
-    for one in statements(text, reader.problems):
-        reader.take(one)
+    for statement in statements(text, reader.problems):
+        reader.take(statement)
     reader.problems.finish()
-    features = [one for several in reader.actual.values() for one in several]
+    features = [statement for several in reader.actual.values() for statement in several]
     features += _of_points(reader)
-    features.sort(key=lambda one: one.mark.line)
+    features.sort(key=lambda statement: statement.mark.line)
     remarks = text.remarks
     if not reader.is_ended:
         remarks += (f"{file}: no ENDFIL at its end; the file may have been cut off",)

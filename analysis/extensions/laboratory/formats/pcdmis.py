@@ -104,17 +104,17 @@ class _Reader:
         if len(line) > LONGEST:
             self.problems.add(mark, f"{len(line)} characters are too long for a line of a report")
             return
-        found = DIMENSION.fullmatch(line)
-        if found is not None:
-            unit = UNIT.search(found[2])
+        match = DIMENSION.fullmatch(line)
+        if match is not None:
+            unit = UNIT.search(match[2])
             self._end()
-            self._start(found[1], found[2], unit[1] if unit else None, mark)
+            self._start(match[1], match[2], unit[1] if unit else None, mark)
             return
         headed = HEADED.fullmatch(line)
         if headed is not None:
             self._end()
-            own = UNITS[headed[1].upper()]
-            self.dimension = _Dimension(mark, headed[3], headed[2], UNSTATED, own)
+            unit_of_heading = UNITS[headed[1].upper()]
+            self.dimension = _Dimension(mark, headed[3], headed[2], UNSTATED, unit_of_heading)
             return
         probe = PROBE.fullmatch(line)
         if probe is not None:
@@ -144,8 +144,8 @@ class _Reader:
         if ended is None or ended.has_row:
             return
         if ended.kind != UNSTATED:
-            one = _Located(ended.mark, ended.name, ended.title, ended.kind, self.probe)
-            self.complete.append(one)
+            located = _Located(ended.mark, ended.name, ended.title, ended.kind, self.probe)
+            self.complete.append(located)
         elif ended.columns:
             self.others[f"dimension (no row {' or '.join(AXES)})"] += 1
 
@@ -157,14 +157,14 @@ class _Reader:
         """
         last = self.text.lines[-1]
         if self.dimension is not None and not self.dimension.has_row:
-            told = (
+            problem = (
                 f'the file ends before the first row of "{shorten(self.dimension.title, 30)}"; it'
                 " was cut off, take a whole copy"
             )
-            self.problems.add(self.dimension.mark, told)
+            self.problems.add(self.dimension.mark, problem)
         elif self.text.is_cut and last.split()[0].upper() in ("DIM", "DIMENSION"):
-            told = "the file ends within this line; it was cut off, take a whole copy"
-            self.problems.add(self.text.mark(len(self.text.lines)), told)
+            problem = "the file ends within this line; it was cut off, take a whole copy"
+            self.problems.add(self.text.mark(len(self.text.lines)), problem)
         self.problems.finish()
         return self.text.remarks + self._about_the_end(last)
 
@@ -187,33 +187,37 @@ class _Reader:
             return
         if unit is not None and unit.upper() not in UNITS:
             self.problems.add(mark, f'unknown unit "{shorten(unit)}"; PC-DMIS has MM and IN')
-        own = UNITS.get(unit.upper(), self.unit) if unit is not None else self.unit
-        self.dimension = _Dimension(mark, located[2].rstrip(","), title, located[1].lower(), own)
+        unit_of_dimension = UNITS.get(unit.upper(), self.unit) if unit is not None else self.unit
+        self.dimension = _Dimension(
+            mark, located[2].rstrip(","), title, located[1].lower(), unit_of_dimension
+        )
 
     def _row(self, axis: str, line: str, mark: Mark, is_last: bool) -> None:
         assert self.dimension is not None
         names = [name for name, _ in self.dimension.columns]
         measured = next((name for name in MEASURED if name in names), None)
         if measured is None:
-            told = "no column MEAS; report measured values, and head the columns AX NOMINAL MEAS …"
-            self.problems.add(mark, told)
+            problem = (
+                "no column MEAS; report measured values, and head the columns AX NOMINAL MEAS …"
+            )
+            self.problems.add(mark, problem)
             return
         row = _by_column(line, self.dimension.columns)
         if row is None or measured not in row:
-            told = f"its numbers are not below the {len(names)} headings; was the line cut off?"
-            self.problems.add(mark, told)
+            problem = f"its numbers are not below the {len(names)} headings; was the line cut off?"
+            self.problems.add(mark, problem)
             return
         if is_last and self.text.is_cut and line.rstrip().endswith(row[measured]):
-            told = "the file ends within this line; end it, or take a whole copy"
-            self.problems.add(mark, told)
+            problem = "the file ends within this line; end it, or take a whole copy"
+            self.problems.add(mark, problem)
             return
         if self.dimension.unit is None:
-            told = "no UNITS= of this dimension; state the unit with --unit mm or --unit in"
-            self.problems.add(mark, told)
+            problem = "no UNITS= of this dimension; state the unit with --unit mm or --unit in"
+            self.problems.add(mark, problem)
             self.dimension.unit = LENGTH_UNITS["mm"]
         if not _agrees(row):
-            told = f"{axis}: the deviation is not measured minus nominal; is the line damaged?"
-            self.problems.add(mark, told)
+            problem = f"{axis}: the deviation is not measured minus nominal; is the line damaged?"
+            self.problems.add(mark, problem)
             return
         value = self.problems.length(with_point(row[measured]), self.dimension.unit, mark)
         self._locate(axis, value, mark)
@@ -222,12 +226,12 @@ class _Reader:
         """Add a co-ordinate to its feature; one that it has already begins another reading."""
         assert self.dimension is not None
         name, title = self.dimension.name, self.dimension.title
-        one = self.located.get(name)
-        if one is None or axis in one.axes:
-            one = _Located(mark, name, title, self.dimension.kind, self.probe)
-            self.located[name] = one
-            self.complete.append(one)
-        one.axes[axis] = value
+        located = self.located.get(name)
+        if located is None or axis in located.axes:
+            located = _Located(mark, name, title, self.dimension.kind, self.probe)
+            self.located[name] = located
+            self.complete.append(located)
+        located.axes[axis] = value
 
 
 def _by_column(line: str, columns: list[tuple[str, int]]) -> dict[str, str] | None:
@@ -235,9 +239,9 @@ def _by_column(line: str, columns: list[tuple[str, int]]) -> dict[str, str] | No
 
     Where some are blank, the others end where their headings do.
     """
-    found = list(re.finditer(r"\S+", line))[1:]
+    matches = list(re.finditer(r"\S+", line))[1:]
     # Behind the numbers may stand a bar of characters.
-    numbers = list(takewhile(lambda word: is_number(word[0]), found))
+    numbers = list(takewhile(lambda word: is_number(word[0]), matches))
     if len(numbers) == len(columns):
         return {name: word[0] for (name, _), word in zip(columns, numbers, strict=True)}
     ends = {end: name for name, end in columns}
@@ -273,7 +277,7 @@ def read(content: bytes, file: str, unit: Fraction | None) -> Report:
     for number, line in enumerate(text.lines, start=1):
         reader.take(number, line)
     remarks = reader.finish()
-    features = tuple(one.feature() for one in reader.complete)
+    features = tuple(located.feature() for located in reader.complete)
     return Report(file, PCDMIS.title, features, reader.others, remarks)
 
 

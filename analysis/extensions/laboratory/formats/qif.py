@@ -38,41 +38,41 @@ class _Document:
     by_id: dict[str, Element]
     units: dict[str, Fraction]
 
-    def named(self, one: Element | None) -> Element | None:
+    def named(self, element: Element | None) -> Element | None:
         """What an element refers to by an id, or None."""
-        return None if one is None else self.by_id.get(one.text)
+        return None if element is None else self.by_id.get(element.text)
 
-    def unit(self, one: Element) -> Fraction:
+    def unit(self, element: Element) -> Fraction:
         """Metres per unit of an element's co-ordinates."""
-        name = one.attributes.get("linearUnit", "")
+        name = element.attributes.get("linearUnit", "")
         if name not in self.units:
-            told = f'unknown unit "{shorten(name)}"; the file\'s units should define it'
+            problem = f'unknown unit "{shorten(name)}"; the file\'s units should define it'
             if not name:
-                told = "the file states no unit of length; state it with --unit mm or --unit in"
-            self.problems.add(one.mark, told)
+                problem = "the file states no unit of length; state it with --unit mm or --unit in"
+            self.problems.add(element.mark, problem)
             self.units[name] = Fraction(1, 1000)
         return self.units[name]
 
-    def numbers(self, one: Element) -> list[float]:
+    def numbers(self, element: Element) -> list[float]:
         """Co-ordinates of an element in metres, NaN after a message."""
-        factor = self.unit(one)
-        return [self.problems.length(text, factor, one.mark) for text in one.text.split()]
+        factor = self.unit(element)
+        return [self.problems.length(text, factor, element.mark) for text in element.text.split()]
 
 
 def _units(root: Element, problems: ReportProblems, unit: Fraction | None) -> dict[str, Fraction]:
     """Metres per unit of length, by the unit's name; those of the file under no name."""
     units = {} if unit is None else {"": unit}
     for where in ("PrimaryUnits", "OtherUnits"):
-        for one in root.all("FileUnits", where, "LinearUnit"):
-            factor = one.first("UnitConversion", "Factor")
+        for unit_element in root.all("FileUnits", where, "LinearUnit"):
+            factor = unit_element.first("UnitConversion", "Factor")
             try:
                 value = Fraction(1) if factor is None else exact_number(factor.text)
             except QuantityError as error:
-                problems.add(factor.mark if factor else one.mark, str(error))
+                problems.add(factor.mark if factor else unit_element.mark, str(error))
                 value = Fraction(1)
             if value <= 0:
-                problems.add(one.mark, "the unit's factor is not above zero")
-            units[one.text_at("UnitName")] = value
+                problems.add(unit_element.mark, "the unit's factor is not above zero")
+            units[unit_element.text_at("UnitName")] = value
             if where == "PrimaryUnits":
                 units.setdefault("", value)
     return units
@@ -81,77 +81,83 @@ def _units(root: Element, problems: ReportProblems, unit: Fraction | None) -> di
 def _features(document: _Document, results: Element) -> Iterator[Feature]:
     for measured in results.all("MeasuredFeatures"):
         lists = [measured, *measured.all("FeatureActuals"), *measured.all("FeatureMeasurements")]
-        for one in (child for of in lists for child in of.children):
-            ending = next((end for end in MEASURED if one.name.endswith(end)), None)
+        for child_element in (child for feature_list in lists for child in feature_list.children):
+            ending = next((end for end in MEASURED if child_element.name.endswith(end)), None)
             if ending is not None:
-                kind = re.sub(r"(?<=[a-z])(?=[A-Z])", " ", one.name.removesuffix(ending)).lower()
-                yield _feature(document, one, kind)
+                kind = re.sub(
+                    r"(?<=[a-z])(?=[A-Z])", " ", child_element.name.removesuffix(ending)
+                ).lower()
+                yield _feature(document, child_element, kind)
 
 
-def _feature(document: _Document, one: Element, kind: str) -> Feature:
-    item = document.named(one.first("FeatureItemId"))
-    name = one.text_at("FeatureName") or (item.text_at("FeatureName") if item else "")
-    location, points, lacks = one.first("Location"), None, ""
+def _feature(document: _Document, element: Element, kind: str) -> Feature:
+    item = document.named(element.first("FeatureItemId"))
+    name = element.text_at("FeatureName") or (item.text_at("FeatureName") if item else "")
+    location, points, lacks = element.first("Location"), None, ""
     centre = None
     if kind in LOCATED and location is not None:
         numbers = document.numbers(location)
         if len(numbers) != 3:
-            told = f"{len(numbers)} co-ordinates instead of 3"
-            document.problems.add(location.mark, told)
+            problem = f"{len(numbers)} co-ordinates instead of 3"
+            document.problems.add(location.mark, problem)
         else:
             centre = numbers[0], numbers[1], numbers[2]
     elif kind == SPHERE:
-        points = _points(document, one)
+        points = _points(document, element)
         lacks = "neither a location nor points" if points is None else ""
-    device = document.named(one.first("MeasurementDeviceIds", "Id"))
+    device = document.named(element.first("MeasurementDeviceIds", "Id"))
     probe = device.text_at("Name") if device else ""
-    transform = document.named(one.first("ActualTransformId"))
+    transform = document.named(element.first("ActualTransformId"))
     frame = document.named(item.first("CoordinateSystemId")) if item else None
     system: System = "unstated" if transform is None and frame is None else "part"
-    of = transform.text_at("Name") if transform else frame.text_at("Name") if frame else ""
+    system_name = transform.text_at("Name") if transform else frame.text_at("Name") if frame else ""
     if not name:
         lacks, centre, points = "no name", None, None
-    return Feature(one.mark, name or one.name, kind, centre, points, probe, system, of, lacks)
+    return Feature(
+        element.mark, name or element.name, kind, centre, points, probe, system, system_name, lacks
+    )
 
 
-def _points(document: _Document, one: Element) -> Array | None:
+def _points(document: _Document, element: Element) -> Array | None:
     """Points (n, 3) of a sphere in metres, None where there are none that can be read."""
-    found: list[Array] = []
-    for listed in one.all("PointList"):
+    point_arrays: list[Array] = []
+    for listed in element.all("PointList"):
         for child in listed.children:
             if child.name == "MeasurePoint":
-                found += [_triples(document, point) for point in child.all("Point")]
+                point_arrays += [_triples(document, point) for point in child.all("Point")]
             elif child.name.endswith("PointSetId"):
-                found.append(_of_set(document, child))
-    return np.concatenate(found) if sum(map(len, found)) else None
+                point_arrays.append(_of_set(document, child))
+    return np.concatenate(point_arrays) if sum(map(len, point_arrays)) else None
 
 
-def _triples(document: _Document, one: Element) -> Array:
-    numbers = document.numbers(one)
+def _triples(document: _Document, element: Element) -> Array:
+    numbers = document.numbers(element)
     if len(numbers) % 3:
-        told = f"{len(numbers)} co-ordinates, which is no multiple of 3"
-        document.problems.add(one.mark, told)
+        problem = f"{len(numbers)} co-ordinates, which is no multiple of 3"
+        document.problems.add(element.mark, problem)
         numbers = []
     return np.array(numbers).reshape(-1, 3)
 
 
-def _of_set(document: _Document, one: Element) -> Array:
+def _of_set(document: _Document, element: Element) -> Array:
     """The points of a set that a reference names: all, those from one to another, or a single
     one, counted from 1.
     """
-    points = document.named(one)
+    points = document.named(element)
     listed = None if points is None else points.first("Points")
     if listed is None:
-        document.problems.add(one.mark, f'no points with the id "{shorten(one.text)}" in clear')
+        document.problems.add(
+            element.mark, f'no points with the id "{shorten(element.text)}" in clear'
+        )
         return np.empty((0, 3))
     every = _triples(document, listed)
-    bounds = one.attributes.get("range", one.attributes.get("index", "")).split()
+    bounds = element.attributes.get("range", element.attributes.get("index", "")).split()
     if not bounds:
         return every
     numbers = [int(text) for text in bounds if re.fullmatch("[0-9]{1,9}", text)]
     if len(numbers) != len(bounds) or not 1 <= numbers[0] <= numbers[-1] <= len(every):
-        told = f'"{shorten(" ".join(bounds))}" are not among the {len(every)} points of the set'
-        document.problems.add(one.mark, told)
+        problem = f'"{shorten(" ".join(bounds))}" are not among the {len(every)} points of the set'
+        document.problems.add(element.mark, problem)
         return np.empty((0, 3))
     return every[numbers[0] - 1 : numbers[-1]]
 
@@ -163,24 +169,29 @@ def read(content: bytes, file: str, unit: Fraction | None) -> Report:
     """
     root = parse_xml(content, file)
     if root.name != "QIFDocument" or not NAMESPACE.fullmatch(root.namespace):
-        told = f"<{shorten(root.name)}> is no document of QIF 2 or 3"
-        raise refused(file, told, line=root.mark.line, column=root.mark.column)
+        problem = f"<{shorten(root.name)}> is no document of QIF 2 or 3"
+        raise refused(file, problem, line=root.mark.line, column=root.mark.column)
     problems = ReportProblems(file)
-    by_id = {one.attributes["id"]: one for one in root.walk() if "id" in one.attributes}
+    by_id = {result.attributes["id"]: result for result in root.walk() if "id" in result.attributes}
     document = _Document(root, problems, by_id, _units(root, problems, unit))
     sets = [*root.all("Results"), *root.all("MeasurementsResults")]
-    results = [one for of in sets for one in of.walk() if one.name == "MeasurementResults"]
-    features = tuple(feature for one in results for feature in _features(document, one))
+    results = [
+        result
+        for set_element in sets
+        for result in set_element.walk()
+        if result.name == "MeasurementResults"
+    ]
+    features = tuple(feature for result in results for feature in _features(document, result))
     if not results:
         problems.add(root.mark, "no measurement results; is it a plan, or a model?")
     problems.finish()
-    others = Counter(
+    other_characteristics = Counter(
         "characteristic"
-        for one in results
-        for below in one.walk()
+        for result in results
+        for below in result.walk()
         if re.search("Characteristic(?:Measurement|Actual)$", below.name)
     )
-    return Report(file, QIF.title, features, others)
+    return Report(file, QIF.title, features, other_characteristics)
 
 
 QIF = Format("qif", "QIF results", lambda text: BEGINNING.search(text) is not None, read)

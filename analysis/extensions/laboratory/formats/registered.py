@@ -34,7 +34,9 @@ BEGINNING = 100_000
 def recognised(text: str) -> Format | None:
     """The format that a text is in by its beginning; None where it is in none of them."""
     beginning = "\n".join(text[:BEGINNING].splitlines())
-    return next((one for one in FORMATS if one.recognises(beginning)), None)
+    return next(
+        (report_format for report_format in FORMATS if report_format.recognises(beginning)), None
+    )
 
 
 def is_table(text: str) -> bool:
@@ -64,17 +66,17 @@ def read_report(
     """
     content, file = read_bytes(path), str(path)
     if name is not None:
-        chosen = {one.name: one for one in FORMATS}
+        chosen = {known_format.name: known_format for known_format in FORMATS}
         if name not in chosen:
             raise refused(file, f'no format "{name}"; {hint(name, chosen)}')
         return chosen[name].read(content, file, unit)
     text = text_and_encoding(content, file)[0]
-    found = recognised(text)
-    if found is not None:
-        return found.read(content, file, unit)
+    report_format = recognised(text)
+    if report_format is not None:
+        return report_format.read(content, file, unit)
     if is_table(text):
         raise refused(file, "this is a table, which needs no import; ballplate fit reads it")
-    titles = listing(one.title for one in FORMATS)
-    names = ", ".join(one.name for one in FORMATS)
+    titles = listing(known_format.title for known_format in FORMATS)
+    names = ", ".join(known_format.name for known_format in FORMATS)
     text = f"not recognised as {titles}; state its format with --from ({names})"
     raise refused(file, text)
