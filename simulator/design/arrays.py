@@ -38,12 +38,12 @@ Kind = TypeVar("Kind", bound="Observations")
 
 @dataclass(frozen=True)
 class Design:
-    """What an experiment consists of, in SI units and integer indices.
+    """Arrays of an experiment, in SI units and integer indices.
 
     `model` is the error model whose parameters are estimated. Balls and positions of length
-    standards stand in the same lists as those of plates: balls and poses of plates are parameters,
+    standards are in the same lists as those of plates: balls and poses of plates are parameters,
     and the pivots of Bryan gauges, the origins of their positions. `observations` are all others
-    than readings of plates, one of each kind, in the order of their rows.
+    than readings of plates, one object per class, in the order of their rows.
     """
 
     model: ErrorModel
@@ -94,7 +94,7 @@ class Design:
         return {}
 
     def once(self, make: Callable[[Design], Made]) -> Made:
-        """What `make` makes of the design, made when it is asked for first."""
+        """Return the result of `make` for the design, computed once."""
         if make not in self._made:
             self._made[make] = make(self)
         return cast(Made, self._made[make])
@@ -138,8 +138,8 @@ class Design:
 
     @property
     def parameter_count(self) -> int:
-        """Number of free parameters: balls, poses less what is held, machine errors, probe offsets,
-        unknown lengths, influence quantities.
+        """Number of free parameters: balls, poses less held parameters, machine errors, probe
+        offsets, unknown lengths, influence quantities.
         """
         return (
             self.dimension * len(self.plate_balls)
@@ -162,7 +162,7 @@ class Design:
         return np.array([parameter.value for parameter in self.influence_parameters], float)
 
     def ball_label(self, ball: int) -> str:
-        """Name of a ball, with its artefact's where there are several."""
+        """Return the name of a ball, with its artefact's if there are several."""
         return self.balls.label(ball, self.artefacts.names)
 
 
@@ -191,8 +191,8 @@ def reading_uncertainties(design: Design, readings: Readings) -> Array:
 
 
 def measured(design: Design, readings: Readings) -> Flags:
-    """Which co-ordinates (m, d) are read: almost those across artefacts that are read in their
-    plane.
+    """Return a mask (m, d) of the co-ordinates read: all except those across artefacts that are
+    read in their plane.
     """
     shape = (len(readings), design.dimension)
     if design.positions.across is None:
@@ -220,7 +220,7 @@ def nominal_state(design: Design) -> State:
 
 
 def nominal_places(design: Design, position: int, balls: Integers) -> Array:
-    """Places (m, d) of balls where an artefact is planned to stand in a position."""
+    """Return nominal locations (m, d) of balls of an artefact in a position."""
     planned = design.positions
     return np.asarray(
         design.balls.places[balls] @ planned.rotations[position].T + planned.origins[position]
@@ -228,8 +228,8 @@ def nominal_places(design: Design, position: int, balls: Integers) -> Array:
 
 
 def read_in_positions(design: Design, readings: Readings) -> Iterator[tuple[int, Integers, Array]]:
-    """Each position with readings: its index, the indices (m,) of its readings, and places (m, d)
-    of their balls in the artefact's frame.
+    """Yield for each position with readings its index, the indices (m,) of its readings, and the
+    locations (m, d) of their balls in the artefact's frame.
     """
     for k in np.unique(readings.position).tolist():
         rows = np.flatnonzero(readings.position == k)
@@ -243,8 +243,8 @@ def locations(design: Design, state: State, readings: Readings) -> Array:
 
 
 def in_sequence(readings: Readings, influences: tuple[Influence, ...]) -> Readings:
-    """All readings, in the order in which they are made, with what influence quantities say beside
-    them for that.
+    """Return all readings in the order of reading, with the further columns that influence
+    quantities need.
     """
     if not influences:
         return readings
@@ -274,8 +274,8 @@ def disturbed_readings(state: State, readings: Readings, x: Array) -> Disturbed:
 def influence_shifts(
     design: Design, state: State, readings: Readings, x: Array
 ) -> tuple[Array, Array]:
-    """What influence quantities add to the locations of readings (m, d), and its derivative by
-    their parameters (m, d, p), where the scales say `x` (m, d); metres.
+    """Return the effect of influence quantities on the locations of readings (m, d), and its
+    derivative by their parameters (m, d, p), at scale readings `x` (m, d); metres.
     """
     disturbed = disturbed_readings(state, readings, x)
     shift, parts = np.zeros(x.shape), [np.zeros((*x.shape, 0))]
@@ -306,8 +306,8 @@ def influence_shifts(
 class Rows:
     """Whitened rows (m,) of observations at a state.
 
-    `residual` (m,), `by_shared` (m, s) the derivative by the shared parameters, None where these
-    have no part, and `by_ball` (m, k, d) that by the `balls` (m, k) of the observations.
+    `residual` (m,), `by_shared` (m, s) the derivative by the shared parameters, if they
+    contribute, and `by_ball` (m, k, d) that by the `balls` (m, k) of the observations.
     """
 
     residual: Array
@@ -317,7 +317,7 @@ class Rows:
 
 @dataclass(frozen=True)
 class Words:
-    """How a wrong one among observations is told: "certified 3 um too high; check the
+    """Wording of a gross error in observations: "certified 3 um too high; check the
     certificate".
     """
 
@@ -328,12 +328,12 @@ class Words:
 
 
 class Observations(ABC):
-    """All observations (m,) of one kind in a design; a frozen dataclass of arrays.
+    """All observations (m,) of one class in a design; a frozen dataclass of arrays.
 
-    `word` is what one of them is called. Where `scales`, values are lengths that a certificate has
-    too long by one ratio where its scale is wrong; where they are `is_joint`, a row is a
-    combination of several values. `words` tell faults of a wrong one. Values are in `measured_in`,
-    unless `unit` says otherwise of each.
+    `word` names one of them. If `scales`, values are lengths that share one ratio if the scale of
+    their certificate has an error; if `is_joint`, a row is a combination of several values.
+    `words` describe a gross error. Values are in `measured_in`, unless `unit` gives a unit for
+    each.
     """
 
     word: ClassVar[str]
@@ -355,9 +355,9 @@ class Observations(ABC):
 
     @property
     def balls(self) -> Integers:
-        """The balls (rows, k) that each row is about; k is 0 where no ball takes part.
+        """Balls (rows, k) of each row; k may be 0.
 
-        Rows of one ball are eliminated with it; balls that rows tie together are kept to the end.
+        Rows of one ball are eliminated with it; balls linked by rows are kept to the end.
         """
         return np.zeros((len(self), 0), np.int64)
 
@@ -368,7 +368,7 @@ class Observations(ABC):
 
     @property
     def is_exact(self) -> NDArray[np.bool_]:
-        """Which values (m,) are stated without any uncertainty."""
+        """Mask (m,) of values without uncertainty."""
         return np.full(len(self), False)
 
     def count(self, design: Design) -> int:
@@ -381,7 +381,7 @@ class Observations(ABC):
 
     @abstractmethod
     def name(self, design: Design, k: int) -> str:
-        """What one of them is, as a metrologist would say it."""
+        """Return the name of an observation in a metrologist's words."""
 
     @abstractmethod
     def true_values(self, design: Design, truth: State, model: ErrorModel) -> Array:
@@ -398,7 +398,7 @@ class Observations(ABC):
         return self.uncertainty * generator.standard_normal((count, len(self)))
 
     def weights(self, design: Design, state: State) -> Array:
-        """How heavy rows are, by the reciprocal of a length; what weighs nothing is left out."""
+        """Return the weights of rows, by the reciprocal of a length; zero weights are omitted."""
         return 1.0 / self.uncertainty
 
     def alike(self, design: Design, state: State) -> Self:
@@ -410,55 +410,55 @@ class Observations(ABC):
         return cast(Self, replace(cast(Any, self), **changed))
 
     def enlarged(self, times: Array) -> Self:
-        """The same observations with uncertainties so many `times` (rows,) as large; of rows that
-        share errors, all the same.
+        """Return the same observations with uncertainties `times` (rows,) as large; rows that
+        share errors change together.
         """
         return self.given(uncertainty=self.uncertainty * times)
 
     def whitened(self, rows: Array) -> Array:
-        """What changes (m, ...) of the values are in uncorrelated rows (count, ...) of unit
+        """Return changes (m, ...) of the values in uncorrelated rows (count, ...) of unit
         variance.
         """
         return rows / self.uncertainty.reshape(-1, *[1] * (rows.ndim - 1))
 
     def scaled(self) -> Array:
-        """What the values (m,) change by, per ratio, where the scale of their certificate is
-        wrong.
+        """Return the change of the values (m,), per ratio, from a scale error of their
+        certificate.
         """
         return self.value if self.scales else np.zeros(len(self))
 
     def loosened(self, least: float) -> Self:
-        """The same with standard uncertainties of `least` at the least, where smaller ones stand
-        for none.
+        """Return the same with standard uncertainties of at least `least`, if smaller ones
+        represent zero.
         """
         return self
 
     def fixing(self) -> tuple[Integers, Integers, Array]:
-        """Balls and axes (f,) of what fixes an artefact's frame, along the axes of the latter, and
-        the co-ordinates (f,).
+        """Return balls and axes (f,) whose values fix an artefact's frame, along its axes, and the
+        co-ordinates (f,).
         """
         none = np.zeros(0, np.int64)
         return none, none, np.zeros(0)
 
     def started(self, design: Design, x: Array, state: State) -> State:
-        """Starting values with what these observations tell of them."""
+        """Return starting values with the information of these observations."""
         return state
 
     def as_read(self, design: Design, x: Array) -> Design:
-        """The design with probe offsets that readings tell, for these observations, by far better
-        than the drawing.
+        """Return the design with probe offsets from readings, for observations that determine them
+        far better than nominal values.
         """
         return design
 
     def reread(self, design: Design, place: Integers) -> Self:
-        """The same where the design's readings stand at other places (readings,)."""
+        """Return the same for readings at other locations (readings,)."""
         return self
 
     def add_misfit(self, rows: Rows, errors: Array, at: Replicates) -> None:
-        """Add what these contribute to S^2 of replicates and its gradient, with errors (b, m) of
-        their true values.
+        """Add the contribution to S^2 of replicates and its gradient, with errors (b, m) of their
+        true values.
 
-        Linear about the `rows` at the start; what is not linear has a method of its own.
+        Linear about the `rows` at the start; nonlinear observations override it.
         """
         if not len(self):
             return
@@ -475,12 +475,12 @@ class Observations(ABC):
 
 @dataclass(frozen=True)
 class Replicates:
-    """What b replicates differ by from the estimate `start` of readings without noise, which are of
-    the `truth`.
+    """Differences of b replicates from the estimate `start` of readings without noise, which are
+    of the `truth`.
 
     `balls` (b, d, n) and `shared` (b, s) are the sums of their steps. Observations add to their
     S^2, `squares` (b,), and to half its gradient, `by_ball` (b, d, n) and `by_shared` (b, s).
-    `offsets` (l, d) are the columns of probe offsets, -1 where they are held.
+    `offsets` (l, d) are the columns of probe offsets, -1 for held ones.
     """
 
     start: State

@@ -1,4 +1,4 @@
-"""What positions and calibrations can refer to: probes, artefacts and their balls."""
+"""Objects that positions and calibrations can refer to: probes, artefacts and their balls."""
 
 from __future__ import annotations
 
@@ -28,18 +28,18 @@ MOST_READINGS = 2_000_000
 
 @dataclass
 class ReadingCount:
-    """What has been counted so far."""
+    """Readings counted so far."""
 
     readings: int = 0
 
 
 @dataclass(frozen=True, eq=False)
 class References:
-    """What can be referred to.
+    """Objects that can be referred to.
 
-    ``probes`` and ``artefact_names`` are names as written, also of entries that are wrong in
-    themselves; ``artefacts`` and ``layouts`` have only right ones. ``dimension`` is None where the
-    file does not tell it, and so is the ``volume`` where it is invalid.
+    ``probes`` and ``artefact_names`` are names as written, also of invalid entries; ``artefacts``
+    and ``layouts`` have only valid ones. ``dimension`` and ``volume`` may be missing from the file
+    or invalid.
     """
 
     problems: Problems
@@ -54,16 +54,14 @@ class References:
     tally: ReadingCount = field(default_factory=ReadingCount)
 
     def file(self, name: object) -> Path:
-        """The file that the experiment names.
+        """Return the file that the experiment names.
 
-        :raises ExperimentError: it lies elsewhere than it may.
+        :raises ExperimentError: it is outside the permitted folders.
         """
         return self.trust.file(self.folder, name)
 
     def count_readings(self, count: int, steps: Steps) -> bool:
-        """Count further readings; tell whether there is room for them, after saying once that there
-        is not.
-        """
+        """Count further readings; return false, after one message, if there are too many."""
         before = self.tally.readings
         self.tally.readings += count
         if before <= MOST_READINGS < self.tally.readings:
@@ -75,9 +73,7 @@ class References:
         return self.tally.readings <= MOST_READINGS
 
     def artefact(self, name: str | None, steps: Steps) -> str | None:
-        """Return the artefact that a position or calibration is about, or None after reporting
-        faults.
-        """
+        """Return the artefact of a position or calibration, or report faults."""
         if name is None:
             if len(self.artefact_names) > 1:
                 choice = listing(self.artefact_names)
@@ -94,7 +90,7 @@ class References:
         return name
 
     def check_written(self, steps: Steps) -> None:
-        """Report unknown names in a position or calibration that is wrong in itself."""
+        """Report unknown names in an invalid position or calibration."""
         name = written_text(self.problems.root, *steps, "artefact")
         if name is not None:
             self.artefact(name, steps)
@@ -107,7 +103,7 @@ class References:
                 )
 
     def probe_names(self, names: tuple[str, ...] | None, steps: Steps) -> tuple[str, ...] | None:
-        """Return the probes of a reading, or None after reporting faults."""
+        """Return the probes of a reading, or report faults."""
         if names is None:
             if len(self.probes) > 1:
                 choice = listing(self.probes)
@@ -116,7 +112,7 @@ class References:
         return names if self._known_once("probe", self.probes, names, (*steps, "probes")) else None
 
     def is_not_negative(self, uncertainty: float | None, steps: Steps) -> bool:
-        """True if an uncertainty is zero or above, or none is stated; otherwise a message."""
+        """True if an uncertainty is absent, zero or above; otherwise a message."""
         return self.require(
             uncertainty is None or uncertainty >= 0.0,
             steps,
@@ -124,7 +120,7 @@ class References:
         )
 
     def has_axes(self, setting: object, steps: Steps) -> bool:
-        """True if what is stated, if it is a list, has one for each axis; otherwise a message."""
+        """True unless a stated list has another length than the number of axes; then a message."""
         count = len(setting) if isinstance(setting, tuple) else self.dimension
         return self.require(
             self.dimension in (None, count),
@@ -143,9 +139,7 @@ class References:
         return self._known_once("probe", self.probes, names, steps)
 
     def balls(self, chosen: Sequence[str], layout: BallLayout, steps: Steps) -> Indices | None:
-        """Return the indices of balls, all, the corners or listed ones, or None after reporting
-        faults.
-        """
+        """Return the indices of balls, all, the corners or listed ones, or report faults."""
         index = {name: i for i, name in enumerate(layout.names)}
         if chosen == "all":
             indices = np.arange(len(index))
@@ -203,7 +197,7 @@ class References:
         return len(self.problems.messages) == before
 
     def require(self, is_right: bool, steps: Steps, text: Callable[[], str] | str) -> bool:
-        """Say what is wrong unless it is right; return whether it is."""
+        """Report a fault unless the condition holds; return the condition."""
         if not is_right:
             self.problems.add(steps, text if isinstance(text, str) else text())
         return is_right
@@ -212,9 +206,7 @@ class References:
 def lengths_per_axis(
     setting: Any, steps: Steps, references: References
 ) -> tuple[Floats | None, bool]:
-    """Lengths of all axes (d,), None where nothing is stated, and whether what is stated is
-    right.
-    """
+    """Return lengths of all axes (d,), if stated, and whether the statement is valid."""
     dimension = references.dimension
     if setting is None or dimension is None:
         return None, True

@@ -1,4 +1,4 @@
-"""Distribution of the noise of readings, where readings are made: simulation and Monte Carlo."""
+"""Distribution of the noise of generated readings: simulation and Monte Carlo."""
 
 from __future__ import annotations
 
@@ -36,8 +36,7 @@ class NoiseSettings(Settings):
 class Noise:
     """Noise of unit variance: normal, uniform, or of Student's t with `degrees_of_freedom`.
 
-    Readings of a position have a part in common along each axis, which is normal and of variance
-    `correlation`.
+    Readings of a position share a normal component along each axis, of variance `correlation`.
     """
 
     distribution: Distribution = "normal"

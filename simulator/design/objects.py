@@ -59,8 +59,8 @@ class Volume:
         return self.lower - slightly, self.upper + slightly
 
     def far_outside(self, x: Array) -> Flags:
-        """Which co-ordinates (n, d) lie outside by more than its own size: they are in another
-        unit.
+        """Return a mask (n, d) of co-ordinates outside by more than the volume's size: they are in
+        another unit.
         """
         size = float(self.size.max())
         return np.asarray((x < self.lower - size) | (x > self.upper + size))
@@ -108,8 +108,8 @@ class Artefacts:
 
 @dataclass(frozen=True)
 class Balls:
-    """Balls of all artefacts: the `artefact` (n,) of each, and their `places` (n, d) in its
-    frame.
+    """Balls of all artefacts: the `artefact` (n,) of each, and their locations `places` (n, d) in
+    its frame.
     """
 
     names: tuple[str, ...]
@@ -121,20 +121,20 @@ class Balls:
         return np.flatnonzero(self.artefact == artefact)
 
     def label(self, ball: int, artefacts: tuple[str, ...]) -> str:
-        """Name of a ball, with that of its artefact where there are several."""
+        """Return the name of a ball, with its artefact's if there are several."""
         name = self.names[ball]
         return name if len(artefacts) == 1 else f"{artefacts[self.artefact[ball]]}/{name}"
 
 
 @dataclass(frozen=True)
 class Positions:
-    """Positions of artefacts: the `artefact` (k,) that stands in each, and its nominal pose, x = R
-    y + o with `rotations` (k, d, d) and `origins` (k, d).
+    """Positions of artefacts: the `artefact` (k,) in each, and its nominal pose, x = R y + o with
+    `rotations` (k, d, d) and `origins` (k, d).
 
-    `held` (k, pose size) marks the pose parameters (origin, then rotation about the machine's axes)
-    that fix a frame or that turn an artefact of collinear balls about its own axis. `across` (k,)
-    is the machine's axis across an artefact of which only co-ordinates in its plane are read, -1
-    elsewhere; None where all co-ordinates are read.
+    `held` (k, pose size) marks the pose parameters (origin, then rotation about the machine's
+    axes) that fix a frame or that turn an artefact of collinear balls about its own axis. `across`
+    (k,) is the machine's axis across an artefact read only in its plane, otherwise -1; absent if
+    all co-ordinates are read.
     """
 
     names: tuple[str, ...]
@@ -147,11 +147,11 @@ class Positions:
 
 @dataclass(frozen=True)
 class Readings:
-    """Which ball is read in which position with which probe, and how often; all arrays (m,).
+    """Ball, position, probe and number of repeats of each reading; all arrays (m,).
 
-    `uncertainty` (m, d) is the standard uncertainty of each co-ordinate read once, in metres; None
-    where all have the machine's repeatability. `beside` has what influence quantities need besides,
-    values (m,) by the names of their columns; None where there are none.
+    `uncertainty` (m, d) is the standard uncertainty of each co-ordinate read once, in metres;
+    absent if all have the machine's repeatability. `beside` has further columns for influence
+    quantities, values (m,) by name, if any.
     """
 
     ball: Integers
@@ -185,8 +185,8 @@ class Readings:
 
 @dataclass(frozen=True)
 class UnknownLengths:
-    """Lengths of standards without certificates, which are parameters: the `artefact` (m,) of each,
-    and what it is `drawn` with (m,), in metres.
+    """Lengths of standards without certificates, which are parameters: the `artefact` (m,) of
+    each, and its nominal length `drawn` (m,), in metres.
     """
 
     names: tuple[str, ...]
@@ -200,7 +200,9 @@ class UnknownLengths:
 
 @dataclass(frozen=True)
 class EvaluationPoints:
-    """Scale readings `points` (p, d) whose corrected places are evaluated, read with `probe`."""
+    """Scale readings `points` (p, d) whose corrected locations are evaluated, read with
+    `probe`.
+    """
 
     points: Array
     probe: int
@@ -208,9 +210,8 @@ class EvaluationPoints:
 
 @dataclass(frozen=True)
 class Tasks:
-    """Lengths that the machine is to measure: `points` (t, 2, d) are what the scales say at their
-    ends, `probes` (t, 2) what measures there, and `targets` (t,) what uncertainties are to be
-    within.
+    """Lengths for the machine to measure: `points` (t, 2, d) are scale readings at their ends,
+    `probes` (t, 2) the probes there, and `targets` (t,) target uncertainties.
     """
 
     names: tuple[str, ...]

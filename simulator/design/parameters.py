@@ -13,14 +13,14 @@ from .arrays import Design
 
 @dataclass(frozen=True)
 class SharedLayout:
-    """Columns of the shared parameters: the free ones of poses, machine errors, free probe offsets,
-    unknown lengths, influence quantities.
+    """Columns of the shared parameters: the free ones of poses, machine errors, free probe
+    offsets, unknown lengths, influence quantities.
 
-    `pose_columns` (k, pose size) holds a column for each pose parameter, -1 where it is held or
+    `pose_columns` (k, pose size) holds a column for each pose parameter, -1 if it is held or
     belongs to a length standard, and `offset_columns` (l, d) the same for probe offsets; `lengths`
     are the columns of unknown lengths and `influences` those of influence quantities. `scale`
-    (columns,) is the size of each parameter, in its own unit, that moves a point somewhere by about
-    one metre.
+    (columns,) is the size of each parameter, in its own unit, that moves a point by about one
+    metre.
     """
 
     parameters: tuple[Parameter, ...]

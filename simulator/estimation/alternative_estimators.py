@@ -72,10 +72,11 @@ class AlternativeSolution:
 
 @dataclass(frozen=True)
 class _Points:
-    """Points read, one for each ball, position and probe: scale readings (r, d) and their variances
-    (r, d).
+    """Points read, one per ball, position and probe: scale readings (r, d) and their variances (r,
+    d).
 
-    `place` (r,) numbers the positions and probes, `position` (places,) states the position of each.
+    `place` (r,) numbers the pairs of position and probe, `position` (pairs,) states the position
+    of each.
     """
 
     ball: Integers
@@ -88,11 +89,11 @@ class _Points:
 
 @dataclass(frozen=True)
 class _Measured:
-    """Distances between two points of the same position (m,): pair (m,), points, distance as read,
-    and variance of each.
+    """Distances between two points of one position (m,): pair (m,), points, distance as read, and
+    variance.
 
-    `calibrated`, `value` and `uncertainty` (c,) tell pairs whose distance is known. Sorted by pair,
-    then place.
+    `calibrated`, `value` and `uncertainty` (c,) list pairs of known distance. Sorted by pair, then
+    by position and probe.
     """
 
     pair: Integers
@@ -121,11 +122,11 @@ def alternative_estimate(
     settings: GaussNewtonSettings | None = None,
     start: Array | None = None,
 ) -> AlternativeSolution:
-    """Minimise the objective of an alternative estimator by Gauss-Newton, from `start` or a machine
-    without errors.
+    """Minimise the objective of an alternative estimator by Gauss-Newton, from `start` or a
+    machine without errors.
 
     `x` (readings, d) holds the scale readings, `pairs` (p, 2) ball indices; calibrated pairs are
-    added to them. Directions that the distances leave open are not moved in.
+    added to them. Directions that the distances do not determine stay at the start.
     """
     settings = settings or GaussNewtonSettings()
     points = _points(design, x)
@@ -219,7 +220,7 @@ def _measured(design: Design, points: _Points, pairs: Integers, across_probes: b
 
 
 def _apart(places: Array, first: Integers, second: Integers) -> tuple[Array, Array]:
-    """Lengths (m,) and directions (m, d) of the differences of two places each."""
+    """Return lengths (m,) and directions (m, d) of the differences of pairs of points."""
     difference = places[first] - places[second]
     length = np.sqrt((difference**2).sum(axis=1))
     return length, difference / np.maximum(length, np.finfo(float).tiny)[:, None]

@@ -1,7 +1,7 @@
 """Uncertainty of any linear function of the parameters, from a factor, without a large matrix.
 
-The covariance of the parameters is G G' with a square root G that has one block for each ball: what
-its own rows leave open, and what it shares with all others through poses and machine errors.
+The covariance of the parameters is G G' with a square root G that has one block per ball: the part
+that its own rows leave, and the part shared with all others through poses and machine errors.
 """
 
 from __future__ import annotations
@@ -34,11 +34,10 @@ class Spectrum:
 
     Columns are scaled so that a unit step moves some point in the volume by up to a micrometre; a
     singular value is then the number of standard deviations by which the observations show such a
-    change. `values` (s,) stand largest first; `deficiency` counts those that the observations leave
-    wholly open, and `gap` is the ratio of the smallest value counted as determined to the largest
-    counted as undetermined, where these were told apart. With the full rank the values are those of
-    the scaled `triangle` (s, s), whose singular vectors are found when they are asked for;
-    otherwise that is None and `known` (s, s) has the directions.
+    change. `values` (s,) are sorted, largest first; `deficiency` counts the undetermined ones, and
+    `gap` is the ratio of the smallest determined value to the largest undetermined one, if both
+    exist. With full rank the values are those of the scaled `triangle` (s, s), whose singular
+    vectors are computed on request; otherwise `known` (s, s) has the directions.
     """
 
     values: Array
@@ -78,8 +77,8 @@ class Spectrum:
 
     @cached_property
     def root(self) -> Array:
-        """Any square root (s, rank) of the shared parameters' covariance, what is undetermined left
-        out.
+        """Square root (s, rank) of the shared parameters' covariance, without undetermined
+        directions.
         """
         if self.triangle is None:
             return self.principal_root
@@ -88,12 +87,12 @@ class Spectrum:
 
 @single_threaded
 def spectrum(factor: Factor, drawn: Spectrum | None = None) -> Spectrum:
-    """Singular value decomposition of the shared parameters' factor.
+    """Return the singular value decomposition of the shared parameters' factor.
 
-    Rank and null space do not depend on the weights of rows. Where these differ much, so that
-    rounding of the heaviest hides what the lightest tell, both are those of the rows with equal
-    weights. They are those of `drawn` where that is given: what observations tell of its null
-    directions is left out, and no other direction counts as one.
+    Rank and null space do not depend on the weights of rows. If the weights differ so much that
+    rounding of the heaviest hides the lightest, both come from the rows with equal weights. A
+    given `drawn` spectrum supplies rank and null space: information on its null directions is
+    omitted, and no other direction is one.
     """
     scale = factor.layout.scale * MICROMETRE
     if drawn is None:
@@ -155,8 +154,8 @@ def _determined(factor: Factor, scale: Array, spanned: Array) -> tuple[Array, Ar
 
 
 def no_spectrum(layout: SharedLayout) -> Spectrum:
-    """What stands for a spectrum where the factor is not finite: no value is known, none counts as
-    open.
+    """Return the substitute for the spectrum of a factor that is not finite: no value is known, no
+    direction undetermined.
     """
     size = len(layout)
     return Spectrum(
@@ -173,10 +172,10 @@ class BallCovariance:
     """Square root of the covariance of the balls, in units of the standard deviation of a
     unit-weight observation.
 
-    `common` (n, d, r + kept) is the part that they have in common with all else, of which the first
-    r columns are those of the shared parameters, and `own` (n, d, d) the part that each has alone;
-    rows of balls that are no parameters are zero. `null` (n, d, deficiency) says how the
-    undetermined directions move the balls.
+    `common` (n, d, r + kept) is the part in common with all other parameters, its first r columns
+    those of the shared parameters, and `own` (n, d, d) the part of each ball alone; rows of balls
+    that are not parameters are zero. `null` (n, d, deficiency) are the motions of balls along
+    undetermined directions.
     """
 
     common: Array

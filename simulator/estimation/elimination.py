@@ -1,12 +1,17 @@
-"""Orthogonal elimination of the balls, a batch of them at a time.
+"""Orthogonal elimination of the balls, in batches.
 
 The Jacobian of all readings is block-angular (NPL Report CISE 15/98, section 3.5.3): the rows of
-one ball involve that ball and the shared parameters, poses and machine errors. Each ball's rows are
-multiplied by an orthogonal matrix that leaves three rows for the ball and the rest for the shared
-parameters alone; the rest goes into one small triangular factor. Neither the whole Jacobian nor any
-normal equation is ever formed, so that time and memory grow in proportion to the readings. Balls
-tied to one another by observations, such as calibrated distances, are kept and eliminated together
-at the end.
+one ball involve that ball and the shared parameters (poses, machine errors, offsets). The whitened
+rows of ball i are
+
+[B_i  C_i | r_i],  with  Q_i' [B_i  C_i | r_i] = [R_i  S_i | z_i; 0  T_i | w_i].
+
+The orthogonal Q_i leaves d rows that determine the ball (R_i, kept in `ball_root`, `ball_shared`,
+`ball_side`), and rows T_i for the shared parameters alone. All T_i go into one small triangular
+factor (`root`, `side`), from which `covariance` takes rank, null space and uncertainties, and
+`gauss_newton` the step. The whole Jacobian and normal equations are never formed; time and memory
+grow in proportion to the readings. Balls linked by observations, such as calibrated distances, are
+kept and eliminated together at the end.
 """
 
 from __future__ import annotations
@@ -52,7 +57,7 @@ class Orders:
 
 @dataclass(frozen=True)
 class Factor:
-    """Triangular factor of the whitened observations, with the right-hand side z = Q' r beside it.
+    """Triangular factor of the whitened observations, with the right-hand side z = Q' r.
 
     With d dimensions, s shared parameters, e balls eliminated singly and k kept balls: `ball_root`
     (e, d, d) and `ball_shared` (e, d, s) with `ball_side` (e, d) are the rows of the balls
@@ -60,10 +65,10 @@ class Factor:
     balls `kept`; `root` (s, s) and `side` (s,) those of the shared parameters. `sum_of_squares` is
     S^2 at the point of linearisation.
 
-    Where the weights of rows differ so much that columns have to be taken in an order that depends
-    on them, `orders` states the columns of all roots, and `alike` is the factor of the same rows
-    with about equal weights, which has the same rank and the same null space. Otherwise columns
-    stand in the order of the parameters.
+    If the weights of rows differ so widely that the order of columns has to follow them, `orders`
+    states the columns of all roots, and `alike` is the factor of the same rows with about equal
+    weights, which has the same rank and null space. Otherwise columns are in the order of the
+    parameters.
     """
 
     layout: SharedLayout
@@ -84,8 +89,8 @@ class Factor:
 
 @dataclass(frozen=True)
 class _Gathered:
-    """Rows of all observations but readings, sorted by what they are about: a single ball (m,)
-    each, several balls (m, k) together, the shared parameters alone.
+    """Rows of all observations except readings, by subject: a single ball (m,), several balls (m,
+    k) together, the shared parameters alone.
     """
 
     single: tuple[tuple[Integers, Rows], ...]
@@ -281,14 +286,14 @@ def _eliminate_graded(
 
 
 def _places(design: Design, chosen: Integers) -> Integers:
-    """Place (n,) of each ball among those kept."""
+    """Return the index (n,) of each ball among those kept."""
     place_of = np.zeros(len(design.balls.names), np.int64)
     place_of[chosen] = np.arange(len(chosen))
     return place_of
 
 
 def _with_residual(rows: Rows, s: int) -> Array:
-    """Derivatives by the shared parameters with the residual beside them (m, s + 1)."""
+    """Return derivatives by the shared parameters, extended by the residual, (m, s + 1)."""
     with_residual = np.zeros((len(rows.residual), s + 1))
     if rows.by_shared is not None:
         with_residual[:, :-1] = rows.by_shared
@@ -325,8 +330,8 @@ def _absorbed(triangle: Array, rows: Array) -> Array:
 
 
 def _with_rows(triangle: Array, rows: Array) -> Array:
-    """Triangular factor of a square `triangle` with `rows` below it, instead of both where they
-    are large.
+    """Return the triangular factor of a square `triangle` with `rows` below it, without stacking
+    large ones.
     """
     if len(triangle) < SMALL:
         return _square(_triangle(np.concatenate([triangle, rows])), len(triangle))
@@ -424,7 +429,7 @@ def _batches(
 
 
 def _fill(by_ball, by_rest, blocks, columns, layout, present) -> None:  # type: ignore[no-untyped-def]
-    """Write reading blocks (b m, d, ...) into the rows of a batch, in place."""
+    """Write reading blocks (b m, d, ...) into the rows of a batch."""
     b, m = present.shape
     d = by_ball.shape[2]
     by_ball[:] = blocks.by_ball.reshape(b, m * d, d)

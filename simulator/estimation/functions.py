@@ -1,8 +1,8 @@
-"""Functions of a design's parameters whose uncertainties are evaluated: parameters, places and
+"""Functions of a design's parameters whose uncertainties are evaluated: parameters, points and
 distances.
 
-They are told without numbers of a particular state, so that a plan, a fit, replicates and a search
-for mistakes can each make what they need of the same description.
+They are described without numbers of a particular state, so that a plan, a fit, replicates and a
+search for gross errors can each derive theirs from the same description.
 """
 
 from __future__ import annotations
@@ -55,14 +55,14 @@ class BallPlaces:
 
     @property
     def labels(self) -> Integers:
-        """Numbers (n,) by which places are named."""
+        """Numbers (n,) that name the balls."""
         return self.index
 
     def name(self, design: Design, label: int) -> str:
         return f"ball {design.ball_label(label)}"
 
     def at(self, design: Design, state: State) -> Array:
-        """Where the places (n, d) are."""
+        """Return the locations (n, d) of the balls."""
         return state.balls[self.index]
 
 
@@ -85,7 +85,7 @@ class MeasuredPoints:
 
     @property
     def labels(self) -> Integers:
-        """Numbers (n,) by which places are named."""
+        """Numbers (n,) that name the points."""
         return np.arange(len(self.points))
 
     def name(self, design: Design, label: int) -> str:
@@ -93,7 +93,7 @@ class MeasuredPoints:
         return f"point {label + 1}"
 
     def at(self, design: Design, state: State) -> Array:
-        """Where the places (n, d) are."""
+        """Return the corrected locations (n, d) of the points."""
         return corrected_points(design, state, self.points, self.probes)
 
 
@@ -102,21 +102,20 @@ Places = BallPlaces | MeasuredPoints
 
 @dataclass(frozen=True, eq=False)
 class Coordinates:
-    """All co-ordinates of places, those of a place together."""
+    """All co-ordinates of points, those of a point together."""
 
     places: Places
 
 
 @dataclass(frozen=True, eq=False)
 class Distances:
-    """Distances between all `places` or, with `pairs` (m, 2) of their indices, between those, which
-    have `names`.
+    """Distances between all `places` or, with `pairs` (m, 2) of their indices, between named
+    pairs.
 
-    `targets` are the uncertainties that each of these is to have, None where nothing is to be
-    reached.
+    `targets` are target uncertainties of the pairs, if they have any.
 
-    :raises ValueError: not each pair has a name, or a target where there are some; or a pair is not
-        of two of the places.
+    :raises ValueError: a pair without a name, or without a target if others have one; or a pair
+        not of     two of the points.
     """
 
     places: Places
@@ -143,14 +142,14 @@ Functions = Parameters | Coordinates | Distances
 
 
 def coordinate_name(design: Design, places: Places, index: int) -> str:
-    """Name of a co-ordinate of places by its index among all of them."""
+    """Return the name of a co-ordinate of points by its index in all co-ordinates."""
     place, axis = divmod(index, design.dimension)
     return f"{places.name(design, int(places.labels[place]))} {AXIS_NAMES[axis]}"
 
 
 def function_name(design: Design, functions: Functions, first: int, second: int) -> str:
-    """Name of a co-ordinate by the label of its place and its axis, or of a distance by the labels
-    of both places.
+    """Return the name of a co-ordinate from its point's label and its axis, or of a distance from
+    both labels.
     """
     assert not isinstance(functions, Parameters)
     places = functions.places
@@ -164,11 +163,12 @@ def function_name(design: Design, functions: Functions, first: int, second: int)
 
 @dataclass(frozen=True, eq=False)
 class Displacements:
-    """How `places` (n, d) are displaced: by `common` (n, d, r) times r standard normal variables
-    that all share, and `own` (n, d, d) times d of their own.
+    """Displacements of `places` (n, d): `common` (n, d, r) times r standard normal variables
+    shared by all, and `own` (n, d, d) times d of their own.
 
-    `null` (n, d, k) moves them along undetermined directions from where they are `drawn` (n, d), by
-    what is no mere rounding of `size` (n, d), which is zero where there is no such direction.
+    `null` (n, d, k) moves the points along undetermined directions from their nominal locations
+    `drawn` (n, d), by more than the rounding of `size` (n, d), which is zero for a determined
+    point.
     """
 
     places: Array
@@ -185,7 +185,7 @@ class Displacements:
         return blank(values, self.null, self.size)
 
     def select(self, chosen: Integers | slice) -> Displacements:
-        """Those of some places."""
+        """Return the displacements of some points."""
         arrays = (self.places, self.common, self.own, self.null, self.drawn, self.size)
         return Displacements(*(array[chosen] for array in arrays))
 
@@ -193,10 +193,11 @@ class Displacements:
 def displacements(
     linearisation: Linearisation, places: Places, narrow: bool = True
 ) -> Displacements:
-    """Displacements of places, in units of the standard deviation of a unit-weight observation.
+    """Return displacements of points, in units of the standard deviation of a unit-weight
+    observation.
 
-    With `narrow` those of points have variables of their own, at most there are parameters that
-    move points; otherwise those of the linearisation, which balls and observations have in common.
+    With `narrow` those of measured points have their own variables, at most one per parameter that
+    moves points; otherwise those of the linearisation, in common with balls and observations.
     """
     design, drawn = linearisation.design, linearisation.as_drawn.state
     if isinstance(places, BallPlaces):
@@ -263,7 +264,7 @@ def point_rows(
 
 
 def linear_functions(linearisation: Linearisation, functions: Functions) -> LinearFunctions:
-    """Derivatives of all functions: dense, for some of them rather than for all distances of a
+    """Return derivatives of functions: dense, for a selection rather than for all distances of a
     large plate.
 
     >>> import ballplate as bp

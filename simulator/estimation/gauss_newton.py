@@ -78,9 +78,9 @@ def gauss_newton(
 ) -> Solution:
     """Minimise S^2 over balls, poses and machine errors, from `start`.
 
-    `x` (readings, d) holds the scale readings. Directions that the observations leave open are not
-    moved in; with `held`, see `as_drawn`, these are its null directions, whatever the state. A
-    failure to converge is a status, not an exception.
+    `x` (readings, d) holds the scale readings. Undetermined directions stay at the start; with
+    `held_spectrum`, see `as_drawn`, its null directions do. A failure to converge is a status, not
+    an exception.
     """
     settings = settings or GaussNewtonSettings()
     layout = design.once(shared_layout)
@@ -114,13 +114,14 @@ def gauss_newton(
 
 
 def estimate(design: Design, x: Array, settings: GaussNewtonSettings | None = None) -> Solution:
-    """The estimate from scale readings `x` (readings, d) and starting values of their own.
+    """Return the estimate from scale readings `x` (readings, d), with starting values from the
+    readings.
 
-    What is open nominal is held, since noise alone would lead far along it, and the square of such
-    a way would falsify what is determined. Of plates it is followed, as in NPL Report CISE 15/98,
-    section 5.4, where the readings tell something of it, see `_tells_of_open`, without leaving the
-    neighbourhood: poses a little off their nominal ones call for steps of metres. Rank and null
-    space of the solution are those of the design nominal in any case.
+    Directions undetermined in the nominal design are held: noise alone would lead far along them,
+    and the second order of such a step would bias determined parameters. For plates they are
+    followed, as in NPL Report CISE 15/98, section 5.4, if the readings determine them, see
+    `_tells_of_open`, and only within the neighbourhood: poses slightly off nominal ones would need
+    steps of metres. Rank and null space of the solution are those of the nominal design.
     """
     start = initial_state(design, x)
     drawn = as_drawn(design)
@@ -141,8 +142,8 @@ def estimate(design: Design, x: Array, settings: GaussNewtonSettings | None = No
 def _tells_of_open(
     design: Design, held_solution: Solution, followed: Solution, deficiency: int
 ) -> bool:
-    """True if S^2 falls by more than noise explains where what is open nominal is followed: an
-    F-test with the scatter of the readings themselves.
+    """True if following the nominally undetermined directions lowers S^2 by more than noise
+    explains: an F-test with the standard deviation of the readings.
     """
     from scipy.special import fdtrc
 
@@ -156,20 +157,18 @@ def _tells_of_open(
 
 
 def as_drawn(design: Design) -> Spectrum:
-    """The spectrum of a design in its nominal poses on a machine without errors: rank and null
-    space are those here.
+    """Return the spectrum of a design in its nominal poses on a machine without errors: the valid
+    rank and null space.
 
-    With errors, noise and poses that are not quite nominal the same readings seem to tell a little
-    of what they leave open. To follow that may lead far astray: where no length is known, S^2 is
-    least when all lengths are zero.
+    With errors, noise and poses slightly off nominal, the readings appear to determine null
+    directions. Following these may lead far astray: without a known length, S^2 is smallest with
+    all lengths zero.
     """
     return linearise(design).spectrum
 
 
 def linearised_fit(design: Design, solution: Solution) -> Linearisation:
-    """The linearisation at an estimate; what is undetermined is what the design nominal leaves
-    open.
-    """
+    """Return the linearisation at an estimate, with the null directions of the nominal design."""
     drawn = linearise(design) if solution.spectrum.deficiency else None
     return Linearisation(
         design, solution.factor.layout, solution.state, solution.factor, solution.spectrum, drawn

@@ -1,11 +1,11 @@
 """Orthogonal elimination of rows whose weights differ by many orders of magnitude.
 
-Where one row outweighs others a millionfold, a plain triangular decomposition mixes its rounding
-into them, and what little they tell is lost. With the rows sorted by weight, heaviest first, and
-the columns taken in the order of what is left in them, every row keeps its own relative accuracy:
-M. J. D. Powell, J. K. Reid, *On applying Householder transformations to linear least squares
-problems*, 1968; A. J. Cox, N. J. Higham, *Stability of Householder QR factorization for weighted
-least squares problems*, 1998.
+If one row outweighs others a millionfold, a plain triangular decomposition mixes its rounding into
+them, and their information is lost. With the rows sorted by weight, heaviest first, and the
+columns in the order of their remaining norms, every row keeps its own relative accuracy: M. J. D.
+Powell, J. K. Reid, *On applying Householder transformations to linear least squares problems*,
+1968; A. J. Cox, N. J. Higham, *Stability of Householder QR factorization for weighted least
+squares problems*, 1998.
 """
 
 from __future__ import annotations
@@ -26,8 +26,7 @@ class Triangle:
     """Rows brought to a triangle: `root` (n, n) is upper triangular in the columns `order` (n,),
     `side` (n, m).
 
-    `rest` (k, m) are the transformed right-hand sides of rows that have nothing left in the
-    columns.
+    `rest` (k, m) are the transformed right-hand sides of the remaining rows, zero in the columns.
     """
 
     root: Array
@@ -95,8 +94,8 @@ def without_balls(
     """Eliminate a batch of balls from rows by them (b, m, d) and by the rest (b, m, c), sorted by
     `weights` (b, m).
 
-    Gives for each ball a root (b, d, d), triangular in its co-ordinates `order` (b, d), with the
-    rest of these rows (b, d, c), and what is left of all others (b, m - d, c).
+    Returns for each ball a root (b, d, d), triangular in its co-ordinates `order` (b, d), with the
+    rest of its rows (b, d, c), and the remaining rows (b, m - d, c).
     """
     b, m, d = by_ball.shape
     heaviest = np.argsort(-weights, axis=1, kind="stable")[:, :, None]

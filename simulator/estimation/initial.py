@@ -1,8 +1,8 @@
-"""Starting values for balls and poses, found from the readings alone.
+"""Starting values for balls and poses from the readings alone.
 
 Two positions that share enough balls determine their relative pose. The positions of an artefact
-are joined one after the other to what is known already, so that none of them need read all balls
-(NPL Report CISE 15/98, section 4.1). The machine is taken to be without errors.
+are joined one after the other to the known ones, so that no position has to read all balls (NPL
+Report CISE 15/98, section 4.1). The machine is assumed to be without errors.
 """
 
 from __future__ import annotations
@@ -95,8 +95,8 @@ def initial_state(design: Design, x: Array) -> State:
 def _in_plane(
     design: Design, k: int, across: int, locations: Array, balls: Array, origin: Array
 ) -> tuple[Array, Array]:
-    """The pose of a position that is read in its plane, from where its balls (n, 3) were seen: out
-    of the plane nothing is read that could tell poses from the drawing's.
+    """Return the pose of a position that is read in its plane, from the locations (n, 3) of its
+    balls; out of the plane the pose stays nominal, since no reading determines it.
     """
     drawn = design.positions.rotations[k]
     is_seen, inside = ~np.isnan(locations).all(axis=1), np.arange(3) != across
@@ -111,7 +111,7 @@ def _in_plane(
 
 
 def _mean_locations(design: Design, x: Array) -> Array:
-    """Where each ball was seen in each position (k, n, d), NaN where it was not."""
+    """Return the mean location of each ball in each position (k, n, d), NaN without a reading."""
     readings = design.readings
     total = np.zeros((len(design.positions.names), len(design.balls.names), design.dimension))
     count = np.zeros(total.shape[:2])
@@ -150,9 +150,7 @@ def _assemble(locations: Array, nominal: Array, d: int) -> tuple[Array, list[tup
 
 
 def _strength(points: Array, d: int) -> float:
-    """How well points (n, d) fix a pose: 0 if not at all, otherwise their extent across their main
-    line.
-    """
+    """Return the extent of points (n, d) across their main line, 0 if they do not fix a pose."""
     if len(points) < 2:
         return 0.0
     extent = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)
@@ -194,8 +192,8 @@ def _into_frame(
 
 
 def _certified(design: Design, members: Integers) -> tuple[Array, Flags, Flags]:
-    """Places of all balls with their calibrated co-ordinates, which of an artefact's have any, and
-    which of their co-ordinates (n, d) these are.
+    """Return the locations of all balls with their calibrated co-ordinates, the artefact's balls
+    that have any, and a mask (n, d) of these co-ordinates.
     """
     target = design.balls.places.copy()
     is_certified = np.zeros(target.shape, bool)
@@ -216,10 +214,10 @@ def _with_held(
     turn: Array,
     shift: Array,
 ) -> tuple[Array, Array]:
-    """The motion into an artefact's frame that leaves what is held of its first pose nominal,
-    where calibrated co-ordinates fix the rest of the frame.
+    """Return the motion into an artefact's frame that keeps the held parameters of its first pose
+    nominal, if calibrated co-ordinates fix the rest of the frame.
 
-    Nothing moves later what is held: the readings do not show it.
+    Held parameters never move later: the readings do not determine them.
     """
     d, is_held = design.dimension, design.positions.held[position]
     target, _, is_certified = _certified(design, members)

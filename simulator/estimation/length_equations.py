@@ -55,16 +55,15 @@ class NotAMetricError(ValueError):
 
 @dataclass(frozen=True)
 class LengthSolution:
-    """What the length equations give.
+    """Solution of the length equations.
 
-    `factors` (6,) are e1 to e6, `parameters` (6,) the scale errors of X, Y and Z and the squareness
-    errors C0Y, B0Z and A0Z that they amount to, `spread` (6, r) a square root of the covariance of
-    the latter as the scatter about the equations has it, the same for all, NaN without redundancy.
-    `deficiency` and `null` (6, deficiency) tell what of the parameters the equations for everything
-    together leave open. `centres` (positions, 3) has NaN where there is no gauge; `lengths` are
-    those that were unknown. Of factors, centres and lengths, `open_factors`, `open_centres` and
-    `open_lengths` say which have a value only because what is open is held. `scatter` is the root
-    of the sum of squares over the degrees of freedom, in square metres.
+    `factors` (6,) are e1 to e6, `parameters` (6,) the equivalent scale errors of X, Y and Z and
+    squareness errors C0Y, B0Z and A0Z, `spread` (6, r) a square root of the covariance of the
+    latter from the residuals of the equations, NaN without redundancy. `deficiency` and `null` (6,
+    deficiency) are the undetermined directions of the parameters in the equations for all unknowns
+    together. `centres` (positions, 3) is NaN without a gauge; `lengths` are the unknown ones.
+    `open_factors`, `open_centres` and `open_lengths` mark values that depend on held directions.
+    `scatter` is the root of the sum of squares over the degrees of freedom, in square metres.
     """
 
     estimator: LengthEstimator
@@ -91,9 +90,9 @@ def length_estimate(
 ) -> LengthSolution:
     """Solve the length equations of a three-dimensional design for scale readings x (readings, 3).
 
-    Where no length is known, scale errors are relative to their mean.
+    Without a known length, scale errors are relative to their mean.
 
-    :raises NotAMetricError: equations whose solution is no metric.
+    :raises NotAMetricError: equations whose solution is not a metric.
     """
     equations = _equations(design, x)
     unknowns = _start(design, x)
@@ -153,12 +152,12 @@ def length_estimate(
 
 @dataclass(frozen=True)
 class _Equations:
-    """Rows: the difference of both ends or, of a gauge, the place read (m, 3); pivot, or -1, and
+    """Rows: the difference of both ends or, of a gauge, the point read (m, 3); pivot, or -1, and
     length of each.
 
     `direction` (m, 3) is the design's. `known` (m,) are lengths in metres, `free` (m,) numbers of
-    unknown ones, -1 where the length is known. Of each group in `together`, rows and a root (m, r),
-    r rows are made.
+    unknown ones, -1 for a known length. Each group in `together`, rows and a root (m, r), gives r
+    rows.
     """
 
     place: Array
@@ -278,12 +277,12 @@ def _derivative(
 
 
 def _open_directions(equations: _Equations, unknowns: _Unknowns) -> Array:
-    """Orthonormal directions (n, k), in micrometres and parts per million, that the equations leave
-    open.
+    """Return orthonormal undetermined directions (n, k) of the equations, in micrometres and parts
+    per million.
 
     They are those of a machine without errors that reads without noise in the design's directions.
-    What else equations seem to tell of them leads astray: where no length is known, all of them
-    hold if all lengths are zero.
+    Other information in the equations is spurious: without a known length, all of them hold if all
+    lengths are zero.
     """
     _, length = _differences(equations, unknowns)
     exact = equations.direction * length[:, None]
@@ -300,7 +299,7 @@ def _solved(
     columns: np.ndarray,
     held_directions: Array | None = None,
 ) -> tuple[_Unknowns, Array, int, bool]:
-    """Least squares over some of the unknowns: where it ends, a square root (n, rank) of (J'J)^+,
+    """Return least-squares values of some unknowns, a square root (n, rank) of (J'J)^+, and the
     iterations.
     """
     unknowns, previous = start, np.inf

@@ -19,8 +19,8 @@ from .elimination import Factor, eliminate
 @dataclass(frozen=True, eq=False)
 class LinearFunctions:
     """Derivatives of m functions: `shared` (m, s) by the shared parameters, `balls` (m, n, d) by
-    those of all balls, None where no ball has a part in them; `drawn` are the same at the design
-    nominal, None where these are.
+    those of all balls, if any ball contributes; `drawn` are the same for the nominal design, if
+    that differs.
     """
 
     shared: Array
@@ -32,10 +32,10 @@ class LinearFunctions:
 class Linearisation:
     """A design at a `state`, with its `factor` and `spectrum` there.
 
-    Square roots of covariances are in units of the standard deviation of a unit-weight observation.
-    After a fit what is undetermined is what the design leaves open as it is drawn: `drawn` then is
-    the linearisation there, at whose state functions are looked at to see whether a null direction
-    changes them. It is None where that is this one.
+    Square roots of covariances are in units of the standard deviation of a unit-weight
+    observation. After a fit, the undetermined directions are those of the nominal design: `drawn`
+    is then the linearisation there, at whose state functions are tested for changes along null
+    directions.
     """
 
     design: Design
@@ -60,7 +60,7 @@ class Linearisation:
 
     @property
     def as_drawn(self) -> Linearisation:
-        """The linearisation whose null directions tell what is undetermined."""
+        """The linearisation whose null directions are the undetermined ones."""
         return self.drawn or self
 
     @cached_property
@@ -75,14 +75,14 @@ class Linearisation:
 
     @cached_property
     def balls(self) -> BallCovariance:
-        """Square root of the covariance of the balls; it takes most of the time, and is made when
-        it is asked for.
+        """Square root of the covariance of the balls, computed on request, since it takes most of
+        the time.
         """
         return ball_covariance(self.design, self.factor, self.spectrum)
 
     @property
     def ball_null(self) -> Array:
-        """How undetermined directions move the balls, (n, d, deficiency)."""
+        """Motions of the balls along undetermined directions, (n, d, deficiency)."""
         return self.as_drawn.balls.null
 
     def of_shared(self, rows: Array, drawn: Array | None = None) -> Array:
@@ -108,14 +108,14 @@ class Linearisation:
         return blank(values, change, np.sqrt(size))
 
     def covariance(self, functions: LinearFunctions, other_functions: LinearFunctions) -> Array:
-        """Covariances (m, k) of functions with others, what is undetermined left out."""
+        """Return covariances (m, k) of functions with others, without undetermined directions."""
         first, second = self._root(functions), self._root(other_functions)
         width = min(first.shape[1], second.shape[1])
         return np.asarray(first[:, :width] @ second[:, :width].T)
 
     def _root(self, functions: LinearFunctions) -> Array:
-        """Derivatives (m, r) by standard normal variables: those of what is shared, of kept balls,
-        of each ball.
+        """Return derivatives (m, r) by standard normal variables: shared ones, those of kept
+        balls, those of each ball.
         """
         common = functions.shared @ self.shared
         if functions.balls is None:

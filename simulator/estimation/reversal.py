@@ -38,19 +38,19 @@ class UndeterminedError(ValueError):
 
 @dataclass(frozen=True, eq=False)
 class Reversal:
-    """What the first-order equations give for n balls; angles in radians, lengths in metres.
+    """Solution of the first-order equations for n balls; angles in radians, lengths in metres.
 
-    `offset` (2,) is zero where it is no parameter. `residuals` (n, 2) are the readings of the first
-    position less what those of the second predict; `sigma` is their root mean square over
-    `degrees_of_freedom`, NaN without any. The error of two readings is in each, so that a single
-    reading scatters by sigma / sqrt(2). `coordinates` (n, 2) are the balls along the machine's axes
-    in the first position, up to a shift: the mean of both positions, corrected.
+    `offset` (2,) is zero if it is not a parameter. `residuals` (n, 2) are the readings of the
+    first position less their prediction from the second; `sigma` is their root mean square over
+    `degrees_of_freedom`, NaN without any. Each contains the errors of two readings, so that the
+    standard deviation of one is sigma / sqrt(2). `coordinates` (n, 2) are the balls along the
+    machine's axes in the first position, up to a shift: the mean of both positions, corrected.
 
-    `neglected` (n, 2) is what the first-order equations leave out, up to a shift. It is taken at
-    the parameters with which nothing is left out; `exact_beta`, `exact_coordinates` (n, 2) and
-    `exact_offset` (2,) are theirs, and `scatter` the standard deviation of a reading about them,
-    which `sigma` overstates where much is neglected. `bias` is the most that neglecting it changes
-    any parameter or co-ordinate by, in standard uncertainties.
+    `neglected` (n, 2) are the terms beyond first order, up to a shift, at the parameters of the
+    complete equations; `exact_beta`, `exact_coordinates` (n, 2) and `exact_offset` (2,) are
+    theirs, and `scatter` the standard deviation of a reading about them, which `sigma` overstates
+    if much is neglected. `bias` is the largest effect of neglecting them on a parameter or
+    co-ordinate, in standard uncertainties.
     """
 
     alpha: float
@@ -89,12 +89,12 @@ def turn_between(first: Array, second: Array) -> float:
 
 @single_threaded
 def reverse(first: Array, second: Array, scale: Scale, offsets: bool = True) -> Reversal:
-    """Fit readings (n, 2) of the same balls in two positions, the second about 90 degrees clockwise
-    from the first.
+    """Fit readings (n, 2) of the same balls in two positions, the second about 90 degrees
+    clockwise from the first.
 
-    `scale` states which axis takes the scale difference when co-ordinates are corrected. With
-    "none" neither does; it is fitted all the same, as the report does. Without `offsets` both
-    positions have to be read from the same ball.
+    `scale` states which axis takes the scale difference in corrected co-ordinates. With "none"
+    neither does; it is still fitted, as in the report. Without `offsets` both positions must be
+    read from the same ball.
 
     :raises UndeterminedError: the balls lie on one line.
     """
@@ -115,8 +115,8 @@ def reverse(first: Array, second: Array, scale: Scale, offsets: bool = True) -> 
     weights = np.array([size, size, size, 1.0, 1.0])[: rows.shape[1]]
 
     def solved(neglected: Array) -> tuple[Array, Array, Array, float]:
-        """Parameters, the offset (2,), residuals (n, 2) and sigma with what is neglected (n, 2)
-        taken out.
+        """Return parameters, the offset (2,), residuals (n, 2) and sigma without the neglected
+        terms (n, 2).
         """
         aim = wanted - neglected.T.ravel()
         solution = np.linalg.lstsq(rows / weights, aim, rcond=None)[0] / weights
@@ -161,13 +161,13 @@ def reverse(first: Array, second: Array, scale: Scale, offsets: bool = True) -> 
 
 
 def _bias(neglected: Array, offset: Array, sigma: float) -> float:
-    """Most that neglecting terms (n, 2) changes any parameter or co-ordinate by, in its own
+    """Return the largest effect of neglected terms (n, 2) on a parameter or co-ordinate, in its
     standard uncertainties.
 
     A linear function of the readings with the coefficients l has the standard uncertainty s |l|, s
-    = sigma / sqrt(2), and changes by no more than |l| |n| where the readings change by n: no more
-    than |n| / s for any. A shift of all is no part of n, so that what the offset changes by is told
-    apart; (2,), or (0,) without, for coefficients of length 1.
+    = sigma / sqrt(2), and changes by at most |l| |n| if the readings change by n: at most |n| / s.
+    A common shift is excluded from n, and the change of the offset is separate: (2,), or (0,)
+    without, for coefficients of length 1.
     """
     sigma = max(sigma, float(np.sqrt(2.0)) * FINEST)
     size = max(float(np.sqrt(2.0 * (neglected**2).sum())), float(offset.max(initial=0.0)))
@@ -189,7 +189,7 @@ def _corrected(x: Array, scale: Scale, alpha: float, gamma: float) -> Array:
 
 
 def _left_out(alpha: float, beta: float, gamma: float) -> Array:
-    """What A B^-1 A^-1 (2, 2) has beside its first-order terms."""
+    """Return A B^-1 A^-1 (2, 2) without its first-order terms."""
     inverse = _corrected(np.eye(2), "split", alpha, gamma).T
     c, s = np.cos(beta), np.sin(beta)
     exact = np.linalg.inv(inverse) @ np.array([[-s, -c], [c, -s]]) @ inverse

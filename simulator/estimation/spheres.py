@@ -1,5 +1,5 @@
 """Spheres through points: for the pivot of a Bryan gauge and the length of its bar, and for balls
-of which a report has points on the surface only.
+reported as points on their surface.
 """
 
 from __future__ import annotations
@@ -35,8 +35,7 @@ def fit_sphere(points: Array, near: Array) -> tuple[Array, float]:
 
 @dataclass(frozen=True)
 class SphereFit:
-    """The sphere closest to points: its `centre` (3,) and radius in metres, and what the points
-    leave.
+    """The sphere closest to points: its `centre` (3,) and radius in metres, and residuals.
 
     `residuals` (m,) are distances from it, and `cofactor` (3, 3) times the variance of a point is
     the covariance of the centre.
@@ -54,11 +53,11 @@ class SphereFit:
 
 
 def closest_sphere(points: Array) -> SphereFit | None:
-    """The sphere whose distances from points (m, 3) have the smallest sum of squares; None where
-    the points lie about in a plane, or are fewer than five.
+    """Return the sphere whose distances from points (m, 3) have the smallest sum of squares,
+    unless the points are nearly in a plane, or fewer than five.
 
-    Gauss and Newton's steps from the sphere of `fit_sphere`; an error of the points turns normals
-    by next to nothing, so that a few are enough.
+    Gauss-Newton steps start from the sphere of `fit_sphere`; errors of the points hardly turn
+    normals, so that a few suffice.
     """
     if len(points) < FEWEST_POINTS:
         return None

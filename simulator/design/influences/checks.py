@@ -1,5 +1,5 @@
-"""What a kind of influence quantity must keep to, checked where it is laid out: its parameters, and
-at a few readings what it adds to them.
+"""Checks of a class of influence quantity when it is laid out: its parameters, and its shifts at a
+few readings.
 """
 
 from __future__ import annotations
@@ -25,12 +25,12 @@ DERIVATIVE = 1e-3
 
 
 def few(count: int) -> Integers:
-    """Indices of a few of so many readings, spread over all."""
+    """Return a few indices spread over `count` readings."""
     return np.unique(np.linspace(0, max(count - 1, 0), min(count, FEW)).astype(np.int64))
 
 
 def wrong_of_parameters(parameters: tuple[InfluenceParameter, ...], positions: int) -> str:
-    """Faults of parameters where there are so many positions; empty if nothing is."""
+    """Return faults of parameters for `positions` positions; possibly empty."""
     return next(iter(_of_parameters(parameters, positions)), "")
 
 
@@ -70,10 +70,10 @@ def wrong_of_shifts(
     at: Disturbed,
     again: Callable[[InfluenceSettings], Influence],
 ) -> str:
-    """Faults of shifts and their derivatives at readings `at`; empty if nothing is.
+    """Return faults of shifts and their derivatives at readings `at`; possibly empty.
 
-    Where a number among the settings is the value of a parameter, the influence is made `again`
-    with others, and the derivative compared with differences. Other derivatives are not.
+    If a number in the settings is the value of a parameter, the influence is built `again` with
+    other values, and the derivative compared with differences. Other derivatives are not checked.
     """
     shift, derivative = influence.shifts(at)
     m, d, p = *at.x.shape, len(influence.parameters)
@@ -117,7 +117,7 @@ def wrong_of_shifts(
 
 
 def _stated(settings: InfluenceSettings, influence: Influence) -> Iterator[tuple[str, int]]:
-    """Settings that are numbers, with the parameters that have them as values."""
+    """Return numeric settings with the parameters whose values they are."""
     for key in type(settings).model_fields:
         value = getattr(settings, key)
         if isinstance(value, float):
@@ -127,7 +127,7 @@ def _stated(settings: InfluenceSettings, influence: Influence) -> Iterator[tuple
 
 
 def _differ_in_value_only(one: Influence, other: Influence, k: int) -> bool:
-    """True if two influences have the same parameters except the value of one of them."""
+    """True if two influences have the same parameters except the value of one."""
     if len(one.parameters) != len(other.parameters):
         return False
     value = one.parameters[k].value

@@ -20,9 +20,9 @@ Level = Literal["position", "probe", "ball"]
 
 @dataclass(frozen=True)
 class SharedDisplacements(Influence):
-    """Displacements of balls, or of tips, which are those of balls the other way round.
+    """Displacements of balls, or of tips, which are those of balls with the opposite sign.
 
-    `place` has the number of each by the indices of its `levels`, -1 without one.
+    `place` has the index of each by the indices of its `levels`, -1 without one.
     """
 
     levels: tuple[Level, ...]

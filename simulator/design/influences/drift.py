@@ -1,9 +1,9 @@
 """Drift of the scale readings over a campaign, linear in time: of the reference point along each
 axis, and of the scales.
 
-What the scales say grows by c t along an axis and by s t x along with x, where t is the time from
-the mean of all readings on: the machine is described as it is then. The time is that of the file of
-readings where it has one, else what the readings take in their order.
+Scale readings grow by c t along an axis and by s t x along with x, where t is the time from the
+mean of all readings: the machine is described at that time. The time is that of the file of
+readings if it has one, otherwise the duration of the readings in their order.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ LEAST_HOURS = 1e-3
 
 
 class PointDriftSettings(Settings):
-    """How the reference point drifts along an axis."""
+    """Drift of the reference point along an axis."""
 
     value: LengthDrift = Field(0.0, description="by how much readings grow; default 0 um/h")
     standard_uncertainty: LengthDrift | None = Field(
@@ -50,7 +50,7 @@ class PointDriftSettings(Settings):
 
 
 class ScaleDriftSettings(Settings):
-    """How lengths that the scales say drift."""
+    """Drift of lengths that the scales indicate."""
 
     value: RatioDrift = Field(0.0, description="by how much they grow; default 0 ppm/h")
     standard_uncertainty: RatioDrift | None = Field(
@@ -59,7 +59,7 @@ class ScaleDriftSettings(Settings):
 
 
 class DriftTimesSettings(Settings):
-    """How long readings take where a file has no times of theirs."""
+    """Duration of readings for a file without times."""
 
     set_up: Duration = Field(0.0, description="before each position; default 0 s")
     reading: Duration = Field(15.0, description="of a reading of a ball; default 15 s")
@@ -95,7 +95,7 @@ class DriftSettings(InfluenceSettings):
     )
 
     def check(self, steps: Steps, positions: Mapping[str, str], references: References) -> None:
-        """Report that nothing drifts, unknown names, wrong lengths of lists and negative
+        """Report a drift without rates, unknown names, lists of another length and negative
         uncertainties.
         """
         references.require(
@@ -150,9 +150,8 @@ class DriftSettings(InfluenceSettings):
 
 @dataclass(frozen=True)
 class Clock:
-    """When readings are made, in seconds: how long set-ups and changes of probe take and, by
-    position, what a reading takes and when the first begins, NaN where that follows from what comes
-    before.
+    """Times of readings in seconds: durations of set-ups and changes of probe and, by position,
+    the duration of a reading and the begin of the first, NaN if that follows from earlier ones.
     """
 
     set_up: float
@@ -161,7 +160,7 @@ class Clock:
     starts: tuple[float, ...]
 
     def hours(self, readings: Readings) -> Array:
-        """Time (m,) of all readings in their order from the mean of them on, in hours."""
+        """Return the times (m,) of all readings in their order, from their mean, in hours."""
         beside = readings.beside or {}
         seconds = beside.get(TIME, np.full(len(readings), np.nan))
         if np.isnan(seconds).any():
@@ -192,8 +191,8 @@ def even_clock(positions: int) -> Clock:
 
 @dataclass(frozen=True)
 class Drift(Influence):
-    """Drifts by a clock; `parts` (p,) tell the axis of each parameter, -1 for all, and whether it
-    is of a scale.
+    """Drifts by a clock; `parts` (p,) are the axes of parameters, -1 for all, and flags of
+    scales.
     """
 
     clock: Clock
@@ -211,7 +210,7 @@ class Drift(Influence):
 
     @property
     def column(self) -> str:
-        """Where the hours of its clock stand beside readings."""
+        """Name of the column with the hours of its clock."""
         return f"hours by {self.clock}"
 
     def in_sequence(self, readings: Readings) -> Mapping[str, Array]:
@@ -219,7 +218,7 @@ class Drift(Influence):
         return {self.column: self.clock.hours(readings)}
 
     def shifts(self, at: Disturbed) -> tuple[Array, Array]:
-        """What the scales say too much is taken off, and so locations grow with it."""
+        """Return the shifts: the excess of the scales is subtracted, so locations grow with it."""
         m, d = at.x.shape
         hours = at.column(self.column)
         derivative = np.zeros((m, d, len(self.parts)))

@@ -1,7 +1,7 @@
-"""All kinds of influence quantities that a file may state.
+"""All influence quantities that a file may state.
 
-A further kind of the kernel is a file beside these, with its settings and what these come to in a
-design, and one line in `INFLUENCES`; extensions have their own.
+A further one of the kernel is a file here, with its settings and its effect in a design, and one
+line in `INFLUENCES`; extensions have their own.
 """
 
 from __future__ import annotations

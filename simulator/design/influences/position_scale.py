@@ -36,7 +36,7 @@ LEAST_EXTENT = 1e-3
 
 
 class PositionScaleSettings(InfluenceSettings):
-    """How much scales differ from position to position."""
+    """Variation of scales from position to position."""
 
     kind: Literal["position scale"] = Field(description="scale error of each position")
     standard_uncertainty: Ratio | None = Field(
@@ -84,8 +84,8 @@ class PositionScaleSettings(InfluenceSettings):
 
 @dataclass(frozen=True)
 class PositionScale(Influence):
-    """Scales of positions; `place` (k, d) is that of the parameter of each position and axis, -1
-    without one.
+    """Scales of positions; `place` (k, d) is the parameter index of each position and axis,
+    or -1.
     """
 
     place: Integers

@@ -38,7 +38,7 @@ NOWHERE = (
 
 
 class ProbingSettings(InfluenceSettings):
-    """How much farther along their styli probes find balls."""
+    """Distance by which probes find balls too far along their styli."""
 
     kind: Literal["probing"] = Field(description="probing error along the stylus")
     value: Length = Field(
@@ -61,7 +61,7 @@ class ProbingSettings(InfluenceSettings):
     )
 
     def check(self, steps: Steps, positions: Mapping[str, str], references: References) -> None:
-        """Report unknown probes, directions that are none and uncertainties below zero."""
+        """Report unknown probes, invalid directions and negative uncertainties."""
         if self.probes is not None:
             references.are_probes(self.probes, (*steps, "probes"))
         for name, direction in (self.directions or {}).items():
@@ -114,7 +114,7 @@ class ProbingSettings(InfluenceSettings):
 @dataclass(frozen=True)
 class Probing(Influence):
     """Probing errors; `directions` (l, d) are those of the probes' styli, zero for probes without
-    one, and `place` (l,) is that of each probe's own parameter, -1 without one.
+    one, and `place` (l,) is the index of each probe's parameter, or -1.
     """
 
     directions: Array

@@ -1,9 +1,9 @@
-"""What a kind of influence quantity is: parameters with what is known of them, and what they add to
+"""Protocol of an influence quantity: parameters with prior knowledge, and their effect on
 readings.
 
 A reading obeys T(x, a, p) = R y + o + s(e) + noise, where s is linear in the influence parameters
 e about their stated values. The derivatives of s by poses, balls and readings are neglected: they
-are smaller than those of R y by the ratio of s to the places themselves, 1e-4 at most.
+are smaller than those of R y by the ratio of s to the co-ordinates, 1e-4 at most.
 """
 
 from __future__ import annotations
@@ -29,11 +29,10 @@ class InfluenceParameter:
     """A parameter of an influence quantity: `value` with its standard `uncertainty`, both in
     `unit`.
 
-    An uncertainty of zero makes it a constant, an infinite one a free parameter. `effect` is what
-    a unit of it displaces readings by, in metres, where it does most. `position` is the index of
-    the position that it is of alone, -1 where it is of several.
-    Parameters of the same `component` are alike: values drawn from one distribution, the variance
-    of which can be estimated from them.
+    An uncertainty of zero makes it a constant, an infinite one a free parameter. `effect` is the
+    largest displacement of readings by one unit, in metres. `position` is the index of its only
+    position, -1 for several. Parameters of the same `component` are values drawn from one
+    distribution, whose variance can be estimated from them.
     """
 
     name: str
@@ -47,8 +46,8 @@ class InfluenceParameter:
 
 @dataclass(frozen=True)
 class DesignParts:
-    """What an influence quantity is laid out for; `readings` are those planned. Names of files
-    begin in `folder`.
+    """Parts of a design that an influence quantity is laid out for; `readings` are the planned
+    ones. File names are relative to `folder`.
     """
 
     machine: Machine
@@ -62,12 +61,12 @@ class DesignParts:
 
 @dataclass(frozen=True)
 class Disturbed:
-    """Readings (m,) that are disturbed, where they are made.
+    """Disturbed readings (m,).
 
     `ball`, `position` and `probe` are indices (m,), `x` (m, d) the scale readings, `places` (m, d)
-    those of the balls in their artefact's frame, `rotations` (m, d, d) from there into the
-    machine's axes, and `offsets` (m, d) of the probes' tips, all in metres. `beside` has further
-    values (m,) of the readings by the names of their columns, `order` among them.
+    the balls in their artefact's frame, `rotations` (m, d, d) from there into the machine's axes,
+    and `offsets` (m, d) of the probes' tips, all in metres. `beside` has further columns (m,) by
+    name, `order` included.
     """
 
     ball: Integers
@@ -81,13 +80,13 @@ class Disturbed:
 
     @property
     def arms(self) -> Array:
-        """Places (m, d) of the balls about the origin of their artefact, along the machine's
+        """Locations (m, d) of the balls about the origin of their artefact, along the machine's
         axes.
         """
         return np.asarray(np.einsum("mij,mj->mi", self.rotations, self.places))
 
     def column(self, name: str) -> Array:
-        """Values (m,) of a column, NaN where a reading has none."""
+        """Return values (m,) of a column, NaN for readings without one."""
         return self.beside.get(name, np.full(len(self.ball), np.nan))
 
 
@@ -96,8 +95,8 @@ class Influence(ABC):
 
     @property
     def columns(self) -> Mapping[str, Mapping[str, Fraction]]:
-        """Columns of a file of readings that it asks for, with the units that each may have; what
-        a reading has there is a `column` of `Disturbed`.
+        """Columns of a file of readings that it uses, with the permitted units of each; the values
+        of a reading are a `column` of `Disturbed`.
         """
         return {}
 
@@ -112,30 +111,30 @@ class Influence(ABC):
 
     @abstractmethod
     def shifts(self, at: Disturbed) -> tuple[Array, Array]:
-        """What is added to the locations of readings at the stated values (m, d), and its
+        """Return the shifts of the locations of readings at the stated values (m, d), and their
         derivative by the parameters (m, d, p), in metres.
         """
 
 
 def or_unknown(uncertainty: float | None) -> float:
-    """A standard uncertainty, infinite where none is stated: nothing is known then."""
+    """Return a standard uncertainty, infinite if none is stated."""
     return np.inf if uncertainty is None else uncertainty
 
 
 class InfluenceSettings(Settings):
-    """Settings of one kind of influence quantity, with a `kind` of its own.
+    """Settings of one influence quantity, with a `kind` of its own.
 
-    Where it is `in_order` it depends on when readings are made: a plan chooses without it.
+    If it is `in_order` it depends on the time of readings: a plan chooses without it.
     """
 
     in_order: ClassVar[bool] = False
 
     def check(self, steps: Steps, positions: Mapping[str, str], references: References) -> None:
-        """Report faults of them where `positions` are names with those of their artefacts."""
+        """Report faults, given `positions`: names with those of their artefacts."""
 
     def influence(self, design: DesignParts) -> Influence:
-        """The influence quantity in a design.
+        """Return the influence quantity in a design.
 
-        :raises ValueError: the design does not say what it needs.
+        :raises ValueError: the design lacks data that it needs.
         """
         raise NotImplementedError

@@ -1,5 +1,5 @@
-"""Re-indexing of an articulating head: each time it turns to another probe, the tip comes to rest
-elsewhere by a little.
+"""Re-indexing of an articulating head: each turn to another probe brings the tip to rest at a
+slightly different point.
 
 Between two turns all readings have the same shift. In each position the head turns to each of its
 probes once, so that there is one shift for each position and probe: x + e(x, a, p + s) = R y + o.
@@ -23,7 +23,7 @@ from .protocol import DesignParts, InfluenceSettings, or_unknown
 
 
 class ReindexingSettings(InfluenceSettings):
-    """How well an articulating head comes back to the same place."""
+    """Repeatability of an articulating head."""
 
     kind: Literal["re-indexing"] = Field(description="re-indexing of an articulating head")
     standard_uncertainty: Length | None = Field(

@@ -1,9 +1,9 @@
-"""Reproducibility: readings that have something in common, such as their position and their ball,
-are displaced together.
+"""Reproducibility: readings that share something, such as their position and their ball, are
+displaced together.
 
-Of readings repeated in one go the repeatability is what they scatter by; from one position, probe
-or ball to the next more may change. There is one displacement for each combination of what is
-stated, drawn anew along each axis: a ball at R y + o is found at R y + o + v.
+Repeatability is the standard deviation of readings repeated without a break; from one position,
+probe or ball to the next more may change. Each combination of the stated levels has one
+displacement, drawn separately along each axis: a ball at R y + o is found at R y + o + v.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from .protocol import DesignParts, InfluenceSettings
 
 
 class ReproducibilitySettings(InfluenceSettings):
-    """How well readings agree beyond their repeatability."""
+    """Standard deviation of readings beyond their repeatability."""
 
     kind: Literal["reproducibility"] = Field(description="displacements that readings share")
     each: NonEmpty[Level] = Field(
@@ -36,8 +36,8 @@ class ReproducibilitySettings(InfluenceSettings):
     )
 
     def check(self, steps: Steps, positions: Mapping[str, str], references: References) -> None:
-        """Report what stands there twice, displacements that nobody can see, and an uncertainty
-        below zero.
+        """Report duplicates, displacements without effect on the readings, and negative
+        uncertainties.
         """
         references.require(
             len(set(self.each)) == len(self.each),

@@ -1,9 +1,9 @@
 """Sag of a plate on its supports under its own weight.
 
-A ball that is at y in its plate's frame without weight is at R (y + A f(y) (g n) n) + o, where n is
-the plate's normal, g the direction of gravity in the plate's frame, and A f(y) what the plate sags
-by with its normal up. A plate that stands does not sag; with its normal down it sags the other way
-in its own frame. What is linear in y is part of the pose.
+A ball at y in its plate's frame without weight is at R (y + A f(y) (g n) n) + o, where n is the
+plate's normal, g the direction of gravity in the plate's frame, and A f(y) the sag with the normal
+up. An upright plate does not sag; with its normal down it sags the other way in its own frame.
+Terms linear in y belong to the pose.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ Direction = Literal["x", "y", "z", "-x", "-y", "-z"]
 
 
 class TermSettings(Settings):
-    """A term of a polynomial in the places of balls, about the middle of the plate."""
+    """A term of a polynomial in the co-ordinates of balls, about the middle of the plate."""
 
     factor: float = Field(1.0, description="how large the term is beside others; default 1")
     x: Annotated[int, Field(ge=0, le=12)] = Field(0, description="power of x; default 0")
@@ -78,7 +78,9 @@ class SagSettings(InfluenceSettings):
     )
 
     def check(self, steps: Steps, positions: Mapping[str, str], references: References) -> None:
-        """Report unknown names, two shapes at once, wrong files, and what does not bend."""
+        """Report unknown names, two shapes at once, invalid files, and artefacts that do not
+        bend.
+        """
         name = references.artefact(self.artefact, steps)
         d = references.dimension
         references.is_not_negative(self.standard_uncertainty, (*steps, "standard_uncertainty"))
@@ -132,8 +134,8 @@ class SagSettings(InfluenceSettings):
 
 @dataclass(frozen=True)
 class Sag(Influence):
-    """A `shape` (n,) over all balls, 1 where it is largest, the direction `down` (d,) of gravity in
-    the machine, and the largest sag.
+    """A `shape` (n,) over all balls, 1 at its largest, the direction `down` (d,) of gravity in the
+    machine, and the largest sag.
     """
 
     shape: Array
@@ -154,9 +156,9 @@ class Sag(Influence):
 def _shape(
     settings: SagSettings, names: tuple[str, ...], places: Array, d: int, folder: Path
 ) -> Array:
-    """What balls (n,) at `places` (n, d) of the plate sag by, in any unit.
+    """Return the sag of balls (n,) at `places` (n, d) of the plate, in any unit.
 
-    :raises ExperimentError: a file of values is wrong, or not one of these balls.
+    :raises ExperimentError: a file of values is invalid, or of other balls.
     """
     if settings.values is not None:
         return _values(folder / settings.values, names)

@@ -1,10 +1,9 @@
-"""Temperature of artefacts and scales: both expand from a reference temperature on.
+"""Temperature of artefacts and scales: both expand from a reference temperature.
 
-A ball at y in its artefact's frame is at R (1 + b t) y + o, and a scale reading x stands for x (1
-+ c s), where b and c are coefficients of thermal expansion and t and s what artefact and scales
-are above the reference temperature. Products of the errors of a coefficient and of a temperature
-are neglected. A file of readings may have temperatures of each reading instead of those of its
-position.
+A ball at y in its artefact's frame is at R (1 + b t) y + o, and a scale reading x means x (1 + c
+s), where b and c are coefficients of thermal expansion and t and s the excess of artefact and
+scales over the reference temperature. Products of the errors of a coefficient and of a temperature
+are neglected. A file of readings may have temperatures of each reading instead of its position's.
 """
 
 from __future__ import annotations
@@ -62,7 +61,7 @@ class ExpansionSettings(Settings):
 
 
 class MeasuredSettings(Settings):
-    """A temperature as it is measured in every position that states no other."""
+    """A temperature measured in every position without a temperature of its own."""
 
     value: Forms[Temperature, NonEmpty[Temperature], Temperature] = Field(
         description="temperature, of scales also a list with one for each axis"
@@ -113,7 +112,7 @@ class TemperaturesSettings(InfluenceSettings):
     )
 
     def check(self, steps: Steps, positions: Mapping[str, str], references: References) -> None:
-        """Report unknown names, an expansion without a temperature, lists of wrong length and
+        """Report unknown names, an expansion without a temperature, lists of another length and
         negative uncertainties.
         """
         if self.artefact is not None:
@@ -302,12 +301,12 @@ class TemperaturesSettings(InfluenceSettings):
 
 @dataclass(frozen=True)
 class Part:
-    """What expands as one: the artefact, all scales, or the scale of an `axis` from 0 on.
+    """A part that expands as one: the artefact, all scales, or the scale of an `axis` from 0.
 
     `differences` (k,) are its temperatures in all positions above the reference; `expansion` is
     the coefficient. `coefficient`, `sensor` and `errors` (k,), -1 for positions without one, are
-    the places of its parameters among all; scales that are measured together share them.
-    `columns` have its temperatures, the last that a reading has counting.
+    the indices of its parameters; scales measured together share them. `columns` have its
+    temperatures; of several, the last that a reading has counts.
     """
 
     axis: int
@@ -340,8 +339,8 @@ class Temperatures(Influence):
         return {name: UNITS for part in self.parts for name in part.columns}
 
     def shifts(self, at: Disturbed) -> tuple[Array, Array]:
-        """Location and derivative: an artefact's expansion moves balls, and that of scales is
-        taken off, since the scales say too little by it.
+        """Return location and derivative: an artefact's expansion moves balls, and that of scales
+        is subtracted, since the scales read too little by it.
         """
         shift = np.zeros(at.x.shape)
         derivative = np.zeros((*at.x.shape, len(self.parameters)))
@@ -375,10 +374,10 @@ def _parts(
     reach: float,
     positions: Sequence[str],
 ) -> Iterator[Part]:
-    """What expands as one, each with `parameters` added to those of all.
+    """Return the parts that expand as one, each with `parameters` appended to those of all.
 
-    `expansions` and `differences` (a, k) have one row for each axis where they are stated so, else
-    one for all. `reach` is how far they go, in metres.
+    `expansions` and `differences` (a, k) have one row per axis if stated so, otherwise one for
+    all. `reach` is their extent in metres.
     """
 
     def add(words: str, unit: Unit, value: float, u: float, effect: float, k: int = -1) -> int:
@@ -423,7 +422,7 @@ def _check_uncertainties(setting: object, steps: Steps, references: References) 
 
 
 def _one_by_one(settings: Iterable[tuple[Steps, object]]) -> Iterator[tuple[Steps, object]]:
-    """Paths and what is stated there, lists taken apart."""
+    """Yield paths and stated values, lists split."""
     for path, value in settings:
         if isinstance(value, tuple):
             yield from (((*path, i), item) for i, item in enumerate(value))

@@ -1,1 +1,1 @@
-"""Kinds of observations: one file each, entered in `kinds`."""
+"""Classes of observations: one file each, entered in `kinds`."""

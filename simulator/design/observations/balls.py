@@ -14,7 +14,7 @@ from .whitening import EXACT
 
 
 class BallObservations(Observations):
-    """Observations that are functions of the `balls` (m, k) of each, whatever the poses and the
+    """Observations that are functions of the `balls` (m, k) of each, independent of poses and
     machine.
     """
 

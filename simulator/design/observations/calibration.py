@@ -1,4 +1,4 @@
-"""What items of calibration have in common: their values in files, and their observations."""
+"""Common base of calibration items: their values in files, and their observations."""
 
 from __future__ import annotations
 
@@ -26,11 +26,10 @@ MOST_TIED_BALLS = 3000
 
 @dataclass(frozen=True)
 class CertifiedValue:
-    """A value that a certificate states: its item's path, what it is of, and value and standard
+    """A value stated in a certificate: its item's path, its subject, and value and standard
     uncertainty in `unit`.
 
-    `is_pair`: the two names are balls, in either order. `drawn` is what the drawing has for a
-    length, otherwise None.
+    `is_pair`: the two names are balls, in either order. `drawn` is the nominal value of a length.
     """
 
     item: str
@@ -44,7 +43,7 @@ class CertifiedValue:
 
     @property
     def key(self) -> tuple[str, str, str]:
-        """What tells this value from all others."""
+        """Key that identifies this value."""
         names = sorted((self.first, self.second)) if self.is_pair else (self.first, self.second)
         return self.item, names[0], names[1]
 
@@ -53,9 +52,9 @@ class Calibration(ABC):
     """An item of calibration of one `kind`; a frozen dataclass with the `values` (m, ...) that it
     states, nominal unless `certified`.
 
-    `artefact` is empty where values are of the machine; their observations have no balls then.
-    `are_lengths`: values are distances between two balls, named in either order. `root` is that of
-    the covariance of its values, None where they are uncorrelated.
+    `artefact` is empty for values of the machine; their observations have no balls. `are_lengths`:
+    values are distances between two balls, named in either order. `root` is that of the covariance
+    of its values, absent if they are uncorrelated.
     """
 
     artefact: str
@@ -70,12 +69,12 @@ class Calibration(ABC):
 
     @property
     def size(self) -> int:
-        """How much it states."""
+        """Number of stated values."""
         return len(self._values)
 
     @property
     def subject(self) -> str:
-        """What its values are of, as text."""
+        """Subject of its values, as text."""
         return self.artefact or "the machine"
 
     def observed(self, first: int) -> Observations:
@@ -87,11 +86,11 @@ class Calibration(ABC):
         raise NotImplementedError
 
     def doubt(self, layout: BallLayout) -> str:
-        """Faults of values that are each possible; empty if nothing is."""
+        """Improbable combinations of values that are each possible; possibly empty."""
         return ""
 
     def certified_values(self, layout: BallLayout) -> Iterator[CertifiedValue]:
-        """What it states, beside what the drawing has for lengths."""
+        """Return its values, with nominal ones of lengths."""
         observed = self.observed(0)
         drawn = [None] * len(observed)
         if self.are_lengths and isinstance(observed, BallObservations):
@@ -116,7 +115,7 @@ class Calibration(ABC):
         return cast(Self, replace(cast(Any, self), values=values, certified=True))
 
     def times_as_uncertain(self, factor: float) -> Self:
-        """The same with so many times the standard uncertainties."""
+        """Return the same with `times` the standard uncertainties."""
         changed = {
             name: factor * value
             for name, value in vars(self).items()
@@ -132,7 +131,7 @@ class Calibration(ABC):
 
 
 def far_from_drawing(certified: float, drawn: float) -> str:
-    """Say that a certified length is not that of the drawing."""
+    """Return a message about a certified length far from nominal."""
     return (
         f"{1e3 * certified:.6g} mm is far from the {1e3 * drawn:.6g} mm of the artefact's drawing"
     )

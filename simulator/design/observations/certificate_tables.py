@@ -30,8 +30,8 @@ def read_rows(
     steps: Steps,
     references: References,
 ) -> tuple[tuple[FileRow, ...], list[Array]] | None:
-    """Rows of a CSV file, and the standard uncertainties of each row's `lengths`, NaN without any;
-    None after reporting faults.
+    """Return rows of a CSV file, and the standard uncertainties of each row's `lengths`, NaN
+    without any; or report faults.
     """
     problems = references.problems
     columns_allowed = [f"{length}_{name}" for name in (STANDARD, EXPANDED) for length in lengths]
@@ -83,7 +83,7 @@ def read_rows(
 
 
 def is_right_factor(text: str, extra: dict[str, float], columns_of_row: list[str]) -> bool:
-    """True if a coverage factor stands beside an expanded uncertainty, or there is none."""
+    """True if an expanded uncertainty has a coverage factor, and a standard one has none."""
     names = [EXPANDED, *(name for name in columns_of_row if name.endswith(EXPANDED))]
     return text == NO_FACTOR or any(not math.isnan(extra[name]) for name in names)
 
@@ -111,7 +111,7 @@ def _factor(text: str, common: float | None) -> float | None:
 
 
 def _wrong(value: float, is_expanded: bool, factor: float | None, text: str) -> str:
-    """Faults of a stated uncertainty; empty if nothing is."""
+    """Return the fault of a stated uncertainty; possibly empty."""
     if value < 0.0:
         return "an uncertainty is below zero; correct it"
     if not is_expanded:

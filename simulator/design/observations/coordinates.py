@@ -70,8 +70,8 @@ def no_coordinates() -> CalibratedCoordinates:
 
 
 def flat(layout: BallLayout, first: int, uncertainty: float) -> CalibratedCoordinates:
-    """Co-ordinates out of the plane nominal, of an artefact whose balls begin at `first` and of
-    which nothing else tells them.
+    """Return co-ordinates with nominal ones out of the plane, for an artefact whose balls begin at
+    `first` and whose heights no other observation determines.
     """
     count = len(layout.names)
     drawn = layout.coordinates[:, 2]
@@ -207,7 +207,7 @@ def read_coordinates(
 
 
 def _axes(settings: CoordinatesSettings, steps: Steps, references: References) -> list[str] | None:
-    """The calibrated axes, None after reporting faults."""
+    """Return the calibrated axes, or report faults."""
     dimension, uncertainty = references.dimension, settings.standard_uncertainty
     place = (*steps, "standard_uncertainty")
     if uncertainty is None or isinstance(uncertainty, float):
@@ -303,10 +303,10 @@ def _table_of_coordinates(
 
 
 def far_spread(values: Array, drawn: Array) -> str:
-    """Faults of certified co-ordinates (m, axes) whose spread is not that of the drawing; empty if
-    nothing is.
+    """Return a fault of certified co-ordinates (m, axes) whose spread is far from nominal;
+    possibly empty.
 
-    Where their axes begin may be another place than in the drawing.
+    Their origin may differ from the nominal one.
     """
     # Root mean squares. A plate that is flat as drawn is not quite so as certified.
     spreads, expected = (

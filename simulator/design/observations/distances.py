@@ -77,9 +77,8 @@ class DistanceCalibration(Calibration):
 
     ``pairs``: (m, 2) ball indices. ``dimensions``: 3 in space, 2 in the artefact's x and y.
     ``values``: (m,) metres, nominal unless ``certified``. ``standard_uncertainties``: (m,) metres,
-    the function ``standard_uncertainty`` at the nominal distances, None where a file states them.
-    ``form`` and ``repeatability``
-    matter for length standards only.
+    the function ``standard_uncertainty`` at the nominal distances, unless a file states them.
+    ``form`` and ``repeatability`` matter for length standards only.
     """
 
     artefact: str
@@ -244,7 +243,7 @@ def _nominal(
     steps: Steps,
     references: References,
 ) -> Array | None:
-    """Distances (m,) nominal, None after saying that one is none."""
+    """Return nominal distances (m,), or report one that is zero."""
     difference = layout.coordinates[indices[:, 1]] - layout.coordinates[indices[:, 0]]
     nominal = np.linalg.norm(difference[:, :dimensions], axis=1)
     if np.any(nominal < COINCIDENT):
@@ -368,7 +367,7 @@ def _entries(
     steps: Steps,
     references: References,
 ) -> FileValues | None:
-    """What the file or the list of values states; None after reporting faults."""
+    """Return the entries of the file or the list of values, or report faults."""
     if is_digital(settings.values):
         return read_digital(settings, wanted, True, steps[:-1], references)
     if isinstance(settings.values, str):
@@ -398,7 +397,9 @@ def _entries(
 def _by_pair(
     entries: list[CertificateEntry], layout: BallLayout, references: References
 ) -> dict[frozenset[str], CertificateEntry]:
-    """Entries by their balls, after saying which are no distances of two of them, each once."""
+    """Return entries by their balls, and report those that are not distances of two balls, each
+    once.
+    """
     problems, known_names = references.problems, set(layout.names)
     by_pair: dict[frozenset[str], CertificateEntry] = {}
     for entry in entries:

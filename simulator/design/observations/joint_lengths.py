@@ -2,10 +2,10 @@
 
 Lengths of one position and probe are v = B n - E u e to first order, measured less certified: n is
 the noise of the readings, B the directions of the lengths at their two ends, e the error of each
-certificate in its uncertainty u, and E tells which certificate a length has. B has a smaller rank
-than rows wherever there are more lengths than the balls have independent distances. What lies
-outside its range is free of noise and of anything that moves a ball: it tells how far certificates
-contradict one another, once for all positions that read the same lengths.
+certificate in its uncertainty u, and E assigns certificates to lengths. B has a smaller rank than
+rows if there are more lengths than the balls have independent distances. The part outside its
+range is free of noise and of motions of balls: it shows contradictions between certificates, once
+for all positions that read the same lengths.
 """
 
 from __future__ import annotations
@@ -40,13 +40,13 @@ TOLD_TWICE = 1e-9
 class LengthArrays:
     """Lengths of length standards read in the volume; arrays (m,), metres.
 
-    `first` and `second` index the readings that a length takes part in; `second` is -1 where the
+    `first` and `second` index the readings that a length takes part in; `second` is -1 if the
     other end is the pivot of a Bryan gauge, which is not read: the origin of the first reading's
-    position. `projected` says whether the difference of the corrected points is projected on the
-    standard's nominal direction (m, d) instead of its norm being taken; `with_repeatability`
-    whether the readings' own scatter along that direction adds to `uncertainty`. Lengths of the
-    same `certificate`, counted from 0, share that error wherever they are read. `free` is the
-    number of the design's unknown length that a length is, -1 where its `value` is known.
+    position. `projected` is true if the difference of the corrected points is projected on the
+    standard's nominal direction (m, d) instead of its norm being taken; `with_repeatability` if
+    the readings' own noise along that direction adds to `uncertainty`. Lengths of the same
+    `certificate`, counted from 0, share that error in all positions. `free` is the number of the
+    design's unknown length, -1 if its `value` is known.
     """
 
     first: Integers
@@ -61,12 +61,12 @@ class LengthArrays:
 
     @property
     def to_pivot(self) -> NDArray[np.bool_]:
-        """Which lengths (m,) are from a reading to a pivot."""
+        """Mask (m,) of lengths from a reading to a pivot."""
         return self.second < 0
 
     @property
     def is_known(self) -> NDArray[np.bool_]:
-        """Which lengths (m,) have a certificate."""
+        """Mask (m,) of lengths with a certificate."""
         return np.full(len(self.value), True) if self.free is None else self.free < 0
 
 
@@ -74,9 +74,9 @@ class LengthArrays:
 class Together:
     """Lengths `rows` (m,) of one position and probe, in the order of their certificates.
 
-    `root` (m, r) makes of them r lengths whose noise is uncorrelated and has unit variance.
-    `by_error` (r, m) is what the errors of the certificates, in their uncertainties, change these
-    by, less what the m lengths tell of them.
+    `root` (m, r) makes of them r lengths with uncorrelated noise of unit variance. `by_error` (r,
+    m) is their derivative by the errors of the certificates, in their uncertainties, without the
+    part that the m lengths determine.
     """
 
     rows: Integers
@@ -86,10 +86,10 @@ class Together:
 
 @dataclass(frozen=True)
 class Consistency:
-    """What lengths of the same certificates tell about the latter, wherever they are read together.
+    """Noise-free information of lengths on their own certificates.
 
-    `rows` (k, m) are the same m lengths in k positions, `equations` (e, m) what of their mean is
-    free of noise.
+    `rows` (k, m) are the same m lengths in k positions, `equations` (e, m) the noise-free
+    combinations of their mean.
     """
 
     rows: Integers
@@ -98,12 +98,12 @@ class Consistency:
 
 @dataclass(frozen=True)
 class JointWhitening:
-    """Whitening of the lengths of one standard whose readings they share.
+    """Whitening of the lengths of one standard that share readings.
 
-    Of the errors of certificates, in their uncertainties, lengths that are read together tell q
-    combinations without noise: `known` (q, equations) makes these of the equations in
-    `consistencies`. They come last, and `by_known` (r, q) is what they take from the r rows before.
-    `shared` (r, k) with `gain` (k,) is the root of what the other errors leave correlated, (1 -
+    Of the errors of certificates, in their uncertainties, lengths read together determine q
+    combinations without noise: `known` (q, equations) forms these from the equations in
+    `consistencies`. They come last, and `by_known` (r, q) is their share in the r rows before.
+    `shared` (r, k) with `gain` (k,) is the root of the correlation left by the other errors, (1 -
     shared diag(gain) shared').
     """
 
@@ -168,10 +168,10 @@ class ByPosition:
 
 @dataclass(frozen=True)
 class LengthWhitening:
-    """Whitening of all lengths (m,) of a design: those `alone` (k,), by themselves, then each
+    """Whitening of all lengths (m,) of a design: those `alone` (k,), each separately, then each
     standard's `joint` ones.
 
-    `scatter` (m,) is what the readings contribute to the standard uncertainty of each length.
+    `scatter` (m,) is the contribution of the readings to the standard uncertainty of each length.
     """
 
     scatter: Array
@@ -210,10 +210,10 @@ class LengthWhitening:
         return result.reshape(-1, *rows.shape[1:])
 
     def by_position(self, lengths: LengthArrays, rows: Array) -> ByPosition:
-        """Rows (r, k) of each position by itself, of lengths' `rows` (m, k).
+        """Return rows (r, k) of each position, of lengths' `rows` (m, k), without other positions.
 
-        No position makes use of what others tell of certificates that contradict one another; where
-        all read the same lengths of a standard there is nothing more to be told.
+        A position uses no contradictions of certificates found by others; if all read the same
+        lengths of a standard, these add no information.
         """
         alone = self.alone
         weight = (
@@ -238,11 +238,11 @@ class LengthWhitening:
 def length_whitening_of(
     lengths: LengthArrays, noise: Array, standard: Integers, place: Integers
 ) -> LengthWhitening:
-    """Whitening of lengths (m,) whose readings have the standard uncertainties `noise` (readings,
-    d), in metres.
+    """Return the whitening of lengths (m,) whose readings have the standard uncertainties `noise`
+    (readings, d), in metres.
 
-    `standard` and `place` (m,) number the artefact, and the position and probe, of each length.
-    Directions are the nominal ones, so that weights stay what they are while parameters change.
+    `standard` and `place` (m,) number the artefact, and the pair of position and probe, of each
+    length. Directions are the nominal ones, so that weights are constant while parameters change.
     """
     variance = noise[lengths.first] ** 2 + np.where(
         lengths.to_pivot[:, None], 0.0, noise[lengths.second] ** 2
@@ -260,7 +260,7 @@ def length_whitening_of(
 
 
 def _shares_readings(lengths: LengthArrays, standard: Integers) -> NDArray[np.bool_]:
-    """Which lengths (m,) are of standards of which some reading is an end of several lengths."""
+    """Return a mask (m,) of lengths of standards with a reading at the end of several lengths."""
     chosen = np.flatnonzero(lengths.with_repeatability & ~lengths.to_pivot)
     ends = np.concatenate([lengths.first[chosen], lengths.second[chosen]])
     _, inverse, count = np.unique(ends, return_inverse=True, return_counts=True)
@@ -320,11 +320,11 @@ def joint_whitening(
 
 
 def equation_root(lengths: LengthArrays, rows: Integers) -> Array:
-    """Root (m, r) that makes uncorrelated equations of those of the squares of lengths `rows` (m,)
-    read together.
+    """Return the root (m, r) that makes uncorrelated equations of the squares of lengths `rows`
+    (m,) read together.
 
-    Noise is the same in all readings. An equation that shared no reading would keep the weight 1,
-    were its length the root mean square of all.
+    Noise is the same in all readings. An equation without a shared reading would keep the weight 1
+    if its length were the root mean square of all.
     """
     size = lengths.value[rows] / np.sqrt(2.0 * (lengths.value[rows] ** 2).mean())
     readings = int(max(lengths.first.max(), lengths.second.max())) + 1
@@ -335,10 +335,10 @@ def equation_root(lengths: LengthArrays, rows: Integers) -> Array:
 def _range_and_noise(
     lengths: LengthArrays, noise: Array, rows: Integers, size: Array | float = 1.0
 ) -> tuple[Array, Array]:
-    """Basis (m, r) of what readings change of lengths `rows` (m,), each times its `size`, with a
-    triangle (r, r).
+    """Return a basis (m, r) of the changes of lengths `rows` (m,) by readings, each times its
+    `size`, with a triangle (r, r).
 
-    The noise of basis' lengths has the covariance triangle' triangle.
+    The noise of the basis' lengths has the covariance triangle' triangle.
     """
     along, of_noise = _directions(lengths, noise, rows)
     scale = np.broadcast_to(size, (len(rows),))[:, None]
@@ -347,8 +347,8 @@ def _range_and_noise(
 
 
 def _directions(lengths: LengthArrays, noise: Array, rows: Integers) -> tuple[Array, Array]:
-    """What displacements of the readings change lengths `rows` (m,) by, (m, readings d): by a
-    metre, and by noise.
+    """Return the changes of lengths `rows` (m,) by displacements of the readings, (m, readings d):
+    by a metre, and by noise.
     """
     ends = np.stack([lengths.first[rows], lengths.second[rows]])
     balls_read, place = np.unique(ends, return_inverse=True)
@@ -367,10 +367,10 @@ def _range(along: Array) -> Array:
 
 
 def _outside(within: Array, uncertainty: Array, size: float) -> Array:
-    """Orthonormal combinations (m - r, m) of m errors, in their `uncertainty` (m,), that no reading
-    bears upon.
+    """Return orthonormal combinations (m - r, m) of m errors, in their `uncertainty` (m,), that no
+    reading affects, unless all certificates are exact.
 
-    `within` (m, r) is the range of what readings change. None, where all certificates are exact.
+    `within` (m, r) is the range of the readings' changes.
     """
     if uncertainty.max() < EXACT_CERTIFICATE * size:
         return np.zeros((0, len(within)))
@@ -379,10 +379,10 @@ def _outside(within: Array, uncertainty: Array, size: float) -> Array:
 
 
 def _independent(equations: Array, told_once: bool) -> tuple[Array, Array]:
-    """What makes of `equations` (e, c), some told twice, orthonormal ones: a matrix (q, e), and the
-    latter (c, q).
+    """Return a matrix (q, e) that makes `equations` (e, c), some of them repeated, orthonormal,
+    and the result (c, q).
 
-    Those `told_once`, of a single set of lengths, are orthonormal as they are.
+    Those `told_once`, of a single set of lengths, are orthonormal already.
     """
     if not len(equations):
         return np.zeros((0, 0)), np.zeros((equations.shape[1], 0))

@@ -70,7 +70,7 @@ class JointValues(BallObservations):
 
     @property
     def balls(self) -> Integers:
-        """All balls of the block of each row; where it has fewer than others, its first again."""
+        """All balls of the block of each row, padded with its first."""
         balls_by_part = self._balls
         result = np.zeros((len(self), max(map(len, balls_by_part), default=0)), np.int64)
         for part, balls_of_part in zip(self._parts, balls_by_part, strict=True):
@@ -138,7 +138,9 @@ class JointValues(BallObservations):
         return replace(self, roots=roots, uncertainty=self.uncertainty * times)
 
     def loosened(self, least: float) -> JointValues:
-        """Combinations without variance have one that is as small beside that of their values."""
+        """Return the same with a small variance for combinations without any, relative to that of
+        their values.
+        """
         roots = tuple(
             replace(
                 root,

@@ -1,7 +1,7 @@
-"""All kinds of calibration that a file may state.
+"""All calibrations that a file may state.
 
-A further kind of the kernel is a file beside these, with its settings, what reads them and its
-observations, and one line in `CALIBRATIONS`; extensions have their own.
+A further one of the kernel is a file here, with its settings, its reader and its observations, and
+one line in `CALIBRATIONS`; extensions have their own.
 """
 
 from __future__ import annotations
@@ -52,7 +52,7 @@ def is_of_machine(kind: str) -> bool:
 def read_calibration(
     settings: Any, artefact: str, steps: Steps, references: References
 ) -> Calibration | None:
-    """The item of an artefact that settings describe, or None after reporting faults."""
+    """Return the item of an artefact that the entry describes, or report faults."""
     reader = next(
         (
             reader

@@ -1,6 +1,6 @@
 """Lengths of length standards that are read in the volume.
 
-They are formed of readings and share the noise of these.
+They are computed from readings and share their noise.
 """
 
 from __future__ import annotations
@@ -86,7 +86,7 @@ class Lengths(LengthArrays, Observations):
 
 
 def length_whitening(design: Design) -> LengthWhitening:
-    """What makes uncorrelated observations of unit variance of the lengths of standards."""
+    """Return the whitening of the lengths of standards."""
     lengths, readings = design.of(Lengths), design.readings
     noise = reading_noise(design, readings)
     standard = design.balls.artefact[readings.ball[lengths.first]]
@@ -97,8 +97,8 @@ def length_whitening(design: Design) -> LengthWhitening:
 
 
 def length_name(design: Design, length: int, of_reading: bool = True) -> str:
-    """A length of a standard by its ends, or a gauge's radius, of one reading or as it is
-    certified.
+    """Return the name of a length by its ends, or a gauge's radius, of one reading or of the
+    certificate.
     """
     lengths, readings = design.of(Lengths), design.readings
     ball = int(readings.ball[lengths.first[length]])
@@ -209,10 +209,10 @@ def _length_residuals(design: Design, state: State, x: Array | None) -> tuple[Ar
 
 
 def length_deviations(design: Design, state: State, x: Array | None) -> tuple[Array, Array]:
-    """What measured lengths exceed those expected by (m,), and the uncertainty of each by itself,
-    in metres.
+    """Return measured less expected lengths (m,), and the uncertainty of each separately, in
+    metres.
 
-    Without scale readings x the machine is taken to read without error.
+    Without scale readings x the machine is assumed to read without error.
     """
     if not len(design.of(Lengths)):
         return np.zeros(0), np.ones(0)
@@ -259,7 +259,7 @@ def true_lengths(design: Design, truth: State) -> Array:
 
 
 def _measured_lengths(design: Design, origins: Array, x: Array) -> Array:
-    """Unknown lengths as the readings have them, in the mean; nominal where there are none."""
+    """Return unknown lengths as the mean of the readings, nominal without readings."""
     lengths = design.of(Lengths)
     if lengths.free is None or not len(design.unknown_lengths.names):
         return design.unknown_lengths.drawn

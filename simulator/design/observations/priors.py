@@ -18,12 +18,12 @@ from ..parameters import shared_layout
 class Priors(Observations):
     """Prior knowledge of shared parameters; arrays (m,), metres, radians or ratios.
 
-    Each row is about a pose parameter (`position` and `component`, by place among origin and
-    rotation), about a probe offset (`probe` and `component`), about a parameter of an influence
-    quantity (`influence`, None where there are none), or about a linear function of the model's
-    parameters, `by_model` (m, n), and of probe offsets, `by_offset` (m, l, d), None where there are
-    no such; indices that do not apply are -1. `units` are those of the first, where they are told.
-    Origins and offsets are stated as co-ordinates, pose angles as deviations from the nominal pose.
+    Each row is about a pose parameter (`position` and `component`, index in origin and rotation),
+    about a probe offset (`probe` and `component`), about a parameter of an influence quantity
+    (`influence`), or about a linear function of the model's parameters, `by_model` (m, n), and of
+    probe offsets, `by_offset` (m, l, d); indices that do not apply are -1, absent arrays None.
+    `units` are those of the rows, if stated. Origins and offsets are stated as co-ordinates, pose
+    angles as deviations from the nominal pose.
     """
 
     word: ClassVar[str] = "prior"
@@ -47,11 +47,11 @@ class Priors(Observations):
 
     @property
     def of_model(self) -> Flags:
-        """Which (m,) are about the error model."""
+        """Mask (m,) of priors on the error model."""
         return (self.position < 0) & (self.probe < 0) & (self.of_influence < 0)
 
     def select(self, chosen: Integers | Flags) -> Priors:
-        """Some of them."""
+        """Return a selection."""
         rows = np.arange(len(self))[chosen]
         arrays = {
             name: array[rows] for name, array in vars(self).items() if isinstance(array, np.ndarray)
@@ -69,7 +69,9 @@ class Priors(Observations):
         )
 
     def true_values(self, design: Design, truth: State, model: ErrorModel) -> Array:
-        """Priors about an error model that is not the true machine's stay what they are."""
+        """Return true values; those on an error model other than the true machine's are
+        unchanged.
+        """
         if model == design.model:
             return self._values(design, truth)
         elsewhere = replace(truth, a=np.zeros(self.by_model.shape[1]))
@@ -102,7 +104,7 @@ class Priors(Observations):
         return design.model.parameters[int(used[0])].unit if len(used) else "1"
 
     def _values(self, design: Design, state: State) -> Array:
-        """Values (m,) at `state` of what these are about."""
+        """Return values (m,) at `state` of the functions that the priors concern."""
         of_poses = _pose_values(design, state)[self.position, self.component]
         axis = np.minimum(self.component, design.dimension - 1)
         of_probes = state.probes[self.probe, axis]
@@ -115,7 +117,9 @@ class Priors(Observations):
         )
 
     def of_offsets(self, offsets: Array) -> Array:
-        """What probe offsets (l, d) contribute to what each (m,) is about, beside the model."""
+        """Return the contribution of probe offsets (l, d) to each function (m,), without the
+        model's.
+        """
         if self.by_offset is None:
             return np.zeros(len(self))
         return np.asarray(np.einsum("mld,ld->m", self.by_offset, offsets))

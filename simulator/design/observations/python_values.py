@@ -110,7 +110,7 @@ class PythonValues(BallObservations):
 class PythonCalibration(Calibration):
     """Values (m,) of functions of the balls (k,) of an artefact, in the functions' unit.
 
-    `functions` are what the `object` of a module in the folder `source` makes with `options`.
+    `functions` are made by the `object` of a module in the folder `source` with `options`.
     """
 
     artefact: str
@@ -226,9 +226,9 @@ def ball_functions(
     names: tuple[str, ...],
     drawn: Array,
 ) -> BallFunctions:
-    """The functions that the object `name` makes for balls of `names`, drawn at (n, d).
+    """Return the functions that the object `name` makes for balls of `names`, nominally at (n, d).
 
-    :raises CustomModelError: there is no such object, or what it returns is not usable.
+    :raises CustomModelError: there is no such object, or its result is unusable.
     """
     build = named_object(name, folder, trust, GROUP)
     key = "options" if options else "object"
@@ -308,7 +308,7 @@ def _values(
 def _stated(
     settings: PythonValuesSettings, functions: BallFunctions, steps: Steps, references: References
 ) -> Array | None:
-    """Standard uncertainties (m,) of the item, NaN where one is wrong, None without any."""
+    """Return standard uncertainties (m,) of the item, NaN for invalid ones, if any are stated."""
     uncertainty, count = settings.standard_uncertainty, len(functions.names)
     if uncertainty is None:
         return None
@@ -324,7 +324,7 @@ def _stated(
 
 
 def _parsed(texts: tuple[str, ...], unit: Unit, steps: Steps, references: References) -> Array:
-    """Quantities (m,), NaN where one is wrong, after saying so once."""
+    """Return quantities (m,), NaN for invalid ones, after one message."""
     values = np.full(len(texts), np.nan)
     for k, text in enumerate(texts):
         try:
@@ -395,7 +395,7 @@ def _check(name: str, functions: Any, drawn: Array) -> None:
 
 
 def _motions(balls: Array) -> list[Array]:
-    """Rigid motions (n, d) of balls, each of which moves none by more than one."""
+    """Return rigid motions (n, d) of balls, each moving no ball by more than one."""
     n, d = balls.shape
     shifts = [np.tile(np.eye(d)[axis], (n, 1)) for axis in range(d)]
     centred = np.zeros((n, 3))

@@ -30,11 +30,11 @@ OFFSET_STEP = 0.1
 
 @dataclass(frozen=True)
 class ReadingBlocks:
-    """Rows of m readings: residual (m, d), derivatives by ball (m, d, d), pose (m, d, q), model (m,
-    d, n).
+    """Rows of m readings: residual (m, d), derivatives by ball (m, d, d), pose (m, d, q), model
+    (m, d, n).
 
     `by_offset` (m, d, d) is the derivative by the probe's offset and `by_influence` (m, d, p) that
-    by influence quantities, None where these are no parameters.
+    by influence quantities, if these are parameters.
     """
 
     residual: Array
@@ -61,11 +61,11 @@ def seen_places(design: Design, readings: Readings, x: Array) -> Array:
 
 
 def offset_sensitivity(model: ErrorModel, x: Array, a: Array, p: Array) -> Array:
-    """Derivative (m, d, d) of the error by the probe offset: identity plus what the machine's
-    rotations add.
+    """Return the derivative (m, d, d) of the error by the probe offset: identity plus the effect
+    of the machine's rotations.
 
-    A rotation acts on the offset linearly, so that a central difference over a whole machine arm is
-    exact to rounding for every model of rigid axes.
+    A rotation acts on the offset linearly, so that a central difference over a whole machine arm
+    is exact to rounding for every model of rigid axes.
     """
     columns = []
     for axis in range(x.shape[1]):
@@ -99,8 +99,8 @@ def reading_weights(design: Design, readings: Readings) -> Array:
 def reading_blocks(
     design: Design, state: State, readings: Readings, x: Array | None
 ) -> ReadingBlocks:
-    """Rows of readings of plates, with scale readings x (m, d), or error-free ones where x is
-    None.
+    """Return rows of readings of plates, with scale readings x (m, d), or error-free ones without
+    x.
     """
     d = design.dimension
     p = state.probes[readings.probe]

@@ -1,11 +1,11 @@
-"""Stars of probes as one body: tips that are known among one another, in whatever direction the
-star points (NPL Report CISE 15/98, section 2.4.2).
+"""Stars of styli as rigid bodies: tips known relative to one another, with an unknown rotation of
+the star (NPL Report CISE 15/98, section 2.4.2).
 
-A star with tips at c, turned by a rotation R, has the offsets p = R c. The rotation is no
-parameter: that nearest to offsets p follows from them, and rows compare R' p with c across the
-directions in which a small turn moves the tips. What is left of the misfit lies there, so that the
-sum of squares is the least over all rotations, exactly and for turns of any size, and each row is
-independent of the others. Where the star's place is unknown too, shifts are left out likewise.
+A star with tips at c, turned by a rotation R, has the offsets p = R c. The rotation is not a
+parameter: the one nearest to offsets p follows from them, and rows compare R' p with c across the
+directions in which a small turn moves the tips. The remaining deviation lies there, so that the
+sum of squares is the least over all rotations, exactly and for turns of any size, and rows are
+independent. If the location of the star is unknown too, shifts are omitted in the same manner.
 """
 
 from __future__ import annotations
@@ -36,8 +36,8 @@ class Star:
     """A star of `probes` (names) whose tips are at ``coordinates`` (l, d) in its own frame, in
     metres, each known to ``standard_uncertainty`` along each axis.
 
-    ``has_place``: whether it turns about the machine's reference point, which is the origin of the
-    coordinates; otherwise its place is unknown as well.
+    ``has_place``: true if it turns about the machine's reference point, the origin of the
+    coordinates; otherwise its location is unknown as well.
     """
 
     probes: tuple[str, ...]
@@ -80,7 +80,9 @@ class Star:
 
 
 def _moves(star: Star) -> Array:
-    """How small turns, and shifts where its place is unknown, move its tips: (l d, k)."""
+    """Return the motions of its tips under small turns, and shifts if its location is unknown: (l
+    d, k).
+    """
     arms = star.coordinates if star.has_place else star.coordinates - star.coordinates.mean(axis=0)
     count, d = arms.shape
     turns = rotation_sensitivity(arms).reshape(count * d, -1)
@@ -126,7 +128,7 @@ class Stars(Observations):
     """The shapes of all `stars`; `value` and `uncertainty` (m,) are in metres.
 
     `probes` are the indices of each star's, `bases` (l d, m) the directions of its rows, and
-    `place` (m,) the co-ordinate, among all tips of its star, that each row is mostly about.
+    `place` (m,) the dominant co-ordinate of each row among all tips of its star.
     """
 
     word: ClassVar[str] = "star"
@@ -178,7 +180,7 @@ class Stars(Observations):
         return replace(design, probes=replace(design.probes, offsets=offsets))
 
     def add_misfit(self, rows: Rows, errors: Array, at: Replicates) -> None:
-        """Exact, whatever the turn of the star."""
+        """Exact for every turn of the star."""
         offsets = (
             at.start.probes + np.append(at.shared, 0.0 * at.shared[:, :1], axis=1)[:, at.offsets]
         )
@@ -199,7 +201,7 @@ class Stars(Observations):
 
 
 def observed_stars(stars: Sequence[Star], names: Sequence[str]) -> Stars:
-    """The shapes of stars of the probes of those names."""
+    """Return the shapes of stars of the named probes."""
     shapes = [_shape(star) for star in stars]
     count = [len(places) for _, places in shapes]
     return Stars(
@@ -219,8 +221,8 @@ def observed_stars(stars: Sequence[Star], names: Sequence[str]) -> Stars:
 
 
 def _turned(star: Star, probes: Integers, design: Design, x: Array) -> Array:
-    """Offsets (l, d) of a star's tips, turned as readings of the same balls in the same positions
-    say; as they are where readings say nothing.
+    """Return offsets (l, d) of a star's tips, turned as readings of the same balls in the same
+    positions indicate; unchanged without such readings.
     """
     drawn, readings = design.probes.offsets[probes], design.readings
     rows = np.flatnonzero(np.isin(readings.probe, probes))

@@ -27,7 +27,7 @@ AGREE = 0.02
 
 
 class CertificateSettings(Settings):
-    """Keys of an item of calibration whose values may stand in a file."""
+    """Keys of a calibration item whose values may be in a file."""
 
     covariance: Text | None = Field(
         None,
@@ -46,8 +46,8 @@ class CertificateSettings(Settings):
 
 @dataclass(frozen=True)
 class CertificateEntry:
-    """A value of a file: two names, value and standard uncertainty (NaN without one) in metres, and
-    where it is written.
+    """A value of a file: two names, value and standard uncertainty (NaN without one) in metres,
+    and its location in the file.
     """
 
     names: tuple[str, str]
@@ -59,7 +59,7 @@ class CertificateEntry:
 
 @dataclass(frozen=True)
 class Uncertainties:
-    """Standard uncertainties (m,) of values in metres, and the root of their covariance where they
+    """Standard uncertainties (m,) of values in metres, and the root of their covariance if they
     are correlated.
     """
 
@@ -69,8 +69,8 @@ class Uncertainties:
 
 @dataclass(frozen=True)
 class FileValues:
-    """What a file states: its entries, and of a digital certificate a covariance (m, m) with its
-    rounding of the values that were asked for.
+    """Content of a file: its entries, and of a digital certificate a covariance (m, m) with its
+    rounding of the requested values.
     """
 
     entries: list[CertificateEntry]
@@ -83,7 +83,7 @@ def is_digital(values: object) -> bool:
 
 
 def check_keys(settings: Any, steps: Steps, references: References) -> bool:
-    """True if the keys about a file go with one another, after saying which do not."""
+    """True if the keys about a file are compatible; others are reported."""
     is_right = True
     of_file = isinstance(settings.values, str)
     digital = is_digital(settings.values)
@@ -99,7 +99,7 @@ def check_keys(settings: Any, steps: Steps, references: References) -> bool:
 
 
 def value_name(names: tuple[str, str], is_pair: bool) -> str:
-    """What a value is called in messages."""
+    """Return the name of a value in messages."""
     return "–".join(names) if is_pair else f"{names[1]} of {names[0]}"
 
 
@@ -113,8 +113,8 @@ def uncertainties_of(
     steps: Steps,
     references: References,
 ) -> Uncertainties | None:
-    """Uncertainties of values with `names`: those `stated` (m,) with the item, or those `found`
-    (m,) in its file, and those of a covariance; None after reporting faults.
+    """Return uncertainties of values with `names`: those stated (m,) with the item, or those read
+    (m,) from its file, and those of a covariance; or report faults.
     """
     problems, path = references.problems, (*steps, "standard_uncertainty")
     in_file = not np.isnan(uncertainties_read).any()
@@ -206,8 +206,8 @@ def _of_file(
     steps: Steps,
     references: References,
 ) -> Any:
-    """Covariance and rounding (m, m) of values from a CSV file, and a third entry where they are
-    those of correlations; None after reporting faults.
+    """Return covariance and rounding (m, m) of values from a CSV file, with a third entry for
+    correlations; or report faults.
     """
     from ...inputs.covariances import read_matrix
 
@@ -266,8 +266,8 @@ def read_digital(
     steps: Steps,
     references: References,
 ) -> FileValues | None:
-    """The wanted values in a digital calibration certificate, which an extension reads; None after
-    reporting faults.
+    """Return the requested values of a digital calibration certificate, read by an extension, or
+    report faults.
     """
     reader = optional_service("read_digital")
     if reader is None:

@@ -131,11 +131,11 @@ class CovarianceRoot:
 
 
 def covariance_root(covariance: Array, rounding: Array | float = 0.0) -> CovarianceRoot:
-    """The root of a covariance (m, m) whose entries are known to `rounding`.
+    """Return the root of a covariance (m, m) whose entries are known to `rounding`.
 
-    The matrix may be singular: eigenvalues of the correlations below `SINGULAR`, or below what the
-    digits of the entries tell, count as that. A combination that has no variance is so tied to a
-    millionth of the standard uncertainties, or as well as the digits tell.
+    The matrix may be singular: eigenvalues of the correlations below `SINGULAR`, or below the
+    resolution of the entries' digits, count as zero. Such a combination is exact to a millionth of
+    the standard uncertainties, or to the resolution of the digits.
 
     :raises IndefiniteError: an eigenvalue that is negative by more than rounding.
 
