@@ -117,7 +117,7 @@ def check(
     for text in texts:
         ensure_type(str, 'texts such as "U6 average 0.3 um"', goals=text)
     if share is not None and "lengths" not in texts:
-        raise ValueError("share goes with the goal lengths; add it, or leave it out")
+        raise ValueError("share applies to the goal lengths; add it, or leave it out")
     parsed = tuple(
         service("parse_goal")(text, share if text == "lengths" else None) for text in texts
     )

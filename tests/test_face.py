@@ -262,7 +262,11 @@ WRONG: list[tuple[Callable[[], object], type[Exception], str]] = [
         "false_alarm=2; give a ratio between 1e-12 and 0.999999",
     ),
     (lambda: bp.fit(QUICKSTART, "a.csv", estimator="distances", pairs=3), TypeError, "pairs=3"),
-    (lambda: fitted().correlation(3), TypeError, r"chosen\[0\]=3; give the name of an estimate"),
+    (
+        lambda: fitted().correlation(3),
+        TypeError,
+        r"chosen\[0\]=3; give the name or the kind of an estimate",
+    ),
     (lambda: fitted().correct([["a", 0.3, 9]], "down"), ValueError, "give numbers in metres, 3"),
     (lambda: fitted().correct([[0.1, 0.3, 0.2]], 5), TypeError, "probe=5; give the name"),
 ]

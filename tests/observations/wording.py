@@ -10,4 +10,4 @@ NO_RESULT_IS_CALLED = 'no result is called "Later"; it has "Before"'
 RESULTS_HAVE_THESE_VALUES = (
     '2 results have these values: "Before" (id b, refType x_before), "After"'
 )
-SAY_WHICH_WITH_RESULT = "say which with result:"
+SAY_WHICH_WITH_RESULT = "choose one with result:"

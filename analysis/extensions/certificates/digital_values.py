@@ -50,11 +50,9 @@ def read_digital(
     except ExperimentError as error:
         problems.take(error, place)
         return None
-    labels = listing(digital_result.label for digital_result in results)
+    labels = listing(item.label for item in results)
     chosen = [
-        digital_result
-        for digital_result in results
-        if settings.result is None or digital_result.is_called(settings.result)
+        item for item in results if settings.result is None or item.is_called(settings.result)
     ]
     if not chosen or settings.result is not None and len(chosen) > 1:
         many = "several results are" if chosen else "no result is"
@@ -62,15 +60,12 @@ def read_digital(
         problems.add((*steps, "result"), text)
         return None
     forms = _forms(wanted)
-    by_result = [_matched(digital_result, forms) for digital_result in chosen]
+    by_result = [_matched(item, forms) for item in chosen]
     full = [k for k, matches in enumerate(by_result) if len(matches) == len(wanted)]
     if len(full) > 1:
-        labels_listed = listing(chosen[k].label for k in full)
-        text = (
-            f"{path.name}: {len(full)} results have these values: {labels_listed};"
-            " say which with result:"
-        )
-        problems.add(place, text)
+        named = listing(chosen[k].label for k in full)
+        text = f"{len(full)} results have these values: {named}; choose one with result:"
+        problems.add(place, f"{path.name}: {text}")
         return None
     best = full[0] if full else max(range(len(chosen)), key=lambda k: len(by_result[k]))
     result, matches = chosen[best], by_result[best]
@@ -83,7 +78,7 @@ def read_digital(
     for k, names in enumerate(wanted):
         values = [result.lengths[i] for i in matches[k]]
         if len(values) > 1:
-            lines = listing(str(digital_result.mark.line) for digital_result in values)
+            lines = listing(str(item.mark.line) for item in values)
             text = f"{value_name(names, is_pair)} has several values, in lines {lines}"
             problems.add_at(values[1].mark, place, text)
         # Who states the uncertainty needs none of the file.

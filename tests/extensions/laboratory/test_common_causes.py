@@ -109,7 +109,7 @@ def test_columns_that_influences_ask_for_are_read_in_any_table(
     other = other.assign(**{"Temperature artefact [°C]": warm}).iloc[:, [2, 6, 0, 1, 5, 4, 3]]
     text = other.to_csv(index=False, sep=";", decimal=",")
     one, two = (read_readings(GivenText("t.csv", given), design) for given in (plain, text))
-    assert "t.csv: read as: semicolons, decimal commas" in two.told[0]
+    assert "t.csv: read as: semicolons, decimal commas" in two.table_notes[0]
     for found in (one, two):
         assert found.design.readings.beside is not None
         given = found.design.readings.beside["temperature_artefact"]

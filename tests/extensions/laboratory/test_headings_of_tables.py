@@ -80,7 +80,7 @@ def test_a_file_named_as_a_position_has_that_position(
         paths[-1].write_text(heads + other.to_csv(index=False, header=False))
     found = read_readings(paths, lay_out(experiment), settings=experiment.readings)
     assert len(found.x) == len(readings) and not found.missing
-    assert all('not used: "Ort"' in told for told in found.told)
+    assert all('not used: "Ort"' in told for told in found.table_notes)
 
 
 @pytest.mark.parametrize("heads", ["X-Istwert,X-Istwert,Z-Istwert", "X,Y,X", "Z,Y,Z", "X,Z,Z"])

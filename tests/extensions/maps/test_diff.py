@@ -163,7 +163,7 @@ def test_what_is_undetermined_is_not_compared(capsys: pytest.CaptureFixture[str]
     [
         (["--probe", "up"], 2, 'no probe "up" in both maps'),
         (["--shared", "certificate"], 2, "does not hold what certificates do to it"),
-        (["--stated", "1 um"], 2, "an uncertainty is stated of a machine file"),
+        (["--stated", "1 um"], 2, "a stated uncertainty needs a machine file"),
         (["--stated", "1"], 2, "1"),
         (["--points", "points.csv"], 2, "outside the volume"),
         (["--grid", "9"], 2, "2 to 5 points"),
@@ -192,7 +192,7 @@ def test_files_that_are_no_maps_are_refused(
 ) -> None:
     machine = str(PARK / "machines" / "npl-like.yaml")
     assert main(["diff", machine, machine]) == 2
-    assert "nothing was measured" in capsys.readouterr().err
+    assert "both files describe machines" in capsys.readouterr().err
     assert main(["diff", maps[0], "designs/quickstart.yaml"]) == 3
     assert "names no readings" in capsys.readouterr().err
     assert main(["diff", maps[0], "designs/reports/z-low.dmo"]) == 3
