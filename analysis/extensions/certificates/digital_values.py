@@ -51,12 +51,11 @@ def read_digital(
         problems.take(error, place)
         return None
     labels = listing(item.label for item in results)
-    chosen = [
-        item for item in results if settings.result is None or item.is_called(settings.result)
-    ]
-    if not chosen or settings.result is not None and len(chosen) > 1:
+    name = settings.result
+    chosen = [item for item in results if name is None or item.is_called(name)]
+    if not chosen or name is not None and len(chosen) > 1:
         many = "several results are" if chosen else "no result is"
-        text = f'{path.name}: {many} called "{shorten(settings.result)}"; it has {labels}'
+        text = f'{path.name}: {many} called "{shorten(name)}"; it has {labels}'
         problems.add((*steps, "result"), text)
         return None
     forms = _forms(wanted)
