@@ -1,10 +1,10 @@
-"""ballplate from Python: what the commands do, with results instead of text.
+"""ballplate from Python: the commands, with results instead of text.
 
-Wherever an experiment is taken, so is the path of a file with one; wherever a table, the path of a
-CSV file or a data frame. Values in results are in metres, radians and ratios. `report` receives
-each step of the progress: what is counted, how many are done, and of how many. Every function
-raises `ballplate.ExperimentError` for a file or an experiment that is wrong, ValueError for an
-argument that is, and TypeError for one of another kind.
+An experiment may be given as the path of its file, a table as the path of a CSV file or a data
+frame. Values in results are in metres, radians and ratios. `report` receives each step of the
+progress: its name, the number done, and the total. Every function raises
+`ballplate.ExperimentError` for an invalid file or experiment, ValueError for an invalid argument,
+and TypeError for one of another type.
 """
 
 from __future__ import annotations
@@ -93,12 +93,12 @@ def check(
     share: float | None = None,
     suggest: bool = False,
 ) -> Prediction:
-    """True if a design determines all its parameters and, if not, which changes it leaves
+    """Return the rank of a design and, if deficient, the changes of parameters it leaves
     undetermined.
 
-    `goals` are what it is to reach, too, as in `reach`, with the `share` of lengths that are to be
-    within; with `suggest` changes are looked for that would determine the rest. Both are in the
-    result's `advice`.
+    `goals` are further requirements, as in `reach`, with the `share` of lengths that must be
+    within; `suggest` searches for changes that determine the rest. Both are in the result's
+    `advice`.
 
     >>> check("designs/quickstart.yaml").verdict.deficiency
     0
@@ -134,11 +134,11 @@ def run(
     workers: int = 1,
     report: Report = unreported,
 ) -> Prediction:
-    """Rank and the uncertainties U1 to U6 of a design, with Monte Carlo beside them if `trials` or
-    `until` is given; `seed` and `workers` go with these only.
+    """Return rank and uncertainties U1 to U6 of a design, with Monte Carlo if `trials` or `until`
+    is given; `seed` and `workers` apply to these only.
 
-    At most `trials` data sets are estimated, or as many as make the ratios of spread to uncertainty
-    as accurate as `until`.
+    At most `trials` data sets are estimated, or as many as give ratios of spread to uncertainty as
+    accurate as `until`.
 
     >>> run(quickstart())
     <Prediction of quickstart: full rank, U6 0.143 µm on average, 0.325 µm at most>
@@ -349,10 +349,10 @@ def compare(
     published_maximum: str | None = None,
     report: Report = unreported,
 ) -> EstimatorComparison:
-    """How far the distances that another estimator corrects are from those by the full one, and
-    both from the true machine's, on synthetic data sets.
+    """Return the differences between distances corrected by another estimator and by the full one,
+    and of both from the true machine's, on synthetic data sets.
 
-    `published` values, as texts with a unit, are placed among the differences.
+    `published` values, as texts with a unit, are ranked among the differences.
 
     >>> compare(quickstart(), trials=2, points=10).failed
     ()
@@ -407,14 +407,14 @@ def plan(
     drift: Sequence[str] = (),
     report: Report = unreported,
 ) -> Campaign:
-    """Positions and certificates chosen from the experiment's pool for a budget, with the bound of
-    any choice.
+    """Choose positions and certificates from the experiment's pool within a limit, with the bound
+    of any choice.
 
-    Without a budget the choice may cost what the positions of the experiment itself do. Readings
-    that are `done` already are kept; where the artefact has `moved` since, a position interrupted
-    there can only be set up again. `earlier` is the file of a choice from this pool before, to
-    compare with and go on from. An `order`, change-over, mirrored, blocks or least-drift, or
-    sizes of a `drift` such as ["0.5 um/h", "0.2 ppm/h"] tell what a drift does in each order.
+    Without a limit the choice may cost as much as the positions of the experiment. Readings that
+    are `done` already are kept; if the artefact has `moved` since, a position interrupted there
+    can only be set up again. `earlier` is the file of an earlier choice from this pool, to compare
+    with and continue. An `order`, change-over, mirrored, blocks or least-drift, or sizes of a
+    `drift` such as ["0.5 um/h", "0.2 ppm/h"] add the effect of drift in each order.
 
     >>> corners = {"x": ["50 mm"], "y": ["50 mm"]}
     >>> places = {"planes": ["z"], "levels": ["100 mm", "400 mm"], "corners": corners}
@@ -486,7 +486,9 @@ def write_map(fitted: FittedMap, path: PathLike) -> None:
 
 
 def _shown_in_notebook(experiment: Experiment) -> str:
-    """An experiment in a notebook: its table, and its picture, of which it knows nothing."""
+    """Return the notebook view of an experiment: its table and its picture, which the experiment
+    itself cannot draw.
+    """
     view = optional_function("view")
     picture = "" if view is None else view(experiment)._repr_html_()
     return experiment._repr_html_() + picture

@@ -135,7 +135,7 @@ def fit_map_or_path(name: str, fitted: Fit | FittedMap | PathLike) -> Fit | Fitt
 
 
 def map_or_path(name: str, fitted: Fit | FittedMap | PathLike) -> FittedMap | Path:
-    """The map of a fit, or of what its to_map() gives; the path of a file as such."""
+    """Return the map of a fit, or a given map or path unchanged."""
     from .results.fits import Fit
 
     side = fit_map_or_path(name, fitted)
@@ -143,7 +143,7 @@ def map_or_path(name: str, fitted: Fit | FittedMap | PathLike) -> FittedMap | Pa
 
 
 def fitted_map_of(name: str, fitted: Fit | FittedMap | PathLike) -> FittedMap:
-    """The map of a fit, of what its to_map() gives, or of a file."""
+    """Return the map of a fit, of its to_map(), or of a file."""
     loaded_map = map_or_path(name, fitted)
     from ballplate.simulator.experiment.map_files import read_map
 

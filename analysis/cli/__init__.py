@@ -87,7 +87,7 @@ def _module_of(name: str) -> ModuleType:
 
 
 def _command(name: str) -> Command | None:
-    """What is listed of a command; None where there is none, or none that is installed.
+    """Return the listing of a command, unless its extension is not installed.
 
     :raises KeyError: there is no such command.
     """
@@ -114,7 +114,7 @@ def _with_command(words: Sequence[str]) -> list[str]:
 
 
 def parser(chosen: Sequence[str] | None = None, with_options: bool = True) -> _Parser:
-    """The command line's grammar, with all commands or some of them, or what is listed of all."""
+    """Return the command line's grammar, with all commands or some, or with their listing only."""
     top = _Parser(
         prog="ballplate",
         description="Plan and evaluate ball-plate experiments for co-ordinate measuring machines.",
@@ -167,7 +167,7 @@ def parser(chosen: Sequence[str] | None = None, with_options: bool = True) -> _P
 
 
 def _plain(text: str) -> str:
-    """A line of help that argparse prints as it is."""
+    """Return a line of help without format directives for argparse."""
     return text.replace("%", "%%")
 
 
@@ -303,14 +303,14 @@ def _run(options: argparse.Namespace) -> int:
 
 
 def internal_error(error: object) -> int:
-    """Say that the program is wrong, not what it was given; the exit status."""
+    """Report an error of the program itself; return the exit status."""
     text = f"internal error: {error}. Please report it with the file and the command."
     print(text, file=sys.stderr)
     return INTERNAL
 
 
 def _told(error: OSError, options: argparse.Namespace) -> str:
-    """What the system refused, of a file or without saying of which."""
+    """Return the system's refusal, with its file if known."""
     try:
         os.getcwd()
     except FileNotFoundError:
@@ -325,7 +325,7 @@ def _told(error: OSError, options: argparse.Namespace) -> str:
 
 
 class _Parser(argparse.ArgumentParser):
-    """Reports wrong usage in one line, whatever the arguments contain, with the probable intention.
+    """Parser that reports wrong usage in one line, with the probable intention.
 
     The parsers of commands are of this class as well.
     """
@@ -356,7 +356,7 @@ class _Parser(argparse.ArgumentParser):
         return choices
 
     def meant_by(self, unknown: Sequence[str]) -> str:
-        """Tell which of the command's options the unknown ones are probably meant for."""
+        """Return a suggestion of the options that the unknown ones are probably meant to be."""
         from ballplate.simulator.inputs.moved import MOVED
         from ballplate.simulator.inputs.settings import nearest
 
@@ -425,14 +425,14 @@ class _Formatter(argparse.HelpFormatter):
 
 
 class _InFull(argparse.Action):
-    """An option that makes another command is looked for as it is spelt."""
+    """An option that selects another command; it must be spelt in full."""
 
     def __call__(self, parser: argparse.ArgumentParser, *_: object) -> None:
         parser.error(f"write {self.option_strings[0]} in full")
 
 
 class _Version(argparse.Action):
-    """Looks the version up only when asked for it."""
+    """Prints the version, read only on request."""
 
     def __call__(self, parser: argparse.ArgumentParser, *_: object) -> None:
         from importlib.metadata import version

@@ -41,7 +41,7 @@ def width() -> int:
 
 
 def line(step: ProgressStep, elapsed: float) -> str:
-    """How far a step has come, as text alone.
+    """Return the progress of a step as text alone.
 
     >>> line(ProgressStep("data sets", 512, 2048, "accurate to 1.5 %"), 20.0)
     '512/2048 data sets, 00:20 so far, 01:00 left, accurate to 1.5 %'

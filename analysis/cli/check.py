@@ -1,4 +1,4 @@
-"""`ballplate check`: does the design determine what it asks for?"""
+"""`ballplate check`: rank of designs against the expected rank and goals."""
 
 from __future__ import annotations
 
@@ -101,7 +101,7 @@ def add_options(parser: ArgumentParser) -> None:
 
 
 def run(options: Namespace) -> int:
-    """Check all designs; 1 if one of them is not as expected, 3 if a file cannot be used."""
+    """Check all designs; return 1 unless all are as expected, 3 if a file cannot be used."""
     from ..planning.checked_files import Wanted, check_files
     from .common import print_json
     from .file_patterns import matching_files

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 
 def add_file(parser: ArgumentParser, several: bool = False) -> None:
-    """Add the experiment file, or several of them, and the choice of a variant."""
+    """Add the experiment file or files, and the choice of a variant."""
     parser.add_argument(
         "files",
         metavar="FILE",
@@ -53,7 +53,7 @@ def add_json(parser: ArgumentParser) -> None:
 
 
 def add_goal(parser: ArgumentParser, quantities: str) -> None:
-    """Add what is to be reached, with examples of quantities, and what replaces the target."""
+    """Add the goal, with examples of quantities, and the replacement of the target."""
     parser.add_argument(
         "--goal",
         default="lengths",
@@ -79,7 +79,7 @@ T = TypeVar("T")
 
 
 def argument_type(parse: Callable[[str], T]) -> Callable[[str], T]:
-    """The type of an argument: what its parser says is wrong with a text is told as it is."""
+    """Return the type of an argument that reports its parser's message on an invalid text."""
 
     @wraps(parse)
     def parsed(text: str) -> T:
@@ -118,7 +118,7 @@ def trial_count(text: str) -> int:
 
 
 def number(text: str, unit: str = "") -> float:
-    """Read a number with a unit behind it, or without; NaN where it is none."""
+    """Read a number with or without a unit behind it; NaN if it is not a number."""
     try:
         return float(text.removesuffix(unit).strip())
     except ValueError:
@@ -158,9 +158,7 @@ def percentage(text: str) -> float:
 
 
 def grid(text: str) -> tuple[int, ...] | None:
-    """Read the points along some axes of a grid, 2 or above each; None where it is no such
-    text.
-    """
+    """Read the points along some axes of a grid, 2 or above each, if the text is one."""
     parts = [part.strip() for part in text.split(",")]
     if not all(part.isascii() and part.isdigit() and 0 < len(part) < 8 for part in parts):
         return None
@@ -179,7 +177,7 @@ def add_workers(parser: Any) -> None:
 
 
 def add_formats(parser: ArgumentParser, formats: Sequence[str], help: str) -> None:
-    """Add the choice among forms of what is printed, text at first, and a short way to JSON."""
+    """Add the choice among output formats, text by default, and a short way to JSON."""
     parser.add_argument("--format", choices=formats, default="text", help=help)
     parser.add_argument(
         "--json",
@@ -206,7 +204,7 @@ def _picture(text: str) -> Path:
 def write_picture(options: Namespace, draw: Writer) -> None:
     """Write the picture that the options name.
 
-    :raises UsageError: there is nothing to be drawn.
+    :raises UsageError: there are no data to draw.
     """
     try:
         write(options, {options.plot: draw})
@@ -268,9 +266,9 @@ def experiments(options: Namespace, planning: bool = False) -> list[Experiment]:
 
 
 def single(options: Namespace, planning: bool = False) -> Experiment:
-    """The one experiment that the options choose, with its pool for `planning`.
+    """Return the one experiment that the options choose, with its pool for `planning`.
 
-    :raises ExperimentError: the file has several variants and none was chosen.
+    :raises ExperimentError: the file has several variants, and the options choose no single one.
     """
     from ballplate.simulator.inputs.messages import refused
 
@@ -297,7 +295,7 @@ def print_lines(lines: Sequence[str]) -> None:
 
 
 def show(options: Namespace, result: Result) -> None:
-    """Print a result as JSON where that is asked for, otherwise as text."""
+    """Print a result as text, or as JSON on request."""
     if options.json:
         print_json([result.to_dict()])
     else:
@@ -305,7 +303,7 @@ def show(options: Namespace, result: Result) -> None:
 
 
 def print_json(results: list[dict[str, Any]]) -> None:
-    """One object by itself, several as an array."""
+    """Print a single object as such, several as an array."""
     json.dump(
         results[0] if len(results) == 1 else results,
         sys.stdout,

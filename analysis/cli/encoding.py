@@ -43,8 +43,7 @@ DATA_FORMATS = (None, "csv", "github", "html", "json", "junit", "latex", "markdo
 
 
 def readable(error: UnicodeError) -> tuple[str, int]:
-    r"""Write plain characters for those that an encoding lacks, and numbers for those that have
-    none.
+    r"""Replace characters that an encoding lacks by plain ones, or by their numbers.
 
     >>> "0.5 µm ± 2 µm, Prüfkörper".encode("ascii", HANDLER)
     b'0.5 um +/- 2 um, Pr\\xfcfk\\xf6rper'

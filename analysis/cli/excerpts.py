@@ -1,6 +1,4 @@
-"""Errors of files for people at a terminal: below each the line that it is about, with a mark at
-the place.
-"""
+"""Errors of files for people at a terminal: each with its line and a mark at the column."""
 
 from __future__ import annotations
 
@@ -27,10 +25,10 @@ RED, PLAIN = "\x1b[31m", "\x1b[0m"
 
 
 def has_colour(stream: TextIO, environment: Mapping[str, str] = os.environ) -> bool:
-    """True if colour is wanted: by NO_COLOR and FORCE_COLOR where one is not empty, else on a
-    terminal that has it.
+    """True for colour: by NO_COLOR and FORCE_COLOR if not empty, otherwise on a terminal that
+    supports it.
 
-    Not every console of Windows knows the sequences, and there it has to be asked for.
+    Some consoles of Windows interpret the sequences only on request.
     """
     if environment.get("NO_COLOR"):
         return False
@@ -104,7 +102,7 @@ def excerpt(line: str, column: int, width: int) -> tuple[str, str]:
 
 
 def _columns(text: str) -> int:
-    """How many columns of a terminal a text takes."""
+    """Return the number of terminal columns of a text."""
     return sum(
         0 if combining(character) else 2 if east_asian_width(character) in "FW" else 1
         for character in text

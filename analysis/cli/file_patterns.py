@@ -1,4 +1,4 @@
-"""Files that patterns stand for, on systems whose shell does not expand them as well."""
+"""Expansion of file patterns, also on systems whose shell does not expand them."""
 
 from __future__ import annotations
 
@@ -12,10 +12,9 @@ OTHERS = ("sweeps", "machines")
 
 
 def matching_files(patterns: Sequence[Path]) -> list[Path]:
-    """Files and patterns as files, each once; those in folders of sweeps and machines are left out
-    of patterns.
+    """Return files of names and patterns, each once; patterns omit folders of sweeps and machines.
 
-    A pattern that matches nothing stays as it is, and is told as a file that is not there.
+    A pattern without a match is kept and reported as a missing file.
     """
     paths: dict[Path, None] = {}
     for path in patterns:

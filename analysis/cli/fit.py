@@ -80,7 +80,7 @@ def add_options(parser: ArgumentParser) -> None:
 
 
 def _add_estimators(parser: ArgumentParser) -> None:
-    """Add the choice of an estimator, and what goes with only some of them."""
+    """Add the choice of an estimator, and the options of some estimators."""
     parser.add_argument(
         "--estimator",
         choices=ESTIMATORS,

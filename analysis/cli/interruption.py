@@ -53,7 +53,7 @@ def named_paths(options: Namespace) -> Iterator[tuple[str, Path]]:
 
 
 def signatures(paths: Iterable[Path]) -> dict[Path, Signature | None]:
-    """True if files are there, and what tells that one was written to."""
+    """Return the presence and write times of files."""
     return {path: _signature(path) for path in paths}
 
 
@@ -66,7 +66,7 @@ def _signature(path: Path) -> Signature | None:
 
 
 def written(before: Mapping[Path, Signature | None]) -> str:
-    """Tell which of the files are new or others than before."""
+    """Return the files that are new or changed."""
     names = [
         str(path) for path, signature in before.items() if _signature(path) not in (None, signature)
     ]
@@ -75,8 +75,8 @@ def written(before: Mapping[Path, Signature | None]) -> str:
 
 @dataclass
 class Interruption:
-    """The first signal of those answered that has come, and what tells what the command keeps if it
-    ends now.
+    """The first signal received, and a function that returns the files kept if the command ends
+    now.
     """
 
     came: int | None = None
@@ -111,10 +111,10 @@ class Interruption:
             self.answer()
 
     def answer(self) -> None:
-        """Raise KeyboardInterrupt if there was a signal.
+        """Raise KeyboardInterrupt after a signal.
 
-        It is for long work to call now and then: an interruption that comes in a place that lets no
-        exception out, such as a finaliser or a library's callback, would go unanswered.
+        Long work calls it now and then: an interruption inside a finaliser or a library's
+        callback, which lets no exception out, would be lost.
         """
         if self.came is not None:
             raise KeyboardInterrupt
@@ -134,16 +134,15 @@ class Interruption:
 
 @contextmanager
 def interruptions(is_own_process: bool = False) -> Iterator[Interruption]:
-    """Remember the first signal, which raises KeyboardInterrupt if it comes within
-    `Interruption.raising`.
+    """Remember the first signal, which raises KeyboardInterrupt within `Interruption.raising`.
 
-    In a process of its own the command has `ORDERLY_LIMIT` to end from then on; then, or at a
-    second signal, another thread ends the process. So it ends also in a long call of linear
-    algebra, and where a library has caught the exception. Signals that come after the command's end
-    change nothing, unless the interpreter's takes too long.
+    In a process of its own the command then has `ORDERLY_LIMIT` to end; afterwards, or at a second
+    signal, another thread ends the process, also during a long call of linear algebra, or if a
+    library has caught the exception. Signals after the command's end have no effect, unless the
+    interpreter's end takes too long.
 
-    A process that was started with a signal ignored, as shells start those in the background, goes
-    on ignoring it.
+    A process started with a signal ignored, as shells start those in the background, continues to
+    ignore it.
     """
     interruption = Interruption()
     if threading.current_thread() is not threading.main_thread():
@@ -216,7 +215,7 @@ def _watch(interruption: Interruption, numbers: frozenset[int]) -> None:
 
 
 def _wait(reader: socket, numbers: frozenset[int]) -> int:
-    """The number of the next signal that is one of these."""
+    """Return the number of the next of these signals."""
     while True:
         number = reader.recv(1)[0]
         if number in numbers:
@@ -226,8 +225,8 @@ def _wait(reader: socket, numbers: frozenset[int]) -> int:
 def leave(status: int) -> NoReturn:
     """End the process and its workers at once.
 
-    The interpreter's own end would wait for what is under way, and may take an interruption that
-    passed through generated code for one that nobody has answered.
+    The interpreter's own end would wait for running work, and may report an interruption that
+    passed through generated code as unanswered.
     """
     try:
         # Not imported: the main thread may be about to, and would be waited for.
@@ -241,7 +240,7 @@ def leave(status: int) -> NoReturn:
 
 
 def tell(interruption: Interruption) -> None:
-    """Say on standard error, once, that the command has ended, and what it keeps."""
+    """Report once, on standard error, that the command has ended, and the files it keeps."""
     if sys.stderr is not None and interruption.told.acquire(blocking=False):
         clear = "\r\x1b[K" if sys.stderr.isatty() else ""
         print(f"{clear}{interruption.word}; {interruption.kept()}", file=sys.stderr, flush=True)

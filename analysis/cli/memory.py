@@ -28,9 +28,7 @@ SMALLER = {
 
 
 def no_memory(error: BaseException, options: Namespace) -> str | None:
-    """What to tell the user where an error comes of a want of memory, here or in a worker; None of
-    any other error.
-    """
+    """Return the message for an error from lack of memory, here or in a worker."""
     name = options.command
     named = [path for key, path in named_paths(options) if key in ("files", "file", "store")]
     place = ", ".join(map(str, named)) or f"ballplate {name}"

@@ -10,7 +10,7 @@ from contextlib import contextmanager
 
 
 def add_telling(parser: ArgumentParser) -> None:
-    """Add the choice to be told less, or more."""
+    """Add the options for fewer or more notes."""
     group = parser.add_mutually_exclusive_group()
     group.add_argument(
         "-q",
@@ -27,35 +27,33 @@ def add_telling(parser: ArgumentParser) -> None:
 
 
 def note(options: Namespace, text: str) -> None:
-    """Tell what is neither a result nor an error nor a warning."""
+    """Print a note."""
     if not options.quiet:
         complain(text)
 
 
 def complain(text: object) -> None:
-    """Tell in one line what is wrong, or what of it is to be known."""
+    """Print a fault, or a fact about it, in one line."""
     from ballplate.simulator.inputs.messages import in_one_line
 
     print(in_one_line(str(text)), file=sys.stderr)
 
 
 def warn(doubts: Iterable[object]) -> None:
-    """Tell what is doubtful, each in one line."""
+    """Print warnings, one line each."""
     for doubt in doubts:
         complain(f"warning: {doubt}")
 
 
 def tell_notes(notes: Iterable[object]) -> None:
-    """Tell what was found by itself, each in one line."""
+    """Print detected settings, one line each."""
     for note in notes:
         complain(f"note: {note}")
 
 
 @contextmanager
 def told(options: Namespace) -> Iterator[None]:
-    """Tell, where it is asked for, what a command works with before it does, and then how long it
-    took.
-    """
+    """On request, print the inputs of a command before it starts, and its duration afterwards."""
     if not options.verbose:
         yield
         return

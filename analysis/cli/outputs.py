@@ -1,8 +1,8 @@
-"""Files that a command writes: declared with its options, checked before any work, and put in place
-whole or not.
+"""Output files of a command: declared with its options, checked before any work, and written whole
+or not at all.
 
-An option that names a file to be written is added by `add_output`. `check_outputs` then refuses,
-before the command runs, whatever cannot be written or would destroy something; `write_outputs`
+`add_output` adds an option that names a file to write. Before the command runs, `check_outputs`
+refuses files that cannot be written or whose writing would destroy something; `write_outputs`
 writes.
 """
 
@@ -55,9 +55,7 @@ Contents = Mapping[Path, Writer | str] | Mapping[Path | None, Writer | str]
 
 @dataclass(frozen=True)
 class Needed:
-    """Modules beside those that every installation has: for `what`, and the extra that installs
-    them.
-    """
+    """Modules of an extra, for `what`, and the extra that installs them."""
 
     what: str
     modules: tuple[str, ...]
@@ -65,7 +63,7 @@ class Needed:
 
     @property
     def told(self) -> str:
-        """What is missing, and how to get it."""
+        """Missing modules, and the command that installs them."""
         pronoun = "it" if len(self.modules) == 1 else "them"
         names = " and ".join(self.modules)
         return (
@@ -105,9 +103,7 @@ class UsageError(ValueError):
 
 
 class OutputAction(Action):
-    """An option that names a file to be written; `options.outputs` has all of them that are
-    given.
-    """
+    """An option that names a file to write; `options.outputs` has all given ones."""
 
     def __init__(
         self,
@@ -137,10 +133,10 @@ class OutputAction(Action):
 
 
 def add_output(parser: Any, *names: str, metavar: str, help: str, **settings: Any) -> None:
-    """Add an option that names a file to be written.
+    """Add an option that names a file to write.
 
-    ``needed`` gives, by the file's name, what writing it needs beside what every installation has;
-    with ``takes_screen`` the name - means standard output.
+    ``needed`` gives, by the file's name, the extra that writing it needs; with ``takes_screen``
+    the name - is standard output.
     """
     parser.add_argument(
         *names, action=OutputAction, metavar=metavar, help=help, **{"type": Path, **settings}
@@ -153,15 +149,14 @@ def add_force(parser: Any) -> None:
 
 
 def check_outputs(options: Namespace) -> None:
-    """Refuse files that cannot be written, or in whose place something stands, before the work and
-    not after it.
+    """Refuse output files that cannot be written, or that exist, before the work.
 
-    Devices and pipes are written as they are, and are not checked. Whatever else the options name
-    is read.
+    Devices and pipes are written directly, without checks. All other files that the options name
+    are inputs.
 
-    :raises UsageError: an output is an input, another output, or where standard output goes.
-    :raises ExperimentError: without `--force` there is one already; one cannot be written; an extra
-        is missing.
+    :raises UsageError: an output is an input, another output, or the target of standard output.
+        :raises ExperimentError: a file exists, without `--force`; cannot be written; or needs an
+        extra that     is missing.
     """
     from ballplate.simulator.inputs.messages import ExperimentError
 
@@ -183,7 +178,7 @@ def check_outputs(options: Namespace) -> None:
 
 
 def check_overwritten(path: Path) -> None:
-    """Refuse a file that cannot be put in the place of the one that is there.
+    """Refuse a file that cannot replace the existing one.
 
     :raises ExperimentError: it cannot be written.
     """
@@ -300,10 +295,9 @@ def write_outputs(
 
 
 def write(options: Namespace, contents: Contents) -> bool:
-    """Write the files of a command.
+    """Write the files of a command; return true if all were written.
 
-    The command ends with the status of a file that cannot be used if one of them cannot be written;
-    whether they are.
+    Otherwise the command ends with the status of a file that cannot be used.
     """
     writers = {
         path: text_writer(partial(_print, content)) if isinstance(content, str) else content
@@ -320,7 +314,7 @@ def _print(text: str, stream: TextIO) -> None:
 
 
 def text_writer(print_to: Callable[[TextIO], object]) -> Writer:
-    """A writer of text, in UTF-8 and with line ends as they are."""
+    """Return a writer of text, in UTF-8 and with unchanged line ends."""
 
     def write_file(path: Path) -> None:
         with path.open("w", encoding="utf-8", newline="") as stream:

@@ -220,7 +220,7 @@ def run(options: Namespace) -> int:
 
 
 def _write(campaign: Campaign, options: Namespace) -> None:
-    """Write what was asked for."""
+    """Write the requested files."""
     contents: dict[Path | None, Writer | str] = {}
     if options.output is not None:
         contents[options.output] = campaign.to_yaml(options.output.parent)

@@ -1,5 +1,5 @@
 """Progress of a long step on standard error: a bar on a terminal, occasional plain lines
-elsewhere.
+otherwise.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ LINE_INTERVAL = 5.0
 
 @dataclass
 class ProgressDisplay:
-    """Shows one step after the other; `what` is counted, which is also what tells steps apart."""
+    """Display of steps in sequence; `what` is counted, and identifies the step."""
 
     is_quiet: bool = False
     is_verbose: bool = False
@@ -34,7 +34,7 @@ class ProgressDisplay:
     bar: Bar | None = None
 
     def show(self, step: ProgressStep) -> None:
-        """Report how far a step has come; the time left does not count what was done before."""
+        """Report the progress of a step; the remaining time ignores earlier work."""
         if step.what != self.what:
             self.close()
             self.what, self.started, self.last = step.what, time.monotonic(), time.monotonic()
@@ -68,9 +68,7 @@ class ProgressDisplay:
             self.bar.clear()
 
     def close(self) -> None:
-        """Take the bar away, as the step has ended, and tell how long it took where that is asked
-        for.
-        """
+        """Remove the bar at the end of the step, and print its duration on request."""
         if self.bar is not None:
             self.bar.close()
         if self.is_verbose and self.what:
@@ -81,7 +79,7 @@ class ProgressDisplay:
 
 @contextmanager
 def progress(options: Namespace) -> Iterator[ProgressDisplay]:
-    """What shows the steps of a command, for as long as they take."""
+    """Return the display of a command's steps."""
     shown = ProgressDisplay(options.quiet, options.verbose)
     try:
         yield shown

@@ -1,4 +1,4 @@
-"""Options about an experiment with its readings, and these as they are read."""
+"""Options of an experiment with readings, and their evaluation."""
 
 from __future__ import annotations
 
@@ -61,9 +61,9 @@ def add_readings_argument(parser: ArgumentParser, help: str) -> None:
 
 
 def refuse_wrong_order(options: Namespace) -> None:
-    """Refuse readings before the experiment file, and what is no table of readings after it.
+    """Refuse readings before the experiment file, and other files than tables after it.
 
-    :raises UsageError: they are so given.
+    :raises UsageError: in these cases.
     """
     first = options.files[0]
     for second in options.readings:
@@ -76,7 +76,7 @@ def refuse_wrong_order(options: Namespace) -> None:
 
 
 def refuse_other_files(path: Path) -> None:
-    """Refuse a file that is a map, or another file of YAML, in the place of readings.
+    """Refuse a map, or another YAML file, as readings.
 
     :raises UsageError: it is one.
     """
@@ -88,11 +88,10 @@ def refuse_other_files(path: Path) -> None:
 
 
 def observed_readings(options: Namespace) -> tuple[Experiment, ObservedReadings]:
-    """The experiment that the options choose and its readings; says what is to be said of these.
+    """Return the experiment that the options choose and its readings, and print their notes.
 
-    :raises UsageError: the readings come first, and the experiment file after them.
-
-    :raises ExperimentError: one of the files is invalid.
+    :raises UsageError: the readings come first, and the experiment file after them. :raises
+        ExperimentError: one of the files is invalid.
     """
     from ballplate.simulator.inputs.extensions import service
 
@@ -106,7 +105,7 @@ def observed_readings(options: Namespace) -> tuple[Experiment, ObservedReadings]
 
 
 def warn_of(result: FitResult) -> int:
-    """Warn of what a user of an estimate has to know; 1 if there is something to complain of."""
+    """Print the warnings of an estimate; return 1 if it has a failure reason."""
     warn(result.cautions)
     if result.complaint:
         complain(result.complaint)
@@ -119,7 +118,7 @@ def tables(
     sources: Sequence[Path],
     of_certificate: tuple[str, ...] = (),
 ) -> ObservedReadings:
-    """Readings of tables; says what is to be said of them, and of a certificate's values."""
+    """Print the notes of tables of readings and of a certificate's values."""
     from ballplate.simulator.experiment.layout import lay_out
     from ballplate.simulator.readings.reading_files import read_readings
 

@@ -1,4 +1,4 @@
-"""`ballplate run`: the uncertainty tables of a design, and Monte Carlo beside them."""
+"""`ballplate run`: uncertainty tables of a design, optionally with Monte Carlo."""
 
 from __future__ import annotations
 

@@ -16,8 +16,8 @@ from typing import Any
 class StandardOutputError(Exception):
     """Standard output cannot be written; the text is the system's reason.
 
-    No OSError, which would be taken for one of a file, and which some libraries pass over in
-    silence.
+    It is not an OSError, which would be reported as one of a file, and which some libraries
+    ignore.
     """
 
 
@@ -27,13 +27,13 @@ _CONSOLE: Any = getattr(io, "_WindowsConsoleIO", io.FileIO)
 
 @contextmanager
 def lasting_streams() -> Iterator[None]:
-    """Let a command work to its end whoever reads what it prints, so that its files and its status
-    are its own.
+    """Let a command finish regardless of the reader of its output, so that its files and its
+    status are its own.
 
-    A reader of standard output that has left, such as ``head``, changes nothing: what follows is
-    dropped. Any other error of standard output is raised once as StandardOutputError, and what
-    follows is dropped. One that was closed beforehand is such an error as soon as something is
-    printed. Errors of standard error are not told, as there is no place for them.
+    If a reader of standard output such as ``head`` has left, further output is dropped. Any other
+    error of standard output is raised once as StandardOutputError, at the first output if the
+    stream was closed beforehand. Errors of standard error are ignored, since no stream remains for
+    them.
     """
     before = sys.stdout, sys.stderr
     sys.stdout = _lasting(sys.stdout, 1, is_told=True)
@@ -48,10 +48,10 @@ def lasting_streams() -> Iterator[None]:
 
 
 def keep_standard_numbers() -> None:
-    """Open the null device in the place of standard streams that are closed.
+    """Open the null device as replacement of closed standard streams.
 
-    Otherwise files that are opened later would take their numbers, here or in workers, and receive
-    what libraries and the interpreter write to these.
+    Otherwise files opened later would take their numbers, here or in workers, and receive the
+    output of libraries and the interpreter.
     """
     while (number := os.open(os.devnull, os.O_RDWR)) <= 2:
         os.set_inheritable(number, True)
@@ -59,9 +59,7 @@ def keep_standard_numbers() -> None:
 
 
 def _lasting(stream: Any, number: int, is_told: bool) -> Any:
-    """The stream with errors answered; as it is where somebody has put one of his own in its
-    place.
-    """
+    """Return the stream with errors handled, or unchanged if it is not the interpreter's own."""
     if stream is None:
         closed = io.BufferedWriter(_Lasting(None, number, is_told))
         return io.TextIOWrapper(closed, encoding="utf-8", errors="replace", line_buffering=True)

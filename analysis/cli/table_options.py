@@ -83,7 +83,7 @@ def columns(text: str) -> dict[str, str]:
 
 
 def with_options(options: Namespace, experiment: Experiment) -> Experiment:
-    """The experiment with what the options say of tables of readings.
+    """Return the experiment with the options on tables of readings.
 
     :raises ExperimentError: they are invalid.
     """
@@ -91,9 +91,9 @@ def with_options(options: Namespace, experiment: Experiment) -> Experiment:
 
 
 def named_sources(experiment: Experiment) -> list[Path]:
-    """The tables that the experiment file names.
+    """Return the tables that the experiment file names.
 
-    :raises ExperimentError: it names none.
+    :raises ExperimentError: the file names no table.
     """
     from ballplate.simulator.inputs.messages import refused
 

@@ -72,7 +72,7 @@ def check_error_model(sections: Sections, machine: Machine | None, references: R
 def _check_model(
     settings: Any, steps: Steps, machine: Machine | None, references: References
 ) -> bool:
-    """Report what is wrong; tell whether the settings can be used further."""
+    """Report faults; return true if the settings can be used further."""
     if isinstance(settings, MachineFileSettings):
         found = _machine_of_file(settings.file, steps, references)
         if found is None:
@@ -335,12 +335,12 @@ def check_use(
     candidates: Collection[Position] | None = (),
     planning: bool = False,
 ) -> None:
-    """Report artefacts never placed, balls of plates never read, and uncalibrated length standards
-    of many balls.
+    """Report artefacts without a position, unread balls of plates, and uncalibrated length
+    standards of many balls.
 
-    Of a ball bar or a Bryan gauge without a certificate the length is a parameter. ``candidates``
-    of a pool, None where some are wrong, may place an artefact; for ``planning`` they may read what
-    no position reads.
+    Without a certificate the length of a ball bar or a Bryan gauge is a parameter. ``candidates``
+    of a pool (unknown if some are invalid) may set up an artefact; for ``planning`` they may read
+    balls that no position reads.
     """
     problems = references.problems
     placed: set[str] = set()
@@ -488,7 +488,7 @@ def check_derivatives(
     evaluation: Evaluation | None,
     references: References,
 ) -> None:
-    """Report more evaluation points than there is memory for, with so many machine errors."""
+    """Report evaluation points whose derivatives by all machine errors exceed the memory."""
     settings = sections.get("error_model")
     if (
         settings is None
@@ -547,7 +547,7 @@ def check_lengths(
 
 
 def _check_joint_lengths(calibrations: Mapping[Steps, Calibration], references: References) -> None:
-    """Report length standards of which too many lengths have balls in common."""
+    """Report length standards with too many lengths that have balls in common."""
     of_standards: dict[str, list[tuple[Steps, DistanceCalibration]]] = {}
     for steps, calibration in calibrations.items():
         if (

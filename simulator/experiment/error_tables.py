@@ -35,9 +35,9 @@ MARGIN, WIDEST = 0.05, 0.25
 
 @dataclass(frozen=True)
 class ErrorTable:
-    """A measured error: its points and bandwidth along the axis, and what the comments say.
+    """A measured error: its points and bandwidth along the axis, and the content of comments.
 
-    `line` has the positions of other axes by their names.
+    `line` has the positions of other axes by name.
     """
 
     points: Points
@@ -185,7 +185,7 @@ def _meant(comment: str) -> str | None:
 def _range(
     file: str, positions: tuple[float, ...], numbers: tuple[int, ...], axis: tuple[float, float]
 ) -> list[Message]:
-    """Faults of the ends of a table whose points stand in lines `numbers`."""
+    """Return the fault of the ends of a table whose points are in lines `numbers`."""
     lower, upper = axis
     length = upper - lower
     limits = []

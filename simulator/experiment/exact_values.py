@@ -46,7 +46,7 @@ MOST_ENTRIES = 200_000
 
 @dataclass(frozen=True)
 class _Exact:
-    """Exact values (m,) of an artefact: of which item each is, and what it is called."""
+    """Exact values (m,) of an artefact, each with its item and its name."""
 
     parts: tuple[tuple[BallObservations, Integers], ...]
     item: tuple[int, ...]
@@ -59,7 +59,7 @@ class _Exact:
 
     @cached_property
     def rounding(self) -> float:
-        """What misfits are no larger than that are mere rounding, in metres."""
+        """Largest misfit that rounding explains, in metres."""
         return AGREE * max(1.0, *(float(np.abs(one.value).max()) for one, _ in self.parts))
 
     def misfit(self, balls: Array) -> tuple[Array, Array]:
@@ -92,8 +92,8 @@ def exact_contradictions(
     plates: Iterable[str],
     layouts: Mapping[str, BallLayout],
 ) -> Iterator[tuple[int, str]]:
-    """Exact distances and co-ordinates of plates that no arrangement of balls has: of which item
-    the first is, and as text.
+    """Return contradictory exact distances and co-ordinates of plates: the item of the first, and
+    a description.
     """
     for artefact in plates:
         mine = {
@@ -143,8 +143,8 @@ def _exact_values(calibrations: Mapping[int, Calibration], layout: BallLayout) -
 
 
 def _doubtfulness(exact: _Exact, balls: Array, misfit: Array) -> Array:
-    """How much of the misfit goes where one value (m,) or another goes: their misfits by the roots
-    of their redundancies [Baarda].
+    """Return the misfit per value (m,): misfits divided by the roots of their redundancies
+    [Baarda].
     """
     rows = exact.misfit(balls)[1]
     u, values, _ = np.linalg.svd(rows.reshape(len(rows), -1), full_matrices=False)
@@ -153,7 +153,9 @@ def _doubtfulness(exact: _Exact, balls: Array, misfit: Array) -> Array:
 
 
 def _least_misfit(exact: _Exact, drawn: Array) -> tuple[Array, Array] | None:
-    """The balls (n, d) that meet the values best and their misfits (m,); None if any meet all."""
+    """Return the balls (n, d) that satisfy the values best and their misfits (m,), or None if
+    every arrangement does.
+    """
     extent = float(np.ptp(drawn, axis=0).max())
     generator = np.random.default_rng(0)
     best: tuple[Array, Array] | None = None

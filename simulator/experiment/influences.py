@@ -1,4 +1,4 @@
-"""Influence quantities of an experiment: faults of them, and what they are in a design."""
+"""Influence quantities of an experiment: their faults, and their form in a design."""
 
 from __future__ import annotations
 
@@ -51,12 +51,12 @@ def resolve_influences(
 
 
 def with_influences(design: Design, experiment: Experiment, is_pool: bool = False) -> Design:
-    """The design with the influence quantities of its experiment, and what is known of them.
+    """Return the design with the influence quantities of its experiment, and their priors.
 
     Of a pool only parameters that positions share count against the limit.
 
-    :raises ExperimentError: they have more parameters than there is memory for, or one twice; a
-        class does not keep to what `Influence` says.
+    :raises ExperimentError: they have more parameters than memory allows, or one twice; a class
+        violates the protocol `Influence`.
     """
     if not experiment.influences:
         return design
@@ -108,7 +108,7 @@ def with_influences(design: Design, experiment: Experiment, is_pool: bool = Fals
 def _with_stated(
     priors: Priors, known_indices: Integers, parameters: list[InfluenceParameter]
 ) -> Priors:
-    """Priors, and what is stated of the parameters `known` of influence quantities."""
+    """Return priors with the stated values of the known parameters of influence quantities."""
     none = np.full(len(known_indices), -1)
     offsets = priors.by_offset
     return Priors(
@@ -145,6 +145,6 @@ def _refuse_too_many(disturbed: Design, experiment: Experiment, is_pool: bool) -
 
 
 def _of_class(experiment: Experiment, i: int, text: str) -> ExperimentError:
-    """Faults of the class of the i-th influence quantity."""
+    """Return the fault of the class of the i-th influence quantity."""
     name = type(experiment.influences[i]).__name__
     return experiment.refused(("influences", i), f"the class {name}: {text}")

@@ -139,13 +139,13 @@ def lay_out(experiment: Experiment, is_pool: bool = False) -> Design:
 
 
 def _free(experiment: Experiment) -> Flags:
-    """Which probe offsets are parameters (l, d)."""
+    """Return a mask (l, d) of probe offsets that are parameters."""
     free = [probe.is_estimated for probe in experiment.probes.values()]
     return np.repeat(np.array(free)[:, None], experiment.dimension, axis=1)
 
 
 def _priors(experiment: Experiment, held_flags: Flags, parameters: int) -> Priors:
-    """What is known beforehand: the priors stated, and the probe offsets that have an uncertainty.
+    """Return prior knowledge: the priors stated, and the probe offsets that have an uncertainty.
 
     :raises ExperimentError: a prior is about a pose parameter that is held.
     """
@@ -191,8 +191,8 @@ def _priors(experiment: Experiment, held_flags: Flags, parameters: int) -> Prior
 def _across(
     experiment: Experiment, rotations: Array, position_artefact: NDArray[np.int64]
 ) -> NDArray[np.int64] | None:
-    """The machine's axis (k,) across artefacts that are read in their plane, -1 for others; None
-    where there are no such artefacts.
+    """Return the machine's axis (k,) across artefacts that are read in their plane, -1 for others,
+    if there are such artefacts.
     """
     in_plane = [artefact.reads == "in plane" for artefact in experiment.artefacts.values()]
     if not any(in_plane):
@@ -280,12 +280,12 @@ def _held(
     rotations: Array,
     observations: Collection[Observations],
 ) -> Flags:
-    """Which pose parameters are held (k, pose size).
+    """Return a mask (k, pose size) of held pose parameters.
 
-    An artefact's frame is free up to a rigid motion, less what calibrated co-ordinates fix of it.
-    As many parameters of the artefact's first pose are held as are left free: all of them when only
-    distances are known, none with co-ordinates of three balls. Balls on one line leave the turn
-    about it open in every pose, a single ball every turn.
+    An artefact's frame is free up to a rigid motion, except the part that calibrated co-ordinates
+    fix. As many parameters of the artefact's first pose are held as remain free: all of them if
+    only distances are known, none with co-ordinates of three balls. Balls on one line leave the
+    turn about it undetermined in every pose, a single ball every turn.
     """
     d = balls.places.shape[1]
     held_flags = np.zeros((len(position_artefact), pose_size(d)), bool)
@@ -313,7 +313,9 @@ def _held(
 
 
 def _idle_turns(balls: Array) -> Array:
-    """Motions (pose size, k) of an artefact about its centre that move none of its balls (n, d)."""
+    """Return the motions (pose size, k) of an artefact about its centre that leave all its balls
+    (n, d) unchanged.
+    """
     d = balls.shape[1]
     centred = balls - balls.mean(axis=0)
     moves = _motion_of_coordinates(
@@ -336,7 +338,9 @@ def _in_machine_axes(motions: Array, rotation: Array) -> Array:
 
 
 def _motion_of_coordinates(places: Array, axis: NDArray[np.int64], d: int) -> Array:
-    """How a small motion of the artefact's frame changes co-ordinates (m, pose size)."""
+    """Return the change of co-ordinates (m, pose size) by a small motion of the artefact's
+    frame.
+    """
     m = len(axis)
     rows = np.zeros((m, pose_size(d)))
     rows[np.arange(m), axis] = 1.0
@@ -348,7 +352,7 @@ def _motion_of_coordinates(places: Array, axis: NDArray[np.int64], d: int) -> Ar
 
 
 def _null_space(rows: Array) -> Array:
-    """Orthonormal columns that span what the rows leave free."""
+    """Return orthonormal columns of the null space of the rows."""
     if not len(rows):
         return np.eye(rows.shape[1])
     # What the triangular factor leaves free, the rows do; their own decomposition grows with their

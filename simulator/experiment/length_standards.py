@@ -21,9 +21,7 @@ from .model import Experiment
 
 @dataclass(frozen=True)
 class _Row:
-    """A length: indices of the readings of its ends (-1: pivot), its direction, and what is known
-    of it.
-    """
+    """A length: indices of the readings of its ends (-1: pivot), its direction, and its value."""
 
     value: float
     certificate: tuple[object, int]
@@ -45,14 +43,14 @@ def standard_lengths(
     position_artefact: Integers,
     balls: Array,
 ) -> tuple[Lengths, UnknownLengths]:
-    """The lengths of all standards, and those of them that are unknown.
+    """Return the lengths of all standards, and the unknown ones.
 
-    A length standard contributes each of its calibrated distances once for every position and probe
-    with which both its balls are read. The error of a certificate is the same in all of them, but
-    where the readings' repeatability is ignored: then the stated uncertainty stands for all that a
-    length may be off, each time anew. A Bryan gauge contributes its radius with every reading.
-    Without a certificate the length of a ball bar and the radius of a gauge are unknown, and the
-    same wherever they are read.
+    A length standard contributes each of its calibrated distances once for every position and
+    probe with which both its balls are read. The error of a certificate is the same in all of
+    these, unless the readings' repeatability is ignored: then the stated uncertainty covers all
+    deviations of a length, separately each time. A Bryan gauge contributes its radius with every
+    reading. Without a certificate the length of a ball bar and the radius of a gauge are unknown,
+    and the same in all readings.
     """
     artefacts = list(experiment.artefacts)
     rows: list[_Row] = []

@@ -55,13 +55,12 @@ def load(
     """Load an experiment file.
 
     Returns the experiment, or one per variant in the order of the file. Tables that the file names
-    are read from the folder it is in. For ``planning`` an experiment has its pool, and positions
-    may be missing where there is one; otherwise what only the pool places is left out. Error
-    models in Python are code that loading runs, if ``trust`` allows it. A ``text`` is read as what
-    the file is to have.
+    are read from its folder. For ``planning`` an experiment has its pool, and positions may be
+    missing if it has one; otherwise artefacts of the pool alone are omitted. Error models in
+    Python are code that loading runs, if ``trust`` allows it. A ``text`` is read as the content of
+    the file.
 
-    :raises ExperimentError: the file, or a table it names, is wrong; holds everything that was
-        found.
+    :raises ExperimentError: the file, or a table it names, is invalid; holds all faults found.
     """
     source = Path(path)
     refused: list[Message] = []
@@ -113,10 +112,10 @@ def load(
 def trees_of(
     text: str, source: Path, refused: list[Message]
 ) -> tuple[Node, dict[str, Node], Problems]:
-    """What a file with this text says, its variants by name, and faults of these; faults of the
-    YAML goes to ``refused``.
+    """Return the content of a file with this text, its variants by name, and the faults of these;
+    faults of the YAML go to ``refused``.
 
-    :raises ExperimentError: the YAML is so wrong that there is no tree.
+    :raises ExperimentError: the YAML has no tree.
     """
     root = with_present_keys(parse_tree(text, str(source), refused))
     problems = Problems(root)
@@ -124,18 +123,19 @@ def trees_of(
 
 
 def with_pool(experiment: Experiment) -> Experiment:
-    """The same experiment with what a plan may choose from.
+    """Return the same experiment with its pool.
 
-    :raises ExperimentError: what a plan may choose from is wrong.
+    :raises ExperimentError: the pool is invalid.
     """
     rebuilt = experiment.builder(experiment.tree, planning=True)
     return replace(rebuilt, mark=experiment.mark)
 
 
 def written_in_python(sections: AnyMapping[str, Any], folder: Path) -> Experiment:
-    """The experiment of a mapping that holds what a file would, with paths relative to a folder.
+    """Return the experiment of a mapping with the content of a file, with paths relative to a
+    folder.
 
-    :raises ExperimentError: it is invalid; holds everything that was found.
+    :raises ExperimentError: it is invalid; holds all faults found.
     """
     mark = Mark("experiment", 0, 0)
     if "variants" in sections:
@@ -162,9 +162,7 @@ def _built(root: Node, source: Path, name: str | None, trust: Trust, planning: b
 def build(
     root: Node, source: Path, name: str | None, trust: Trust, planning: bool = False
 ) -> tuple[Experiment | None, list[Message]]:
-    """Return the experiment of a tree without variants and no messages, or None and what is
-    wrong.
-    """
+    """Return the experiment of a tree without variants, or None with its faults."""
     try:
         return _build(root, source, name, trust, planning)
     except ExperimentError as too_many:

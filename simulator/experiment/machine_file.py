@@ -46,12 +46,11 @@ def load_machine(
     doubts: list[Message] | None = None,
     trust: Trust = UNKNOWN,
 ) -> MachineDescription:
-    """Load a machine file. Tables that it names are read from the folder it is in.
+    """Load a machine file. Tables that it names are read from its folder.
 
-    What counts for nothing in it, and was hardly stated for that, is added to `doubts`.
+    Statements without effect, which are probably meant otherwise, are added to `doubts`.
 
-    :raises ExperimentError: the file, or a table it names, is wrong; holds everything that was
-        found.
+    :raises ExperimentError: the file, or a table it names, is invalid; holds all faults found.
     """
     source = Path(path)
     refused: list[Any] = []
@@ -172,7 +171,7 @@ def _check_ends(ends: Iterable[tuple[float, float]], problems: Problems) -> None
 
 
 def _volume_of(root: Mapping, problems: Problems) -> None:
-    """Say faults of the volume of a file that is wrong elsewhere."""
+    """Report faults of the volume of a file that has other faults."""
     try:
         volume = VolumeSettings.model_validate(to_python(root).get("volume"))
     except ValidationError:
@@ -238,7 +237,9 @@ def _errors(
 def _smoothed(
     points: Points, settings: SmoothingSettings, steps: Steps, problems: Problems
 ) -> Points:
-    """The least-squares spline that is wanted; the points after saying why there is none."""
+    """Return the requested least-squares spline, or the points after reporting why it is
+    impossible.
+    """
     x = np.asarray(points.positions)
     knots = tuple(sorted(settings.knots or ()))
     if settings.every is not None:
@@ -304,7 +305,7 @@ def _table(
 
 
 def _read_tables(root: Mapping, source: Path, problems: Problems, trust: Trust) -> None:
-    """Say faults of the tables of a file that is wrong itself."""
+    """Report faults of the tables of a file that has other faults."""
     errors = root.items.get("errors")
     for name, node in errors.items.items() if isinstance(errors, Mapping) else ():
         file = node.items.get("file") if isinstance(node, Mapping) else None

@@ -1,4 +1,4 @@
-"""The fitted map of a map file's tree, or faults of it."""
+"""The fitted map of a map file's tree, or its faults."""
 
 from __future__ import annotations
 
@@ -161,7 +161,7 @@ def _model(
 
 
 def _has_its_files(settings: MapSettings, folder: Path, problems: Problems) -> bool:
-    """True if files that the error model rests on are what they were; reports which are not."""
+    """True if the files that the error model uses are unchanged; reports others."""
     before = len(problems.messages)
     model_data = to_python(problems.root)["error_model"]  # type: ignore[index,unused-ignore]
     present = fingerprints(absolute(model_data, folder))
@@ -289,7 +289,7 @@ def _is_number(word: str) -> bool:
 def _check_covariance(
     covariance: Array, undetermined: Array, size: int, problems: Problems
 ) -> None:
-    """Report what is no covariance: of another size, not symmetric, with negative variances."""
+    """Report an invalid covariance: of another size, not symmetric, with negative variances."""
     if covariance.shape != (size, size) or undetermined.shape[:1] != (size,):
         problems.add(("covariance",), f"is not of {size} parameters and estimated offsets")
         return

@@ -1,4 +1,4 @@
-"""What a map file says besides its covariance, and how changes of it are recognised."""
+"""Content of a map file except its covariance, and the checksum that detects changes of it."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ WORDS = ("title", "experiment", "date", "program", "frame", "checksum")
 
 
 def head_of(fitted: FittedMap, folder: Path) -> dict[str, Any]:
-    """What a map file holds besides its covariance and undetermined directions."""
+    """Return the content of a map file except its covariance and undetermined directions."""
     lower, upper = fitted.volume.corners
     head: dict[str, Any] = {
         "map": 1,
@@ -90,7 +90,7 @@ def _length(value: float) -> str:
 
 
 def checksum_of(head: Mapping[str, Any], covariance: Array, undetermined: Array) -> str:
-    """SHA-256 of what a file says, however it is written."""
+    """Return the SHA-256 of a file's content, independent of its form."""
     checked = {key: value for key, value in head.items() if key not in WORDS}
     digest = hashlib.sha256(json.dumps(checked, sort_keys=True).encode())
     for array in (covariance[np.tril_indices(len(covariance))], undetermined):

@@ -1,5 +1,5 @@
-"""Map files: writing a fitted map as YAML, or as arrays of NumPy, and reading it with all that is
-wrong with it.
+"""Map files: writing a fitted map as YAML, or as arrays of NumPy, and reading it with all
+faults.
 """
 
 from __future__ import annotations
@@ -30,11 +30,11 @@ BINARY = ".npz"
 
 
 def write_map(fitted: FittedMap, path: str | os.PathLike[str]) -> None:
-    """Write a map file: YAML, or arrays of NumPy where the name ends in .npz. Numbers are written
+    """Write a map file: YAML, or arrays of NumPy if the name ends in .npz. Numbers are written
     with all their digits.
 
-    :raises ExperimentError: the error model cannot be named in a file, or what it rests on cannot
-        be read.
+    :raises ExperimentError: the error model cannot be named in a file, or a file that it uses
+        cannot     be read.
     """
     target = Path(path)
     head = head_of(fitted, target.parent)
@@ -50,7 +50,7 @@ def write_map(fitted: FittedMap, path: str | os.PathLike[str]) -> None:
 
 
 def map_text(fitted: FittedMap, head: Mapping[str, Any]) -> str:
-    """A map file as YAML; `head` is what it holds besides arrays."""
+    """Return a map file as YAML; `head` is its content except arrays."""
     lines = []
     for key, value in head.items():
         if key == "checksum":
@@ -98,7 +98,7 @@ def read_map(path: str | os.PathLike[str], trust: Trust = OPENED) -> FittedMap:
 
 
 def map_tree(source: Path, minor: list[Message]) -> tuple[Node, dict[str, Array]]:
-    """What a map file says, and the arrays that it has beside that; `minor` as for `read_tree`.
+    """Return the content of a map file, and its arrays; `minor` as for `read_tree`.
 
     :raises ExperimentError: it cannot be read.
     """
@@ -110,7 +110,9 @@ def map_tree(source: Path, minor: list[Message]) -> tuple[Node, dict[str, Array]
 
 
 def _binary(source: Path) -> tuple[Node, dict[str, Array]]:
-    """What a file of arrays says, as a tree whose nodes are all at its name, and its arrays."""
+    """Return the content of a file of arrays, as a tree whose nodes are all at its name, and its
+    arrays.
+    """
     content = read_bytes(source)
     try:
         with zipfile.ZipFile(io.BytesIO(content)) as archive:
@@ -126,10 +128,10 @@ def _binary(source: Path) -> tuple[Node, dict[str, Array]]:
 
 
 def _array(archive: zipfile.ZipFile, name: str) -> Array:
-    """An array of a file, as large as it is: neither what is compressed nor the array's own head
-    may make it larger.
+    """Return an array of a file within the size of the file: neither compression nor the array's
+    own head may enlarge it.
 
-    :raises ValueError: it is larger than a file may be, or than its head says.
+    :raises ValueError: it is larger than a file may be, or than its head states.
     """
     size = archive.getinfo(f"{name}.npy").file_size
     if size > MOST_BYTES:

@@ -37,9 +37,8 @@ if TYPE_CHECKING:
 class Probe:
     """A probe: the ``offset`` (d,) of its tip from the machine's reference point, in metres.
 
-    ``standard_uncertainty``: (d,) of the offset where it is estimated, infinite where nothing is
-    known of it, None where the offset is as stated. ``angles``: A and B of an articulating head, in
-    radians, where these state the offset.
+    ``standard_uncertainty``: (d,) of an estimated offset, infinite if unknown, None for an exact
+    offset. ``angles``: A and B of an articulating head, in radians, if these state the offset.
     """
 
     name: str
@@ -64,8 +63,8 @@ class Probe:
 class ReadingGroup:
     """Balls read with the same probes: each ball with each probe, ``repeats`` times.
 
-    ``probes``: names. ``balls``: names, ``ball_indices``: (k,) the same as indices into the layout.
-    ``standard_uncertainty``: (d,) metres of each reading, None where it is the machine's
+    ``probes``: names. ``balls``: names, ``ball_indices``: (k,) the same as indices into the
+    layout. ``standard_uncertainty``: (d,) metres of each reading, None for the machine's
     repeatability.
     """
 
@@ -83,9 +82,9 @@ class ReadingGroup:
 
 @dataclass(frozen=True, eq=False)
 class Position:
-    """A position of an artefact, its nominal pose in the machine and what is read in it.
+    """A position of an artefact, its nominal pose in the machine and its readings.
 
-    ``description`` says as text what a short name does not, empty where nothing is said.
+    ``description`` completes a short name; possibly empty.
     """
 
     name: str
@@ -114,11 +113,11 @@ class Position:
 class Prior:
     """Prior knowledge of a parameter, in metres, radians or a ratio.
 
-    ``position`` and ``component``: a pose parameter, by its place among origin and rotation.
+    ``position`` and ``component``: a pose parameter, by its index in origin and rotation.
     ``probe`` and ``component``: a probe offset. Otherwise ``by_model`` (n,): a linear function of
-    the error model's parameters, and with ``by_offset`` of offsets (d,) of probes by their names.
-    ``mark`` and ``path``: where it is stated. ``unit``: m, rad or 1. ``data``: the readings of the
-    map that tells it, and ``share`` what its standard uncertainty consists of.
+    the error model's parameters, and with ``by_offset`` of offsets (d,) of probes by name.
+    ``mark`` and ``path``: its location in the file. ``unit``: m, rad or 1. ``data``: the readings
+    of the map that states it, and ``share`` the parts of its standard uncertainty.
     """
 
     name: str
@@ -138,10 +137,10 @@ class Prior:
 
 @dataclass(frozen=True, eq=False)
 class Task:
-    """A length that the machine is to measure: ``points`` (2, d) in metres, and the probes of its
+    """A length for the machine to measure: ``points`` (2, d) in metres, and the probes of its
     ends.
 
-    ``target``: what is to be reached, None where neither the task nor the file states it.
+    ``target``: target uncertainty of the task, or else of the file, if either states one.
     """
 
     name: str
@@ -152,8 +151,8 @@ class Task:
 
 @dataclass(frozen=True, eq=False)
 class Evaluation:
-    """Where the machine is evaluated: ``points`` (n, d) in metres, none unless asked for, the
-    probe, and tasks.
+    """Evaluation of the machine: ``points`` (n, d) in metres, if requested, the probe, and
+    tasks.
     """
 
     points: Floats
@@ -173,11 +172,11 @@ class ChangeTimes:
 class Candidate:
     """A position, or a calibration item, that a plan may choose.
 
-    `seconds` is what it takes by itself: set-up, readings and changes of probe within it, or the
-    price of a calibration item. `plane` names the axis that the artefact stands across, empty where
-    the pose is free and for a calibration item. `group` is the entry of the pool that it comes
-    from, empty for positions that are `drawn`, in the experiment's own list. `settings` is what an
-    experiment file says of it. `reading_seconds` is what a reading takes.
+    `seconds` is its own duration: set-up, readings and changes of probe within it, or the price of
+    a calibration item. `plane` names the axis normal to the artefact, empty for a free pose and
+    for a calibration item. `group` is the entry of the pool that it comes from, empty for
+    positions that are `drawn`, in the experiment's own list. `settings` is its form in an
+    experiment file. `reading_seconds` is the duration of a reading.
     """
 
     name: str
@@ -197,7 +196,7 @@ class Candidate:
 
 @dataclass(frozen=True)
 class AtMost:
-    """A limit: of `members`, indices of candidates, at most `count`."""
+    """A limit: at most `count` of `members`, indices of candidates."""
 
     members: tuple[int, ...]
     count: int
@@ -208,8 +207,8 @@ class Pool:
     """Candidates in order, positions of the experiment itself first, and the limits on choosing
     them.
 
-    `must` are the indices of what has to be chosen. `dropped` states how many candidates were
-    generated but cannot be read, or are the same as others, by the reason.
+    `must` are the indices of required ones. `dropped` counts generated candidates that cannot be
+    read, or are duplicates, by reason.
     """
 
     candidates: tuple[Candidate, ...]
@@ -224,15 +223,14 @@ class Experiment:
     """A complete experiment, or one variant of it.
 
     ``name``: of the variant, None without variants. ``probes``: by name. ``layouts``: name of an
-    artefact → its balls. ``target_uncertainty`` and ``expected_rank_deficiency`` are None where
-    nothing was stated. ``coverage_factor`` times the standard uncertainty is what targets are
-    meant for. ``noise``: of simulated readings. ``pool``: what a plan may choose from. ``doubts``:
-    what of the file is possible, and unlikely to be meant. ``notes``: what was found in its tables
-    by itself. ``readings``: where tables of readings are and how they are written. ``sections``:
-    what is written under keys that extensions provide. ``extensions``: names of those that it
-    needs. ``tree``: what was written, without variants, ``mark``: where the experiment itself
-    stands, and ``builder``: what makes an experiment of a tree, with the ``trust`` that is in the
-    file.
+    artefact → its balls. ``target_uncertainty`` and ``expected_rank_deficiency``: optional.
+    ``coverage_factor`` times the standard uncertainty is compared with targets. ``noise``: of
+    simulated readings. ``pool``: candidates of a plan. ``doubts``: possible but improbable
+    statements. ``notes``: settings detected in its tables. ``readings``: location and form of
+    tables of readings. ``sections``: entries under keys that extensions provide. ``extensions``:
+    names of required ones. ``tree``: the file's content without variants, ``mark``: the location
+    of the experiment, and ``builder``: function from a tree to an experiment, with the ``trust``
+    in the file.
     """
 
     title: str
@@ -280,13 +278,13 @@ class Experiment:
         return tuple(dict.fromkeys(share.campaign for share in shares if share is not None))
 
     def layout_of(self, item: Calibration) -> BallLayout:
-        """The layout that an item of calibration names its values by; any where these are of the
-        machine, and need none.
+        """Return the layout that an item of calibration names its values by; any layout for values
+        of the machine.
         """
         return self.layouts[item.artefact or next(iter(self.layouts))]
 
     def is_observed(self, item: Calibration) -> bool:
-        """True if an item is observations of its own; lengths of standards are read."""
+        """True if an item is an observation of its own; lengths of standards are read."""
         return not item.artefact or self.artefacts[item.artefact].role == "plate"
 
     @property
@@ -350,7 +348,7 @@ class Experiment:
         return f"<p><strong>{title}</strong></p>\n<table>{''.join(cells)}</table>\n"
 
     def place(self, steps: Steps) -> Mark:
-        """Where a path stands; what nobody has written, where the experiment itself does."""
+        """Return the location of a path, or of the experiment if the file does not contain it."""
         return self.mark if written(self.tree, *steps) is None else mark_of(self.tree, steps)
 
     def message(self, steps: Steps, text: str) -> Message:
@@ -364,23 +362,23 @@ class Experiment:
     def with_(
         self, changes: Mapping[str, object] | None = None, /, **sections: object
     ) -> Experiment:
-        """The experiment with some of its entries changed, checked as a file is.
+        """Return the experiment with some of its entries changed, checked like a file.
 
         ``changes`` has new values by path, such as ``positions[P1].level`` or
-        ``artefacts.plate.size``, as variants of a file have; ``sections`` replaces whole entries by
-        their names. Values are what a file would hold: texts with units, numbers, lists and
-        mappings. None removes an entry. A length computed in metres is given as a text with its
-        unit too, as in ``f"{length} m"``.
+        ``artefacts.plate.size``, like variants of a file; ``sections`` replaces whole entries by
+        name. Values are in the form of a file: texts with units, numbers, lists and mappings. None
+        removes an entry. A length computed in metres is given as a text with its unit too, as in
+        ``f"{length} m"``.
 
-        :raises ExperimentError: a path that does not exist, or an experiment that is wrong so.
+        :raises ExperimentError: a path that does not exist, or an invalid experiment.
         """
         return self.builder(
             changed_tree(self.tree, str(self.source), {**(changes or {}), **sections})
         )
 
     def with_readings(self, changes: Mapping[str, Any]) -> Experiment:
-        """The experiment with other keys of `readings`; None leaves one as it is, and columns are
-        added to those stated.
+        """Return the experiment with other keys of `readings`; None leaves one unchanged, and
+        columns are added to those stated.
 
         :raises ExperimentError: they are invalid.
         """
@@ -395,7 +393,7 @@ class Experiment:
 
 
 def _words_of(position: Position) -> str:
-    """What is read in a position, as text."""
+    """Return a description of the readings of a position."""
     groups = (
         f"{len(group.balls)} balls with {', '.join(group.probes)}"
         + (f", {group.repeats} times" if group.repeats > 1 else "")

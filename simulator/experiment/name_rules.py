@@ -1,4 +1,4 @@
-"""Rules by which measuring programs name features: a name with places in braces, such as
+"""Rules by which measuring programs name features: a name with fields in braces, such as
 {position}_{ball}_{probe}.
 """
 
@@ -13,9 +13,9 @@ PLACE = re.compile(r"\{([^{}]*)\}")
 
 
 def check_rule(rule: str) -> str:
-    """A rule as it is.
+    """Return a valid rule.
 
-    :raises ValueError: it has no ball, or a place that there is not or that is there twice.
+    :raises ValueError: it has no ball, or an unknown or repeated field.
     """
     place_holders = PLACE.findall(rule)
     unknown = [name for name in place_holders if name not in PLACES]

@@ -1,7 +1,8 @@
 """Files that an experiment or a machine file names: values of the keys that hold paths, and the
 modules of error models in Python.
 
-Text elsewhere is never taken for a path: a title that spells the name of a private key is a title.
+Other text is never interpreted as a path: a title that spells the name of a private key is a
+title.
 """
 
 from __future__ import annotations
@@ -24,10 +25,10 @@ PATH_KEYS = ("file", "files", "values", "covariance")
 
 
 def named_by(source: Path) -> list[Path]:
-    """Files that an experiment or machine file names, those that they name, and its modules, if
-    they are there.
+    """Return existing files that an experiment or machine file names, those that these name, and
+    its modules.
 
-    Empty where the file cannot be read: loading it tells why.
+    Empty if the file cannot be read: loading reports why.
     """
     try:
         root = read_tree(source)
@@ -37,8 +38,8 @@ def named_by(source: Path) -> list[Path]:
 
 
 def named_in(nodes: Sequence[tuple[str, Node]], folder: Path) -> list[Path]:
-    """Files that nodes at paths of an experiment name, as seen from a folder, those that they
-    name, and modules, if they are there.
+    """Return existing files that nodes at paths of an experiment name, as seen from a folder,
+    those that these name, and modules.
     """
     paths: set[Path] = set()
     for key, node in nodes:
@@ -143,9 +144,7 @@ def module_files(folder: Path, module: str) -> set[Path]:
 
 
 def _imports(path: Path) -> Iterator[str]:
-    """Names of the modules that a file of Python imports; faults of the file is told when it is
-    loaded.
-    """
+    """Return names of the modules that a file of Python imports; loading reports its faults."""
     try:
         tree = ast.parse(path.read_bytes())
     except (OSError, SyntaxError, ValueError, RecursionError):

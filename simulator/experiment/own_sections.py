@@ -10,7 +10,7 @@ from .structure import KEYS, Sections
 
 
 def resolve_own_sections(sections: Sections, references: References) -> dict[str, Any]:
-    """What is written under keys that extensions provide, as their `read` makes it, where they
+    """Return the entries under keys that extensions provide, converted by their `read` if they
     have one; faults go to the problems.
     """
     for i, name in enumerate(sections.get("extensions") or ()):

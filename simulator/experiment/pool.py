@@ -23,7 +23,7 @@ def with_chosen(experiment: Experiment, chosen: Sequence[Candidate]) -> Experime
 
 
 def placed_only(experiment: Experiment) -> Experiment:
-    """The experiment without its pool, artefacts that no position places and priors about other
+    """Return the experiment without its pool, artefacts without a position and priors about other
     positions.
     """
     placed = {position.artefact for position in experiment.positions}

@@ -1,4 +1,4 @@
-"""Groups of a pool: candidates that are every combination of planes, levels, places, turns, probes
+"""Groups of a pool: candidates for every combination of planes, levels, locations, turns, probes
 and balls.
 """
 
@@ -45,11 +45,11 @@ TOLERANCE = 1e-9
 
 @dataclass(frozen=True, eq=False)
 class Bounds:
-    """Where artefacts may be.
+    """Limits of the poses of artefacts.
 
-    The scale readings of balls, which are where they are less the probe's offset, have to be in
-    `volume`, the balls themselves in the lower and upper ends (2, d) of `reach`, by probe. `edge`
-    is what a plate needs around it.
+    The scale readings of balls (ball less probe offset) must be in `volume`, the balls themselves
+    in the lower and upper ends (2, d) of `reach`, by probe. `edge` is the margin of a plate around
+    its balls.
     """
 
     volume: Volume
@@ -111,9 +111,7 @@ class _Group:
 def generate(
     settings: GroupSettings, steps: Steps, bounds: Bounds | None, count: int, references: References
 ) -> list[Generated] | None:
-    """Return the candidates of a group, or None after reporting faults; `count` are there
-    already.
-    """
+    """Return the candidates of a group, after `count` earlier ones, or report faults."""
     group = _resolve(settings, steps, references)
     if group is None:
         return None
@@ -150,8 +148,8 @@ def extent(points: Floats) -> Floats:
 
 
 def outline(pose: Pose, layout: BallLayout, edge: float) -> Floats:
-    """Return the lowest and the highest co-ordinates (2, d) of a plate with so much material beyond
-    its balls.
+    """Return the lowest and the highest co-ordinates (2, d) of a plate with `edge` of material
+    beyond its balls.
     """
     (corners_beyond, low), (right, high) = bounding_rectangle(layout) + [[-edge], [edge]]
     around = np.array([(x, y, 0.0) for x in (corners_beyond, right) for y in (low, high)])
@@ -169,8 +167,8 @@ def is_within(indices: Floats, lower: Floats, upper: Floats) -> Any:
 def _reasons(
     group: _Group, plane: Axis, turn: int, balls: _Balls, bounds: Bounds, references: References
 ) -> dict[tuple[str, ...], list[str]]:
-    """By set of probes and for each level and place, why a candidate cannot be read; empty where it
-    can.
+    """Return by set of probes, for each level and location, why a candidate cannot be read; empty
+    if it can.
     """
     d = references.dimension or 3
     at_zero = nominal_pose(

@@ -45,9 +45,7 @@ SET_UP, READING, PROBE_CHANGE, PLANE_CHANGE = 20 * 60.0, 15.0, 2 * 60.0, 30 * 60
 
 @dataclass
 class Candidates:
-    """Positions to choose from if they are right; `complete` states whether all that is written
-    is.
-    """
+    """Valid positions to choose from; `complete` is true if every entry is valid."""
 
     found: list[Candidate] = field(default_factory=list)
     dropped: dict[str, int] = field(default_factory=dict)
@@ -56,7 +54,7 @@ class Candidates:
     seen: dict[Any, str] = field(default_factory=dict)
 
     def add(self, candidate: Candidate) -> None:
-        """Add a candidate unless the same stands there already."""
+        """Add a candidate unless the same exists already."""
         key = _identity(candidate.item) if isinstance(candidate.item, Position) else candidate.name
         if key in self.seen and not candidate.drawn:
             self.drop("the same as others")
@@ -95,7 +93,7 @@ def resolve_candidates(
     probes: AnyMapping[str, Probe],
     references: References,
 ) -> Candidates:
-    """Return the positions to choose from, none without a pool; faults go to the problems."""
+    """Return the positions to choose from, if there is a pool; faults go to the problems."""
     problems = references.problems
     root, result = problems.root, Candidates()
     node = written(root, "pool")
@@ -206,7 +204,7 @@ def resolve_pool(
     calibrations: AnyMapping[int, Calibration],
     references: References,
 ) -> Pool | None:
-    """Return the pool, or None without one; faults go to the problems."""
+    """Return the pool, if there is one; faults go to the problems."""
     problems = references.problems
     root = problems.root
     if ("pool", "times") not in sections.values:
@@ -285,7 +283,7 @@ def seconds_of(
     reading: float = READING,
     probe_change: float = PROBE_CHANGE,
 ) -> float:
-    """Time that a position takes by itself, in seconds; the usual one where none is stated."""
+    """Return the duration of a position in seconds, by default the usual one."""
     return set_up + position.count * reading + (len(position.probes) - 1) * probe_change
 
 
@@ -294,7 +292,9 @@ def _or(value: float | None, default: float) -> float:
 
 
 def _identity(position: Position) -> Any:
-    """Equal where positions are the same: artefact, pose to a nanometre, and what is read."""
+    """Return a key that is equal for equal positions: artefact, pose to a nanometre, and
+    readings.
+    """
     pose = np.concatenate([position.pose.rotation.ravel(), position.pose.origin])
     return (
         position.artefact,
@@ -318,8 +318,8 @@ def _identity(position: Position) -> Any:
 
 
 def _check_names(references: References) -> bool:
-    """True if no entry of the pool has the name of another, or of a position, after reporting
-    those that have.
+    """True if no entry of the pool has the name of another, or of a position; others are
+    reported.
     """
     problems, before = references.problems, len(references.problems.messages)
     first: dict[str, str] = {}
@@ -410,7 +410,7 @@ def _limits(
     complete: bool,
     references: References,
 ) -> tuple[tuple[int, ...], list[AtMost]]:
-    """Indices of what has to be chosen, and limits on numbers."""
+    """Return indices of required candidates, and limits on numbers."""
     problems, place = references.problems, ("pool", "limits")
     index = {one.name: i for i, one in enumerate(candidates)}
     before = len(problems.messages)

@@ -72,7 +72,7 @@ _Known = tuple[str, str | None, str | None, int, Floats, Unit, float]
 def _known(
     model: ErrorModel, positions: dict[int, Position], references: References
 ) -> dict[str, tuple[_Known, ...]]:
-    """Every name that a prior may have, and the parameters it stands for."""
+    """Return the parameters of every name that a prior may have."""
     known_quantities: dict[str, tuple[_Known, ...]] = {}
     unit_rows = np.eye(len(model.parameters))
     for row, parameter in zip(unit_rows, model.parameters, strict=True):

@@ -1,5 +1,5 @@
-"""Probes of an experiment: their offsets, as stated or by the angles of a head, what is known of
-them, and stars of them.
+"""Probes of an experiment: their offsets, as stated or by the angles of a head, their
+uncertainties, and stars.
 """
 
 from __future__ import annotations
@@ -64,9 +64,7 @@ def resolve_probes(sections: Sections, references: References) -> dict[str, Prob
 def _offset(
     settings: ProbeSettings, head: HeadSettings | None, steps: Steps, references: References
 ) -> tuple[float, ...] | None:
-    """The offset (d,) that is stated, or that the head's angles make; None after reporting
-    faults.
-    """
+    """Return the offset (d,) as stated or by the head's angles, or report faults."""
     if settings.a is None:
         return settings.offset
     tip = settings.tip or (head.tip if head is not None else None)
@@ -88,7 +86,7 @@ def _offset(
 
 
 def _star_members(sections: Sections, references: References) -> list[str]:
-    """Probes of stars, faults of their names told."""
+    """Return probes of stars, and report faults of their names."""
     members: list[str] = []
     for i, settings in sections.entries("stars").items():
         steps: Steps = ("stars", int(i), "probes")
@@ -142,7 +140,7 @@ def resolve_stars(
 def _star_values(
     settings: StarSettings, names: tuple[str, ...], steps: Steps, references: References
 ) -> Floats | None:
-    """Co-ordinates (l, d) of a star's tips from its table, None after reporting faults."""
+    """Return co-ordinates (l, d) of a star's tips from its table, or report faults."""
     letters = list("xyz"[: references.dimension])
     try:
         rows = read_table(references.file(settings.values), ["probe"], letters, [])
@@ -169,8 +167,8 @@ def _star_values(
 
 
 def _reference_probe(sections: Sections, references: References) -> str:
-    """Name of the probe whose offset is held, none where stars turn about a stated place; faults
-    of it is told.
+    """Return the name of the probe whose offset is held, if any is held, and report faults; stars
+    that turn about a stated point need none.
     """
     problems = references.problems
     listed = {
@@ -207,8 +205,8 @@ def _reference_probe(sections: Sections, references: References) -> str:
 def _offset_uncertainty(
     settings: ProbeSettings, steps: Steps, references: References
 ) -> Floats | None:
-    """Standard uncertainties (d,) of an offset that is estimated, infinite where it is unknown,
-    None after reporting faults and where nothing is stated.
+    """Return standard uncertainties (d,) of an estimated offset, infinite for an unknown one, if
+    stated and valid.
     """
     problems, dimension = references.problems, references.dimension
     stated = settings.standard_uncertainty

@@ -16,7 +16,7 @@ AXES = ("x", "y", "z")
 
 
 def check_readings(sections: Sections, references: References) -> None:
-    """Report what of the readings section nothing else here has; read the file of a correction."""
+    """Report faults of the readings section beyond its form; read the file of a correction."""
     settings, problems = sections.get("readings"), references.problems
     if not isinstance(settings, ReadingsSettings):
         return
@@ -50,7 +50,7 @@ def check_readings(sections: Sections, references: References) -> None:
 
 
 def _check_constants(columns: ColumnsSettings, references: References) -> None:
-    """Report what cannot be the same in all rows, and a wrong uncertainty that is."""
+    """Report settings that cannot be the same in all rows, and an invalid constant uncertainty."""
     for role in ("ball", "diameter"):
         if (getattr(columns, role) or "").startswith("="):
             text = f"a {role} is that of a reading, and not of all rows; name its column"
@@ -64,7 +64,7 @@ def _check_constants(columns: ColumnsSettings, references: References) -> None:
 
 
 def is_text_encoding(name: str) -> bool:
-    """True if Python knows an encoding of text by this name.
+    """True if Python has a text encoding of this name.
 
     >>> is_text_encoding("cp1252"), is_text_encoding("zip"), is_text_encoding("cp 12520")
     (True, False, False)
@@ -85,7 +85,7 @@ def _check_probes(names: list[str], steps: Steps, references: References) -> Non
 
 
 def _read_correction(settings: ReadingsSettings, references: References) -> None:
-    """Let a correction to be taken off be that of its machine file."""
+    """Set a correction to subtract to that of its machine file."""
     correction = settings.compensation
     if not isinstance(correction, CompensationSettings):
         return

@@ -98,7 +98,7 @@ def _check_axes(
     dimension: int | None,
     problems: Problems,
 ) -> None:
-    """Report axes of an artefact that has none, or through balls that it does not have."""
+    """Report axes of an artefact without axes, or through unknown balls."""
     assert settings.axes is not None
     if settings.role != "plate":
         problems.add(steps, "a length standard's balls are not estimated; remove its axes")
@@ -147,7 +147,7 @@ def _with_coordinates(
 
 
 def _dimension(root: Node) -> int | None:
-    """Return the number of axes of the volume as written, even where its values are wrong."""
+    """Return the number of axes of the volume as written, even with invalid values."""
     volume = written(root, "machine", "volume")
     if isinstance(volume, Mapping):
         # Neither may be meant where an axis has another name.

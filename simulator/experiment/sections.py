@@ -1,5 +1,5 @@
-"""The keys of an experiment file: forms, units and ranges. What they refer to is checked
-elsewhere.
+"""The keys of an experiment file: forms, units and ranges. References between them are checked in
+`checks`.
 """
 
 from __future__ import annotations

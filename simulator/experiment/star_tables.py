@@ -1,9 +1,9 @@
-"""Tables of stars beside the stated offsets of their probes: tips that are exchanged, and tips that
-lie elsewhere.
+"""Tables of stars compared with the stated offsets of their probes: exchanged tips, and displaced
+tips.
 
-A table has axes of its own, so that it is turned, and shifted where the star's place is unknown, to
-where its tips are nearest to the offsets. A mirror image is no turn, and two tips of a symmetric
-star that are exchanged make one: distances would not tell.
+A table has its own axes; it is turned, and shifted if the star's location is unknown, to the
+nearest fit of its tips to the offsets. A mirror image is not a turn, and two exchanged tips of a
+symmetric star form one: distances would not show it.
 """
 
 from __future__ import annotations
@@ -26,8 +26,8 @@ MOST_TIPS = 100
 
 
 def doubt_of_table(star: Star, offsets: Array) -> str:
-    """What is unlikely to be meant where a star's table is beside the offsets (l, d) that are
-    stated of its probes, in metres; empty if nothing is.
+    """Return an improbable feature of a star's table compared with the stated offsets (l, d) of
+    its probes, in metres; possibly empty.
     """
     misfit = _misfit(star, offsets)
     worst, possible = float(misfit.max()), POSSIBLE * star.standard_uncertainty
@@ -66,10 +66,11 @@ def _misfit(star: Star, offsets: Array) -> Array:
 
 
 def _exchange(star: Star, offsets: Array) -> tuple[tuple[int, int], float]:
-    """The two tips that, exchanged, bring the table nearest to offsets, and what is left.
+    """Return the two tips whose exchange brings the table nearest to offsets, and the remaining
+    misfit.
 
-    Exchanges in a symmetric star differ by a turn: of those that leave as little, that with the
-    least turn is likeliest, as tables are mostly made in axes like the machine's.
+    Exchanges in a symmetric star differ by a turn: among those that leave as little, the one with
+    the least turn is likeliest, since most tables use axes like the machine's.
     """
     exchanges: list[tuple[float, float, tuple[int, int]]] = []
     for i in range(len(offsets) - 1):

@@ -64,12 +64,12 @@ _VALID: WeakKeyDictionary[Node, dict[TypeAdapter[Any], Any]] = WeakKeyDictionary
 
 @dataclass(frozen=True)
 class Sections:
-    """What is right in a file: values by path, such as ("machine",) and ("positions", 0)."""
+    """Valid values of a file by path, such as ("machine",) and ("positions", 0)."""
 
     values: dict[Steps, Any]
 
     def get(self, *steps: str | int) -> Any:
-        """Return the value of a path, or None where it was missing or wrong."""
+        """Return the value of a path, or None if it is missing or invalid."""
         return self.values.get(steps)
 
     def entries(self, section: str) -> dict[str | int, Any]:
@@ -82,9 +82,9 @@ class Sections:
 
 
 def validate_sections(root: Node, problems: Problems, planning: bool = False) -> Sections:
-    """Validate what each section says by itself; faults go to ``problems``.
+    """Validate each section separately; faults go to ``problems``.
 
-    For ``planning`` positions may be missing where there is a pool to choose them from.
+    For ``planning`` positions may be missing if there is a pool to choose them from.
     """
     fields = ExperimentSettings.model_fields
     values: dict[Steps, Any] = {}
@@ -138,7 +138,7 @@ def validate_sections(root: Node, problems: Problems, planning: bool = False) ->
 
 
 def _known_key(key: str, absent: Iterable[str]) -> str:
-    """Which key was meant, those of extensions among them."""
+    """Return the probable key, those of extensions included."""
     meant = hint(key, (*absent, *names("sections", with_registered=True)))
     return f"{meant}; {LACKING}" if meant.startswith("known") else meant
 
@@ -209,8 +209,8 @@ POOL_ENTRIES: dict[str, Callable[[Node], Any]] = {
 def _validate(
     adapters: Iterable[TypeAdapter[Any]], node: Node, steps: Steps, problems: Problems
 ) -> dict[Steps, Any]:
-    """The value of a node by the first of some adapters that takes it; the last says what is
-    wrong.
+    """Return the value of a node by the first of some adapters that accepts it; the last reports
+    faults.
     """
     valid = {} if steps[0] in COMPLETED_LATER else _VALID.setdefault(node, {})
     for adapter in adapters:
@@ -226,10 +226,9 @@ def _validate(
 
 
 def _adapters(key: str, node: Node) -> Iterator[TypeAdapter[Any]]:
-    """What may take a section, or an entry of it: the kind that it says it is, then any kind.
+    """Return the adapters of a section, or an entry of it: its stated `kind`, then every one.
 
-    The form of one kind is made in a fraction of the time that those of all kinds take, which are
-    needed to say what would be right.
+    The form of one is built in a fraction of the time of all, which only error messages need.
     """
     kind = node.items.get("kind") if isinstance(node, Mapping) else None
     if isinstance(kind, Scalar) and isinstance(kind.value, str):

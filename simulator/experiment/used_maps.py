@@ -69,11 +69,11 @@ def resolve_map_prior(
     references: References,
     probes: Mapping[str, Probe],
 ) -> list[Prior]:
-    """What a map tells of the machine of another campaign, as priors that do not depend on one
-    another; faults go to the problems.
+    """Return the information of another campaign's map as independent priors; faults go to the
+    problems.
 
-    These are combinations of the parameters in which the map's covariance is diagonal, once each
-    parameter is measured by its effect: as many as the map determines.
+    These are the combinations of parameters in which the map's covariance is diagonal, each
+    parameter scaled by its effect: as many as the map determines.
     """
     problems, of_file = references.problems, (*steps, "file")
     fitted = _read(settings.file, of_file, references)
@@ -178,7 +178,7 @@ def _between(start: date, end: date) -> float:
 def _is_same(
     fitted: FittedMap, model: ErrorModel, machine: Machine, steps: Steps, references: References
 ) -> bool:
-    """True if a map is of the error model that is fitted here; says where not."""
+    """True if a map is of the error model that is fitted here; others are reported."""
     add = references.problems.add
     if machine.dimension != fitted.dimension:
         add(steps, f"is of {fitted.dimension} axes, but machine.volume of {machine.dimension}")
@@ -210,7 +210,9 @@ def _is_same(
 def _check_ends(
     fitted: FittedMap, machine: Machine, steps: Steps, references: References, outside_only: bool
 ) -> bool:
-    """True if the volume is that of the map, or within it where `outside_only`; says where not."""
+    """True if the volume is that of the map, or within it if `outside_only`; others are
+    reported.
+    """
     mapped, volume, is_right = fitted.volume, machine.volume, True
     for k, axis in enumerate(AXES[: fitted.dimension]):
         ends = float(mapped.lower[k]), float(mapped.upper[k])

@@ -25,10 +25,11 @@ STEP = re.compile(r"(?:(?:^|\.)([^.\[\]]+)|\[([^\]]*)\])")
 
 
 def with_present_keys(node: Node, above: tuple[str, ...] = ()) -> Node:
-    """The same experiment with the keys of today; a key that stands beside its earlier name stays,
-    so that the earlier one is refused as unknown.
+    """Return the same experiment with the present keys; a key that occurs with its earlier name
+    stays, so that the earlier one is refused as unknown.
 
-    `above` are the steps that lead to the node. Names that a person chose, such as a probe's, stay.
+    `above` are the steps that lead to the node. Names chosen by the author, such as a probe's,
+    stay.
     """
     if isinstance(node, Sequence):
         # The only list of entries that have such a key.
@@ -50,7 +51,7 @@ def with_present_keys(node: Node, above: tuple[str, ...] = ()) -> Node:
 
 
 def _has_aliases(above: AnySequence[str]) -> bool:
-    """True if the keys below some steps are those that have earlier names."""
+    """True if the keys below some steps have earlier names."""
     return not above or len(above) == 3 and tuple(above[:2]) == ("evaluation", "tasks")
 
 
@@ -112,7 +113,7 @@ def variant_trees(root: Node, problems: Problems) -> dict[str, Node]:
 
 
 def node_at(root: Node, path: str) -> Node | None:
-    """Return the value at a path, None if there is none.
+    """Return the value at a path, or None if it is missing.
 
     :raises ValueError: the path is malformed, or an entry of a list does not exist.
     """
@@ -123,7 +124,7 @@ def node_at(root: Node, path: str) -> Node | None:
 
 
 def is_same_place(root: Node, path: str, second: str) -> bool:
-    """True if one of two paths leads to the other's place, or into it.
+    """True if one of two paths leads to the other's node, or into it.
 
     :raises ValueError: as ``node_at``.
     """
@@ -131,9 +132,9 @@ def is_same_place(root: Node, path: str, second: str) -> bool:
 
 
 def override(root: Node, path: str, value: Node, mark: Mark) -> Node:
-    """Return the tree with the node at a path replaced; ``mark`` is where the override stands.
+    """Return the tree with the node at a path replaced; ``mark`` is the location of the override.
 
-    :raises ValueError: the path is malformed, or what it passes through does not exist.
+    :raises ValueError: the path is malformed, or passes through a missing entry.
     """
     steps = steps_of(path)
     if (
@@ -191,7 +192,7 @@ def steps_of(path: str) -> list[str]:
 
 
 def place_of(root: Node, path: str) -> tuple[str, ...]:
-    """Steps of a path with entries of lists by index, so that one place has one name.
+    """Return the steps of a path with entries of lists by index, so that each node has one name.
 
     :raises ValueError: the path is malformed, or an entry of a list does not exist.
     """
@@ -265,7 +266,7 @@ def _shallow(node: Node) -> object:
 
 
 def in_variants(names: list[str], all_names: list[str]) -> str:
-    """Say in which variants a message holds; nothing where it holds in all of them.
+    """Return the variants in which a message holds; empty for all.
 
     >>> in_variants(["A"], ["A", "B"])
     ' (in variant A)'
@@ -278,8 +279,8 @@ def in_variants(names: list[str], all_names: list[str]) -> str:
 def unknown_variants(
     files: AnySequence[Path], wanted: AnySequence[str], variant_names: Collection[str | None]
 ) -> tuple[Message, ...]:
-    """Messages about variants that none of the files has; `found` are names of those that they
-    have.
+    """Return messages about variants that are in no file; `variant_names` are the existing
+    ones.
     """
     every, known_variants = (
         ", ".join(map(str, files)),
