@@ -42,9 +42,7 @@ MOST_NAMED = 20
 
 @dataclass(frozen=True)
 class Replicate:
-    """The estimates (m,) from one data set, NaN where undetermined or where it did not converge,
-    and its sigma.
-    """
+    """Estimates (m,) from one data set, NaN if undetermined or not converged, and its sigma."""
 
     status: Status
     values: Array
@@ -55,10 +53,10 @@ class Replicate:
 class Bootstrap(Result):
     """A fit's estimates over data sets of its own parameters.
 
-    `values` and `uncertainties` (m,) are those of the fit, the latter as linear theory says;
-    `deviations` (t, m) are what the data sets that converged give beyond the parameters they are
-    of, and `sigmas` (t,) their own over the fit's. `failed` has the numbers of the others with how
-    they ended.
+    `values` and `uncertainties` (m,) are those of the fit, the latter by linear theory;
+    `deviations` (t, m) are the results of converged data sets less their true parameters, and
+    `sigmas` (t,) their own sigmas over the fit's. `failed` has the numbers of the others with
+    their status.
     """
 
     label: str
@@ -82,7 +80,7 @@ class Bootstrap(Result):
 
     @property
     def biases(self) -> Array:
-        """How much too large the estimates (m,) are on average."""
+        """Mean deviations (m,) of the estimates."""
         if not len(self.deviations):
             return np.full(len(self.values), np.nan)
         return np.asarray(self.deviations.mean(axis=0))
@@ -105,7 +103,7 @@ class Bootstrap(Result):
         return 1.0 / float(np.sqrt(2.0 * max(len(self.deviations) - 1, 1)))
 
     def _ratios(self) -> Array:
-        """Standard deviations (m,) in the linear ones; NaN where these are rounding."""
+        """Standard deviations (m,) over the linear ones; NaN if these are rounding."""
         units = np.array([function.unit for function in self.functions])
         u = np.nan_to_num(self.uncertainties)
         largest = np.array([u[units == unit].max() for unit in units])
@@ -170,7 +168,7 @@ class Bootstrap(Result):
         }
 
     def columns(self) -> tuple[Columns, Sequence[Any]]:
-        """One row for each estimate; what is undetermined is NaN."""
+        """Columns with one row per estimate; undetermined ones are NaN."""
         columns = {
             "parameter": "name",
             "kind": "kind",
@@ -202,8 +200,8 @@ COLUMNS = {
 def replicated(
     design: Design, truth: State, sigma: float, monomials: bool, seed: int, trial: int
 ) -> Replicate:
-    """Estimates from one data set of `truth`, whose stated uncertainties `sigma` multiplies; the
-    same for a seed and a number, whatever else is computed.
+    """Return estimates from one data set of `truth`, whose stated uncertainties `sigma`
+    multiplies; a function of seed and number alone.
     """
     generator = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(trial,)))
     readings = design.readings
@@ -250,10 +248,10 @@ def bootstrap(
 ) -> Bootstrap:
     """Fit data sets of a fit's own parameters, of which it estimated `functions`.
 
-    Lengths of standards without certificates are nominal. Neither `workers` nor more trials change
-    what a data set gives.
+    Lengths of standards without certificates are nominal. The result of a data set depends neither
+    on `workers` nor on the number of trials.
 
-    :raises ValueError: the errors are so large that there are no readings of them.
+    :raises ValueError: the errors are too large to generate readings.
     """
     linearisation = functions.at
     design = linearisation.design

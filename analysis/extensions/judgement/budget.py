@@ -36,8 +36,8 @@ SIDE_BY_SIDE = 6
 class BudgetFigure:
     """An uncertainty with the `contributions` of all sources to it, which add in squares; metres.
 
-    Of several functions, as U6 is of many distances, it is the root mean square of those that are
-    determined; `undetermined` of the `count` are not. NaN where none is.
+    Of several functions, such as the distances of U6, it is the root mean square of the determined
+    ones; `undetermined` of the `count` are not. NaN if all are undetermined.
     """
 
     name: str
@@ -50,11 +50,11 @@ class BudgetFigure:
 
 @dataclass(frozen=True, repr=False)
 class UncertaintyBudget(Result):
-    """What the `sources` of uncertainty contribute to `figures`, standard uncertainties in metres,
-    in the order of what they contribute to U6, the largest first.
+    """Contributions of the `sources` of uncertainty to `figures`, standard uncertainties in
+    metres, sorted by the contribution to U6, largest first.
 
     `sigma` has multiplied all stated uncertainties; `coverage_factor` is that of expanded ones.
-    `of_fit` tells whether it is that of a fit, or what a design will achieve.
+    `of_fit` is true for a fit, false for a design.
     """
 
     label: str
@@ -92,7 +92,7 @@ class UncertaintyBudget(Result):
         return aligned(rows, [False, *[True] * len(figures)])
 
     def columns(self) -> tuple[Columns, Sequence[Any]]:
-        """One row for each source and figure."""
+        """Columns with one row per source and uncertainty."""
         count = len(self.sources)
         pairs = [(figure, k) for figure in self.figures for k in range(count)]
         columns = {
@@ -136,7 +136,7 @@ class UncertaintyBudget(Result):
 
 
 def _ratio(figure: BudgetFigure, k: int) -> float:
-    """The share of a source in the variance; NaN where there is none."""
+    """Return the share of a source in the variance, NaN without a variance."""
     if not figure.standard_uncertainty > 0.0:
         return float("nan")
     return (figure.contributions[k] / figure.standard_uncertainty) ** 2
@@ -169,9 +169,9 @@ def _words(figure: BudgetFigure) -> str:
 def budget(
     experiment: Experiment, fit: Fit | None = None, by: Grouping = "calibration"
 ) -> UncertaintyBudget:
-    """The uncertainty budget of an experiment's design or, with its `fit`, of that.
+    """Return the uncertainty budget of an experiment's design or of its `fit`.
 
-    `by` tells how readings are grouped: all as one source by default.
+    `by` groups the readings, by default as one source.
 
     :raises ValueError: the fit has not converged.
     """
@@ -200,9 +200,7 @@ def budget(
 
 
 def _ranking(figures: Sequence[BudgetFigure]) -> BudgetFigure | None:
-    """The figure that sources are ranked by: U6 or, where it is undetermined, the first that is
-    not.
-    """
+    """Return the uncertainty that ranks sources: U6, or the first determined one."""
     positive = [figure for figure in figures if figure.standard_uncertainty > 0.0]
     return next(
         (figure for figure in positive if figure.name == "U6"), positive[0] if positive else None
@@ -212,8 +210,8 @@ def _ranking(figures: Sequence[BudgetFigure]) -> BudgetFigure | None:
 def _largest_first(
     sources: tuple[str, ...], figures: tuple[BudgetFigure, ...]
 ) -> tuple[tuple[str, ...], tuple[BudgetFigure, ...]]:
-    """Sources and their contributions in the order of what they contribute to the ranking figure,
-    those that are equal except rounding as they were.
+    """Return sources and contributions in the order of their contribution to the ranking
+    uncertainty; a stable sort of values that are equal except rounding.
     """
     chosen = _ranking(figures)
     if chosen is None:
@@ -270,7 +268,7 @@ def _ends(distances: Distances, k: int) -> str:
 
 
 def _distances(linearisation: Linearisation, places: MeasuredPoints) -> Iterator[LinearFunctions]:
-    """Distances between all places that are apart, those from one place at a time."""
+    """Yield distances between all separate points, those from one point at a time."""
     functions_of_places = linear_functions(linearisation, Coordinates(places))
     as_drawn = functions_of_places.drawn or functions_of_places
     now, drawn = (
@@ -334,7 +332,7 @@ def _each(
     functions: LinearFunctions,
     sigma: float,
 ) -> Iterator[BudgetFigure]:
-    """Figures of single functions."""
+    """Return the uncertainties of single functions."""
     values = linearisation.uncertainty(functions)
     shares = sums.variances(functions.shared @ linearisation.shared)
     shares[:, np.isnan(values)] = np.nan

@@ -1,7 +1,8 @@
-"""Error models compared on an experiment's readings: which of them the readings call for.
+"""Comparison of error models on an experiment's readings: the smallest sufficient one.
 
-Kinematic models with polynomials of more and more coefficients, and empirical ones, are compared by
-tests of what a richer model explains, as NPL Report CISE 15/98, section 5.3, compares two.
+Kinematic models with polynomials of increasing degree, and empirical ones, are compared by tests
+of the sum of squares that a larger model explains, as NPL Report CISE 15/98, section 5.3, compares
+two.
 """
 
 from __future__ import annotations
@@ -62,7 +63,7 @@ MISFIT = 1e-3
 
 @dataclass(frozen=True, eq=False)
 class RungFit:
-    """An estimate with one model of the ladder: its sum of squares, and where it is."""
+    """An estimate with one model of the ladder: its sum of squares and its state."""
 
     fitted: FittedSum
     at: Linearisation
@@ -72,17 +73,17 @@ class RungFit:
         return self.fitted.model
 
     def sigma(self, is_given: bool) -> float:
-        """What multiplies stated uncertainties."""
+        """Factor of the stated uncertainties."""
         variance = self.fitted.sum_of_squares / self.fitted.degrees_of_freedom
         return 1.0 if is_given else float(np.sqrt(variance))
 
 
 @dataclass(frozen=True, eq=False)
 class Climb:
-    """The models that a design determines, with their S^2, and what was chosen of them.
+    """The models that a design determines, with their S^2, and the chosen one.
 
-    `beyond` says as text which models the design leaves undetermined, `most` is the number of
-    coefficients up to which they were tried.
+    `beyond` describes models that the design leaves undetermined, `most` is the largest number of
+    coefficients tried.
     """
 
     grid: PolynomialGrid
@@ -98,8 +99,8 @@ class Climb:
         return max(self.every, key=lambda fitted: fitted.model.count)
 
     def unconfirmed(self, model: LadderModel) -> tuple[str, bool]:
-        """Why nothing shows that a model has coefficients enough, empty where something does, and
-        whether that is for want of readings.
+        """Reason why a model's number of coefficients is unconfirmed, possibly empty, and whether
+        it is a lack of readings.
         """
         reached = limits_reached(model, self.grid, self.every)
         if not reached:
@@ -122,7 +123,8 @@ def climb(
     is_given: bool,
     most: int = MOST_COEFFICIENTS,
 ) -> Climb:
-    """Choose the poorest model that no richer one beats; `most` coefficients at most.
+    """Choose the smallest model that no larger one improves significantly; `most` coefficients at
+    most.
 
     :raises ExperimentError: priors of the file's own parameters, an estimate that does not
         converge, or readings that leave no degrees of freedom even with straight axes.
@@ -170,7 +172,7 @@ class _Judge:
 def _richest_polynomials(
     make: Callable[[int, int, dict[str, int]], LadderModel], judge: _Judge, most: int
 ) -> tuple[LadderModel, tuple[str, ...]]:
-    """The richest polynomials that a design determines, and as text which it does not."""
+    """Return the largest polynomials that a design determines, and a description of the others."""
     n = m = most
     while (n, m) != POOREST and not judge.determines(make(n, m, {})):
         n, m = max(n - 1, POOREST[0]), max(m - 1, POOREST[1])
@@ -210,9 +212,10 @@ def compared_models(
     most: int = MOST_COEFFICIENTS,
     report: Report = unreported,
 ) -> ComparedModels:
-    """Which error model an experiment's readings call for, and what the others change in lengths.
+    """Return the smallest sufficient error model of an experiment's readings, and the effect of
+    the others on lengths.
 
-    `sigma` overrides what the file says; polynomials have `most` coefficients at most.
+    `sigma` overrides the file; polynomials have `most` coefficients at most.
 
     :raises ExperimentError: as `climb`.
     """
@@ -286,8 +289,8 @@ def _with_best_richer(
     file: LadderModel,
     test: Comparison,
 ) -> list[RungFit]:
-    """The fits with those of the richer models that explain most beside the chosen one and the
-    file's, which are told by name.
+    """Return the fits with those larger models that explain most, in addition to the chosen one
+    and the file's, by name.
     """
     fit_of_file = next(fit.fitted for fit in fits if fit.model.words == file.words)
     named = {climbed.beaten.by, test.beaten(fit_of_file, richer(fit_of_file, climbed.every)).by}
@@ -303,7 +306,7 @@ def _untested(design: Design) -> str:
 
 
 def _of_file(experiment: Experiment, model: ErrorModel, climbed: Climb) -> LadderModel:
-    """The file's own model, as a rung where it is one."""
+    """Return the file's own model, as a rung if it is one."""
     model_settings = experiment.error_model
     made = next((fit.model for fit in climbed.every if fit.model.model == model), None)
     if (
@@ -329,7 +332,7 @@ def _shown(climbed: Climb, file: LadderModel, test: Comparison) -> list[LadderMo
 
 
 def _change(linearisation: Linearisation, other_linearisation: Linearisation) -> LengthChange:
-    """How two fits differ in the lengths between all evaluation points."""
+    """Return the difference of two fits in the lengths between all evaluation points."""
     first, second = (
         _lengths(rung_linearisation.design, rung_linearisation.state)
         for rung_linearisation in (linearisation, other_linearisation)
@@ -347,8 +350,8 @@ def _lengths(design: Design, state: State) -> Array:
 
 
 def _lack_of_fit(fitted: FittedSum, repeats: PureError) -> float:
-    """Chance that what a model leaves beyond the scatter of repeats is due to that scatter; NaN
-    without repeats, or where nothing else is left.
+    """Return the p-value of a model's residuals beyond the noise of repeats; NaN without repeats,
+    or without a remainder.
     """
     dimensions = fitted.degrees_of_freedom - repeats.degrees_of_freedom
     if not repeats.degrees_of_freedom or dimensions <= 0:
@@ -363,8 +366,8 @@ def _lack_of_fit(fitted: FittedSum, repeats: PureError) -> float:
 
 
 def _mistakes(fits: list[RungFit], file: LadderModel, x: Array, is_given: bool) -> tuple[str, ...]:
-    """Mistakes in the file's offsets or arrangement that explain an S^2 of its own model that is
-    too large, as text.
+    """Return descriptions of errors in the file's offsets or arrangement that explain an excessive
+    S^2 of its own model.
     """
     fit = next(suspect for suspect in fits if suspect.model.words == file.words)
     square, freedom = fit.fitted.sum_of_squares, fit.fitted.degrees_of_freedom
@@ -381,7 +384,7 @@ def _mistakes(fits: list[RungFit], file: LadderModel, x: Array, is_given: bool) 
 
 
 def _faults(fit: RungFit, x: Array, repeats: PureError, is_given: bool) -> tuple[str, ...]:
-    """What a model leaves unexplained, as text."""
+    """Return descriptions of the residuals that a model leaves."""
     faults, fitted, design = [], fit.fitted, fit.at.design
     chance = _lack_of_fit(fitted, repeats)
     if chance < MISFIT:

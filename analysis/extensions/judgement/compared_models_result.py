@@ -32,10 +32,10 @@ class LengthChange:
 
 @dataclass(frozen=True)
 class Rung:
-    """An error model on the ladder: its number of parameters, its S^2 and what that leaves.
+    """An error model on the ladder: its number of parameters, its S^2 and degrees of freedom.
 
-    `change` is how its corrected lengths differ from those of the recommended model. Parameters
-    beyond those that the other rungs leave open are `undetermined`.
+    `change` is the difference of its corrected lengths from the recommended model's. Parameters
+    undetermined beyond those of other rungs are `undetermined`.
     """
 
     model: str
@@ -56,15 +56,15 @@ class Rung:
 
 @dataclass(frozen=True, repr=False)
 class ComparedModels(FitResult):
-    """Error models on the same readings, and the one that these call for.
+    """Error models on the same readings, and the recommended one.
 
-    `recommended` is the poorest that no richer one beats, and `error_model` what a file states for
-    it. `faults` are what even the richest leaves unexplained, or, where that `is_mistake`, mistakes
-    in the file that explain it; with any of them none is recommended, and changes of lengths are
-    from the one that would be. `sigma` multiplies stated uncertainties.
-    `lack_of_fit` is the chance of the recommended model's residuals beside the scatter of
-    `repeats`, NaN without any. `beyond` are models that the design leaves undetermined. `lengths`
-    are the standard uncertainties U6 with the recommended model.
+    `recommended` is the smallest that no larger one improves significantly, and `error_model` its
+    statement in a file. `faults` are the residuals of even the largest or, if `is_mistake`, errors
+    in the file that explain these; then no model is recommended, and changes of lengths are from
+    the one that otherwise would be. `sigma` multiplies stated uncertainties. `lack_of_fit` is the
+    p-value of the recommended model's residuals compared with `repeats`, NaN without any. `beyond`
+    are models that the design leaves undetermined. `lengths` are the standard uncertainties U6
+    with the recommended model.
     """
 
     label: str
@@ -92,14 +92,14 @@ class ComparedModels(FitResult):
 
     @property
     def is_none(self) -> bool:
-        """True if none of the models can be recommended."""
+        """True if no model is recommended."""
         return bool(self.faults)
 
     def headline(self) -> str:
         return "none of these" if self.is_none else f"recommended: {self.recommended}"
 
     def verdict(self) -> list[str]:
-        """What to do, as text."""
+        """Recommendation, as text."""
         if self.is_mistake:
             return [f"none of these before the file is corrected: {'; '.join(self.faults)}"]
         if self.is_none:

@@ -49,10 +49,10 @@ MOST_ENTRIES = 20_000_000
 class VarianceComponent:
     """The variance of a group of `observations` as a `ratio` to the stated one.
 
-    `redundancy` is the number of its observations less what the estimate absorbs of them;
-    `standard_uncertainty` is that of the ratio, and `lower` and `upper` are the ends of an interval
-    of 95 %. All are NaN where `verdict` says that it cannot be estimated, and the ratio is taken
-    for 1.
+    `redundancy` is the number of its observations less those absorbed by the estimate;
+    `standard_uncertainty` is that of the ratio, and `lower` and `upper` are the ends of an
+    interval of 95 %. All are NaN if `verdict` states that it cannot be estimated, and the ratio
+    counts as 1.
     """
 
     name: str
@@ -70,8 +70,8 @@ class VarianceComponent:
 
     @property
     def is_to_be_used(self) -> bool:
-        """True if a fit that is reweighted uses the estimate: it may make uncertainties smaller
-        only where it is good to a half.
+        """True if a reweighted fit uses the estimate: it may reduce uncertainties only if it is
+        accurate to a half.
         """
         good = self.ratio > 0.0 and 2.0 * (self.ratio / self.standard_uncertainty) ** 2 >= FEW
         return self.is_estimated and (good or self.verdict == LARGER)
@@ -81,8 +81,8 @@ class VarianceComponent:
 class VarianceComponents(Result):
     """Variance components of the groups that `by` makes of all observations of a fit.
 
-    `weighting` are the ratios that take the place of what is stated where a fit is reweighted: 1
-    where there is no estimate, or one with few degrees of freedom, unless it is larger than stated.
+    `weighting` are the ratios that a reweighted fit applies to stated variances: 1 without an
+    estimate, or with few degrees of freedom, unless it is larger than stated.
     """
 
     label: str
@@ -138,8 +138,8 @@ def too_many_groups(design: Design, groups: Sequence[ObservationGroup]) -> str:
 
 @dataclass(frozen=True)
 class Estimated:
-    """Estimated `ratios` (g,) of `groups`; of those that are not `free` they are 1 for want of an
-    estimate, and `reasons` says why.
+    """Estimated `ratios` (g,) of `groups`; without an estimate (not `free`) they are 1, and
+    `reasons` states why.
     """
 
     groups: tuple[ObservationGroup, ...]
@@ -156,8 +156,8 @@ def told_apart(sums: GroupSums, groups: tuple[ObservationGroup, ...]) -> Estimat
 
 
 def _told_apart(sums: GroupSums, names: Sequence[str]) -> tuple[Integers, tuple[str, ...]]:
-    """Groups whose variances the design tells apart, where these are as stated, and why others
-    have no estimate.
+    """Return groups whose variances the design distinguishes, at stated values, and the reasons
+    for the others.
     """
     at_unit_ratios = at_ratios(sums, np.ones(len(sums.counts)))
     reasons = [""] * len(names)

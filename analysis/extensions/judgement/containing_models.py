@@ -19,7 +19,7 @@ CONTAINED = 1e-9
 
 
 class NotContainedError(ValueError):
-    """A model cannot do what another can; `parameters` names what is missing."""
+    """A model cannot represent another; `parameters` names the missing effects."""
 
     def __init__(self, parameters: tuple[str, ...]) -> None:
         self.parameters = parameters
@@ -27,13 +27,12 @@ class NotContainedError(ValueError):
 
 
 def linear_map(inner: ErrorModel, outer: ErrorModel) -> Array:
-    """Matrix from the parameters of one model to those of another in the same volume, with the same
-    first-order errors.
+    """Return the matrix from the parameters of one model to those of another in the same volume,
+    with the same first-order errors.
 
-    Found by least squares at random places with several probe offsets.
+    It is found by least squares at random points with several probe offsets.
 
-    :raises NotContainedError: some of the parameters of `inner` have effects that `outer` does not
-        know.
+    :raises NotContainedError: some of the parameters of `inner` have effects that `outer` lacks.
     """
     lower, upper = _volume(inner, outer)
     generator = np.random.default_rng(np.random.SeedSequence(1))

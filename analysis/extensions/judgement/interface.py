@@ -33,8 +33,8 @@ def compare_models(
     certificate: PathLike | pandas.DataFrame | None = None,
     report: Report = unreported,
 ) -> ComparedModels:
-    """Which error model readings call for: kinematic ones with up to so many `coefficients`,
-    and empirical ones, compared by what richer ones explain, and what each changes in lengths.
+    """Compare error models on readings: kinematic ones with up to `coefficients`, and empirical
+    ones, by the sum of squares that larger ones explain, with their effect on lengths.
 
     >>> import ballplate as bp
     >>> readings = bp.simulate(bp.quickstart())
@@ -72,11 +72,11 @@ def validate(
 
 
 def budget(subject: Experiment | PathLike | Fit, by: Grouping = "calibration") -> UncertaintyBudget:
-    """What each source contributes to U4, U6, the body diagonals and the measuring tasks of the
-    design of an experiment, or of a fit.
+    """Return the contributions of each source to U4, U6, the body diagonals and the measuring
+    tasks of the design of an experiment, or of a fit.
 
-    `by` splits the readings by axis, probe, position or artefact; as they are by default, they are
-    one source. Contributions add in squares; the largest comes first.
+    `by` splits the readings by axis, probe, position or artefact; by default they are one source.
+    Contributions add in squares; the largest comes first.
 
     >>> import ballplate as bp
     >>> bp.budget(bp.quickstart())

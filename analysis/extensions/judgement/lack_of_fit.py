@@ -1,4 +1,4 @@
-"""Scatter of repeated readings, and the test of lack of fit against it."""
+"""Standard deviation of repeated readings, and the test of lack of fit against it."""
 
 from __future__ import annotations
 
@@ -33,8 +33,9 @@ class PureError:
 
 
 def pure_error(design: Design, state: State, x: Array) -> PureError:
-    """Scatter of the readings of one ball in one position with one probe, x (readings, d), about
-    their weighted mean; what influence quantities differ by among them is taken off.
+    """Return the variation of the readings of one ball in one position with one probe, x
+    (readings, d), about their weighted mean; differences of influence quantities among these are
+    subtracted.
     """
     chosen = design.plate_readings
     readings = design.readings.select(chosen)
@@ -62,7 +63,7 @@ LEAST_TOLD = 1e-6
 
 
 def chance_words(chance: float) -> str:
-    """A chance in two digits, or that it is next to none.
+    """Return a p-value in two digits, or a bound of a tiny one.
 
     >>> chance_words(0.0345), chance_words(1e-300)
     ('0.035', '<1e-06')
@@ -73,8 +74,8 @@ def chance_words(chance: float) -> str:
 def chance_of(
     square: float, dimensions: int, sum_of_rest: float, freedom: int, is_given: bool
 ) -> float:
-    """Chance that so many dimensions explain a sum of squares so large, beside a `rest` with its
-    degrees of freedom: of chi-squared with `given` sigma, otherwise of Fisher's F.
+    """Return the p-value of a sum of squares in a number of dimensions, relative to a `rest` with
+    its degrees of freedom: of chi-squared with `given` sigma, otherwise of Fisher's F.
 
     >>> round(chance_of(3.841459, 1, 90.0, 90, True), 6)
     0.05

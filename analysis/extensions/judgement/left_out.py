@@ -1,10 +1,10 @@
 """Positions, plates and directions left out in turn, and predicted from the rest.
 
-What is left out has uncertainties a thousand times as large, so that it tells nothing of the
-machine, but the pose of a position that is left out, and balls that are read nowhere else, are
-taken from its own readings: what is predicted is what is free of these. S^2 falls by the sum of
-squares of the prediction errors, weighted with their own covariance, the scatter of the readings
-included (Chow's test of predictions).
+Readings left out have uncertainties a thousand times as large, so that they add no information on
+the machine, while the pose of a position left out, and balls read only there, come from its own
+readings: the prediction concerns the remaining combinations. S^2 falls by the sum of squares of
+the prediction errors, weighted with their own covariance, the noise of the readings included
+(Chow's test of predictions).
 """
 
 from __future__ import annotations
@@ -60,7 +60,7 @@ PARALLEL = 0.99
 
 @dataclass(frozen=True)
 class LeftGroup:
-    """What is left out together: `positions` (k,), and the `artefact`'s certificates if it is not
+    """Readings left out together: `positions` (k,), and the `artefact`'s certificates if it is not
     -1.
     """
 
@@ -71,8 +71,8 @@ class LeftGroup:
 
 
 def groups_to_leave(design: Design) -> list[LeftGroup]:
-    """All positions that were read, all plates and standards, and all directions of plates; none
-    that is all there is.
+    """Return all positions that were read, all plates and standards, and all directions of plates,
+    except groups that are the whole.
     """
     positions_read = np.unique(design.readings.position)
     groups = [
@@ -106,7 +106,9 @@ def _directions(design: Design, positions: Integers) -> Iterator[tuple[str, Inte
 
 
 def without(design: Design, group: LeftGroup) -> tuple[Design, Flags]:
-    """The design with a group left out, and which rows (rows,) count as good as nothing."""
+    """Return the design with a group left out, and a mask (rows,) of the rows with negligible
+    weight.
+    """
     readings, lengths = design.readings, design.of(Lengths)
     out = np.isin(readings.position, group.positions)
     uncertainty = reading_uncertainties(design, readings) * np.where(out, OUT, 1.0)[:, None]
@@ -150,7 +152,7 @@ class RestFit:
 
 @single_threaded
 def rest_of(design: Design, x: Array, group: LeftGroup) -> RestFit | None:
-    """The estimate without a group; None where it does not converge."""
+    """Return the estimate without a group, if it converges."""
     design_left, is_out = without(design, group)
     solution = estimate(design_left, x)
     if solution.status != "converged":
@@ -261,7 +263,7 @@ def _left_out(
 def _worst(
     fit_of_rest: RestFit, observed: ObservedReadings, scale: float
 ) -> PredictedReading | None:
-    """The reading that is predicted worst; None where none is predicted."""
+    """Return the reading with the largest standardised prediction error, if any is predicted."""
     design = fit_of_rest.at.design
     readings = row_places(design)["reading"]
     can = (fit_of_rest.variances > NOT_PREDICTED) & (fit_of_rest.rows < readings.stop)
@@ -288,8 +290,8 @@ def _worst(
 def _length_difference(
     full: Linearisation, fit_of_rest: RestFit, scale: float
 ) -> LengthDifference | None:
-    """The largest difference that a group makes to lengths between evaluation points; None where
-    the rest determines no length.
+    """Return the largest effect of a group on lengths between evaluation points, if the rest
+    determines any length.
 
     As the estimate from all readings is the best, the variance of its difference from that of some
     is the difference of their variances.

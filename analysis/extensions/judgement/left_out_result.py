@@ -1,4 +1,4 @@
-"""Predictions of what was left out: text, data and rows."""
+"""Predictions of groups left out: text, data and rows."""
 
 from __future__ import annotations
 
@@ -17,8 +17,8 @@ FAILED = 0.01
 
 @dataclass(frozen=True)
 class PredictedReading:
-    """A prediction error of one co-ordinate in metres, with its standard uncertainty, the scatter
-    of the reading included.
+    """A prediction error of one co-ordinate in metres, with its standard uncertainty, the noise of
+    the reading included.
     """
 
     position: str
@@ -32,9 +32,8 @@ class PredictedReading:
 
 @dataclass(frozen=True)
 class LengthDifference:
-    """The largest change of a corrected length, in metres, where something is left out: with the
-    standard uncertainty of the change, and that of the length. `undetermined` lengths are known by
-    nothing else.
+    """The largest change of a corrected length without a group, in metres, with the standard
+    uncertainties of the change and of the length. `undetermined` lengths rest on the group alone.
     """
 
     change: float
@@ -52,9 +51,9 @@ class LengthDifference:
 class PredictedGroup:
     """A position, plate or direction that was left out and predicted.
 
-    `predicted` are the independent co-ordinates that the others predict, and `mean_square` the mean
-    square of their errors in the variances that the stated uncertainties give them; `sigma` is the
-    others' own. `chance` is that of errors so large.
+    `predicted` counts the independent co-ordinates that the others predict, `mean_square` is the
+    mean square of their errors over the stated variances; `sigma` is the others' own. `chance` is
+    the p-value of the errors.
     """
 
     kind: str
@@ -81,7 +80,7 @@ class Validation(FitResult):
 
     @property
     def failed(self) -> tuple[PredictedGroup, ...]:
-        """What is predicted worse than chance explains, all tests together."""
+        """Groups whose prediction fails the joint test."""
         tested = [group for group in self.left_out if group.predicted > 0]
         return tuple(group for group in tested if group.chance * len(tested) < FAILED)
 

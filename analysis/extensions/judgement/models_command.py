@@ -1,4 +1,4 @@
-"""`ballplate models`: which error model the readings call for."""
+"""`ballplate models`: smallest sufficient error model of readings."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def _coefficients(text: str) -> int:
 
 
 def run(options: Namespace) -> int:
-    """Compare error models; 1 if none is recommended."""
+    """Compare error models; return 1 if no model is recommended."""
     from ballplate.cli import progress, show
 
     from .compared_models import compared_models

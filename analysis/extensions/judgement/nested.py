@@ -1,9 +1,9 @@
-"""Sums of squares of all models that a rich one contains, from its linearisation alone.
+"""Sums of squares of all submodels of a large model, from its linearisation alone.
 
 The readings are linear in the parameters of the machine to a millionth of the errors. With balls,
-poses and all others eliminated, S^2 is b + |t + X a|^2 in the machine's parameters a; a poorer one
-has some of the columns of X only. NPL Report CISE 15/98, section 5.3, compares models by the same
-sums of squares.
+poses and all others eliminated, S^2 is b + |t + X a|^2 in the machine's parameters a; a smaller
+model has some of the columns of X only. NPL Report CISE 15/98, section 5.3, compares models by the
+same sums of squares.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ NOTHING = 1e-10
 @dataclass(frozen=True, eq=False)
 class NestedSums:
     """Columns X (r, n) of the machine's scaled parameters and the target t (r,); S^2 of the model
-    with some of the columns is `base` plus what they leave of the target.
+    with some of the columns is `base` plus the squared remainder of the target.
     """
 
     columns: Array
@@ -35,7 +35,7 @@ class NestedSums:
         return span(self.columns[:, is_kept], float(np.abs(self.columns).max(initial=0.0)))
 
     def left(self, basis: Array) -> Array:
-        """What an orthonormal basis (r, q) leaves of the target (r,)."""
+        """Return the remainder of the target (r,) beyond an orthonormal basis (r, q)."""
         return np.asarray(self.target - basis @ (basis.T @ self.target))
 
     def sum_of_squares(self, is_kept: Flags) -> float:
@@ -44,8 +44,8 @@ class NestedSums:
         return self.base + float(remainder @ remainder)
 
     def gain(self, basis: Array, remainder: Array, more: Integers) -> tuple[float, int]:
-        """How much further columns bring S^2 down beside a basis that leaves `left` (r,), and in
-        how many dimensions.
+        """Return the decrease of S^2 by further columns beyond a basis that leaves `remainder`
+        (r,), and its number of dimensions.
         """
         added = self.columns[:, more]
         added = span(added - basis @ (basis.T @ added), float(np.abs(added).max(initial=0.0)))
@@ -62,7 +62,7 @@ def span(columns: Array, size: float) -> Array:
 
 @single_threaded
 def nested_sums(linearisation: Linearisation) -> NestedSums:
-    """Sums of squares of the models that the one of a fit contains, what the design leaves open
+    """Return sums of squares of the submodels of a fit's model, with undetermined directions
     held.
     """
     layout, factor = linearisation.layout, linearisation.factor

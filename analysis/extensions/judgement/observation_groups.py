@@ -31,10 +31,10 @@ class ObservationGroup:
 
 
 def kinds_of_rows(design: Design, observations: Observations) -> list[str]:
-    """The group of each row of observations, by their kind and artefact.
+    """Return the group of each row of observations, by class and artefact.
 
-    Values that influence quantities have by the same statement are a group, as what is stated of
-    them is the variance that these values have.
+    Values of influence quantities from one statement are a group, whose variance the statement
+    gives.
     """
     if isinstance(observations, Priors):
         parameters = design.influence_parameters
@@ -91,7 +91,7 @@ def groups_of(
 
 
 def reweighted(design: Design, groups: Sequence[ObservationGroup], ratios: Array) -> Design:
-    """The design with the variances (g,) of groups that many times what is stated."""
+    """Return the design with the stated variances of groups multiplied by (g,)."""
     d, chosen = design.dimension, design.plate_readings
     times = np.ones(row_count(design))
     for group, ratio in zip(groups, ratios.tolist(), strict=True):
