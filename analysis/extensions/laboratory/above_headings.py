@@ -1,4 +1,4 @@
-"""What lines above the headings of a table say of all its rows."""
+"""Information in the lines above the headings of a table, which applies to all its rows."""
 
 from __future__ import annotations
 
@@ -20,9 +20,9 @@ LONGEST_LINE = 300
 
 
 def said_above(lines: Iterable[str]) -> dict[str, str]:
-    """What lines say of all rows: position, probe and unit.
+    """Return position, probe and unit stated for all rows.
 
-    :raises HeadingError: they say two things.
+    :raises HeadingError: two lines contradict each other.
     """
     statements: dict[str, str] = {}
     for text in (text[:LONGEST_LINE] for text in lines):

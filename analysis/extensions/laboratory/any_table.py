@@ -59,13 +59,13 @@ TEMPERATURES = (
 
 @dataclass(frozen=True)
 class TableRows:
-    """Rows of tables of readings: the names of position, ball and probe, and lengths in metres, x,
-    y, z and u, and what further columns hold; NaN for what is not stated.
+    """Rows of tables of readings: the names of position, ball and probe, lengths in metres (x, y,
+    z and u), and further columns; NaN if not stated.
 
-    `told` says how each table was read. `diameters` (rows,) in metres are NaN where none is stated.
-    `hints` are what to say where names are not known: that a position is the name of the file
-    though columns are not used. `coordinates` is what those of a report of a measuring program
-    are; None of a table, which does not say. `times` are those of rows that have clock times.
+    `told` describes how each table was read. `diameters` (rows,) in metres are NaN if not stated.
+    `hints` are advice for unknown names: a position may be named by the file although columns are
+    unused. `coordinates` is the type of a report's co-ordinates, None for a table. `times` are
+    those of rows with clock times.
     """
 
     rows: tuple[FileRow, ...]
@@ -83,12 +83,13 @@ def read_any_table(
     settings: ReadingsSettings,
     is_possible: Callable[[Array], bool],
 ) -> TableRows:
-    """Rows of a table whose form is found, or stated in the settings.
+    """Return rows of a table whose form is detected, or stated in the experiment.
 
-    `is_possible` tells whether co-ordinates (m, d) in metres can be readings of the machine. Names
-    are as the table has them; the probe is empty where nothing states it.
+    `is_possible` is true if co-ordinates (m, d) in metres can be readings of the machine. Names
+    are those of the table; the probe is empty if not stated.
 
-    :raises ExperimentError: the table is ambiguous, lacks columns or units, or has wrong cells.
+    :raises ExperimentError: the table is ambiguous, lacks columns or units, or has invalid
+        entries.
     """
     refuse_controls(source.text, source)
     texts = LINE_END.split(source.text)
@@ -168,9 +169,9 @@ class _Reader:
             raise ExperimentError(messages)
 
     def _texts(self, above: Mapping[str, str]) -> tuple[dict[str, str], list[str]]:
-        """What all rows have where no column says it, and as text where that comes from.
+        """Return texts that apply to all rows without a column for them, and their sources.
 
-        :raises ExperimentError: nothing says which position it is.
+        :raises ExperimentError: the position is not stated.
         """
         texts, notes = {}, []
         every = {role for group in self.form.headings.groups for role in group.texts}
@@ -196,9 +197,9 @@ class _Reader:
         return texts, notes
 
     def _of_positions(self, position: str) -> tuple[Message, ...]:
-        """What to say where positions are not known, since one is by the name of the file alone.
+        """Return advice for unknown positions, if only the file's name states one.
 
-        :raises ExperimentError: a column that is not used has nothing but names of positions.
+        :raises ExperimentError: an unused column holds names of positions alone.
         """
         headings = self.form.headings
         if position != Path(self.source.name).stem or "position" in headings.roles:
@@ -224,9 +225,9 @@ class _Reader:
         return (Message(str(self.source), max(self.form.header, 1), 1, "", text),)
 
     def _units(self, above: Mapping[str, str]) -> dict[int, str]:
-        """Units by place of the columns of lengths.
+        """Return units by index of the columns of lengths.
 
-        :raises ExperimentError: one has none, or two.
+        :raises ExperimentError: a column without a unit, or with two.
         """
         unit_stated = None if self.settings.unit is None else plain_unit(self.settings.unit)
         once = unit_of(above.get("unit", "").rstrip("."))
@@ -270,7 +271,7 @@ class _Reader:
     def _rows(
         self, group: Group, texts: Mapping[str, str], units: Mapping[int, str]
     ) -> list[tuple[FileRow, float]]:
-        """Rows of the readings of a group of columns, with diameters; cells are in order."""
+        """Return rows of the readings of a group of columns, with diameters."""
         roles, file = self.form.headings.roles, str(self.source)
         sign = DECIMALS[self.form.decimal]
         axes = [axis.place for axis in group.axes]
@@ -368,7 +369,7 @@ class _Reader:
             )
 
     def _told(self, units: Mapping[int, str], notes_above: Sequence[str]) -> str:
-        """How the table was read, in a sentence."""
+        """Return a sentence on how the table was read."""
         form, headings = self.form, self.form.headings
         parts = [SEPARATORS[form.separator][1], f"decimal {form.decimal}s"]
         parts += [self.encoding] if self.encoding else []

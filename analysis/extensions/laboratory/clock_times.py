@@ -31,7 +31,7 @@ class ClockTime:
 def clock_time(text: str) -> ClockTime:
     """Read a time of a day, or one with its date, by ISO 8601 or with the day first and points.
 
-    :raises ClockError: it is none.
+    :raises ClockError: the text is not a time.
 
     >>> clock_time("10:05"), clock_time("22.11.2026 10:05:30").seconds % 60
     (ClockTime(kind='times of a day', seconds=36300.0), 30.0)

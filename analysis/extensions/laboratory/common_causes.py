@@ -1,9 +1,7 @@
-"""Causes that all readings have in common: axes that are exchanged or run the other way, another
-unit, co-ordinates of a part.
+"""Causes common to all readings: exchanged or reversed axes, another unit, part co-ordinates.
 
-Where the readings of most positions fit no artefact as it was planned to stand, one such cause is
-likelier than as many slips as there are readings. A cause is told only if all positions fit with
-it.
+If the readings of most positions fit no artefact in its planned pose, one such cause is likelier
+than many separate slips. A cause is reported only if all positions fit with it.
 """
 
 from __future__ import annotations
@@ -45,10 +43,10 @@ SHIFTED = 0.25
 def poses_found(
     design: Design, readings: Readings, seen_places: Array
 ) -> dict[int, tuple[float, float]] | None:
-    """By position, the angle (degrees) and the distance (m) of readings' places seen (m, d) from
-    where the artefact was planned; None where those of a position are not of the artefact.
+    """Return by position the angle (degrees) and the distance (m) between the artefact's pose from
+    readings at (m, d) and the planned one, None if the readings do not fit the artefact.
 
-    Only positions of plates count, of which balls were read that fix the pose.
+    Only positions of plates count whose balls fix the pose.
     """
     pitch, poses = ball_pitches(design), {}
     for k, rows, nominal in read_in_positions(design, readings):
@@ -75,9 +73,9 @@ def _as_planned(design: Design, readings: Readings, seen_places: Array) -> bool:
 
 
 def common_cause(design: Design, x: Array, settings: ReadingsSettings) -> str:
-    """What would let all readings fit, as text; empty where nothing does.
+    """Return the change with which all readings fit; possibly empty.
 
-    x (readings, d) are scale readings, made of what the table has as the settings state.
+    x (readings, d) are scale readings, computed from the table by the stated settings.
     """
     readings = design.readings
     offsets = design.probes.offsets[readings.probe]
@@ -130,8 +128,8 @@ def _units() -> Iterator[tuple[str, float]]:
 
 
 def mistaken_positions(design: Design, readings: Readings, seen_places: Array) -> dict[int, int]:
-    """Positions of plates most of whose places seen (m, d) are where another one was planned, and
-    not where their own was, each with that other one.
+    """Return positions of plates most of whose readings at (m, d) are in the planned pose of
+    another one and not in their own, each with that other one.
     """
     reach, mistaken = AGAINST_DRAWING * ball_pitches(design), {}
     artefacts = design.positions.artefact
@@ -160,8 +158,8 @@ def words_of_mistaken(design: Design, mistaken: Mapping[int, int]) -> str:
 
 
 def doubts_about_poses(design: Design, x: Array) -> tuple[str, ...]:
-    """A sentence about plates that stood far from where they were planned, which machines rarely
-    are the cause of; none where they stood about as planned.
+    """Return a sentence about plates far from their planned pose, which machines rarely cause;
+    possibly empty.
     """
     readings = design.readings
     places = x + design.probes.offsets[readings.probe]

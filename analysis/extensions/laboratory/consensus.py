@@ -1,4 +1,4 @@
-"""The rigid motion that most points of a set agree on, however wrong the others are."""
+"""The rigid motion that most points of a set agree on, robust against the others."""
 
 from __future__ import annotations
 
@@ -20,12 +20,11 @@ JUDGES = 400
 def consensus_motion(
     source: Array, target: Array, reach: Array
 ) -> tuple[Array, Array, NDArray[np.bool_]]:
-    """Rotation (d, d), origin (d,) and which points (m,) agree with them.
+    """Return rotation (d, d), origin (d,) and a mask (m,) of the points that agree with them.
 
-    The motion brings as many points `source` (m, d) as possible within `reach` (m,) of `target` (m,
-    d). Motions of small subsets of widely spread points are tried, the best of them is refined by
-    all points that agree with it. The same points give the same answer: subsets are drawn from a
-    fixed seed.
+    The motion brings as many points `source` (m, d) as possible within `reach` (m,) of `target`
+    (m, d). Motions of small, widely spread subsets are tried; the best is refined by all points
+    that agree with it. The same points give the same result: subsets are drawn from a fixed seed.
     """
     judges = np.unique(np.linspace(0, len(source) - 1, min(len(source), JUDGES)).astype(np.int64))
     subsets = _subsets(source)
@@ -51,12 +50,14 @@ def consensus_motion(
 
 
 def distances(source: Array, target: Array, rotation: Array, origin: Array) -> Array:
-    """How far (m,) points `source` (m, d), once moved, are from `target` (m, d)."""
+    """Return distances (m,) of moved points `source` (m, d) from `target` (m, d)."""
     return np.asarray(np.sqrt(((source @ rotation.T + origin - target) ** 2).sum(axis=1)))
 
 
 def _subsets(source: Array) -> NDArray[np.int64]:
-    """Indices (c, d) of subsets that fix a motion, the most widely spread ones of those drawn."""
+    """Return indices (c, d) of subsets that fix a motion, the most widely spread of the drawn
+    ones.
+    """
     return _widest(source.tobytes(), source.shape[1])
 
 

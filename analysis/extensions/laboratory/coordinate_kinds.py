@@ -1,5 +1,5 @@
-"""Scale readings from what measuring programs write: centres of balls, in the machine's
-co-ordinates or in those of a part, with the machine's own correction or without.
+"""Scale readings from the output of measuring programs: centres of balls, in machine or part
+co-ordinates, with or without the machine's own correction.
 """
 
 from __future__ import annotations
@@ -34,15 +34,15 @@ def controller_offsets(design: Design, settings: ReadingsSettings) -> Array:
 def as_scale_readings(
     design: Design, readings: Readings, x: Array, settings: ReadingsSettings, file: object
 ) -> Array:
-    """Scale readings (m, d) of co-ordinates (m, d) of the kind that the settings state.
+    """Return scale readings (m, d) of co-ordinates (m, d) of the stated type.
 
-    Ball centres lose the offset that the controller has. Part co-ordinates are first put where the
-    nominal pose of each position has its balls: the estimated pose takes up the rest, and the
-    machine's errors are evaluated as far off as the artefact stood from its nominal pose. What the
-    machine's correction has added is taken off last, where it is stated.
+    The controller's offset is subtracted from ball centres. Part co-ordinates are first moved to
+    the nominal pose of each position: the estimated pose absorbs the rest, and the machine's
+    errors are evaluated as far off as the artefact was from its nominal pose. A stated correction
+    of the machine is subtracted last.
 
-    :raises ExperimentError: a position has too few balls for its part co-ordinates to be placed, or
-        the correction is too large to be taken off; or not all co-ordinates were read.
+    :raises ExperimentError: a position has too few balls to move its part co-ordinates, the
+        correction     is too large to subtract, or some co-ordinates were not read.
     """
     correction = settings.compensation
     is_taken_off = isinstance(correction, CompensationSettings)
@@ -65,8 +65,8 @@ def as_scale_readings(
 
 
 def doubts_about_copies(design: Design, readings: Readings, x: Array) -> tuple[str, ...]:
-    """What is doubtful about part co-ordinates (m, d) as the table has them: that two positions
-    have the same ones, which repeated measurements do not give, but a file that was copied does.
+    """Return doubts about part co-ordinates (m, d) in the table: two positions have equal ones,
+    which copied files have and repeated measurements do not.
     """
     of_position = {
         k: {

@@ -22,8 +22,8 @@ OTHER_UNIT = 100.0
 
 
 def last_digit(x: Array) -> float:
-    """The largest power of ten of a unit that all co-ordinates are multiples of, in metres; zero
-    where they have digits far below all readings.
+    """Return the largest power of ten of a unit that divides all co-ordinates, in metres; zero for
+    many digits.
 
     >>> [round(last_digit(np.array([0.1234, 0.5]) * unit), 9) for unit in (1.0, 0.001, 0.0254)]
     [0.0001, 1e-07, 2.54e-06]
@@ -40,9 +40,9 @@ def last_digit(x: Array) -> float:
 
 
 def doubts_about_digits(design: Design, x: Array, uncertainty: Array | None) -> tuple[str, ...]:
-    """A sentence about co-ordinates (m, d) as the table has them, in metres, that are rounded more
-    coarsely than is in keeping with the standard `uncertainty` (m, d) of readings, or with the
-    repeatability; none where they are not.
+    """Return a sentence about co-ordinates (m, d) in the table, in metres, that are rounded more
+    coarsely than the standard `uncertainty` (m, d) of readings, or the repeatability, suggests;
+    possibly empty.
 
     Rounding to steps of q has the standard uncertainty q / sqrt(12) (GUM, 4.3.7).
     """
@@ -67,8 +67,8 @@ def doubts_about_digits(design: Design, x: Array, uncertainty: Array | None) -> 
 
 
 def doubts_about_units(design: Design, uncertainty: Array) -> tuple[str, ...]:
-    """A sentence about standard uncertainties (m,) that a table has of its readings, if they are
-    so much larger or smaller than the repeatability that they are rather in another unit.
+    """Return a sentence about standard uncertainties (m,) of readings in a table that differ from
+    the repeatability by a factor typical of another unit.
     """
     stated_uncertainty, repeatability = (
         float(np.median(uncertainty)),

@@ -1,7 +1,7 @@
-"""Positions, balls and probes out of the names that a measuring program gives to features.
+"""Positions, balls and probes from the names that a measuring program gives to features.
 
-A rule is a name with places in braces, such as {position}_{ball}_{probe}. Where the experiment is
-known, capitals and whatever is no letter or digit do not count.
+A rule is a name with fields in braces, such as {position}_{ball}_{probe}. For a known experiment,
+capitals and characters other than letters and digits are ignored.
 """
 
 from __future__ import annotations
@@ -37,9 +37,9 @@ Parts = Mapping[str, str]
 
 @dataclass(frozen=True)
 class Named:
-    """The parts of each feature's name by a rule, none where it is not of the rule; `numbered` are
-    those of which names have the number. Those that are `strange` are not the experiment's, and
-    matched by number and place as those of tables are.
+    """The parts of each feature's name by a rule, None if it does not match; `numbered` are those
+    given by number. `strange` ones are not the experiment's, and are matched by number and
+    location like those of tables.
     """
 
     rule: str
@@ -60,9 +60,9 @@ def fold(name: str) -> str:
 
 
 def named(names: Sequence[str], rule: str | None, design: Design | None, file: str) -> Named:
-    """The parts of names by a rule, or by the one that they follow.
+    """Return the parts of names by a rule, or by the one that they follow.
 
-    :raises ExperimentError: they follow several rules, or none.
+    :raises ExperimentError: they follow several rules, or no rule.
     """
     if design is not None:
         return _known(names, rule, design, file)
@@ -71,8 +71,8 @@ def named(names: Sequence[str], rule: str | None, design: Design | None, file: s
 
 
 def without_point(rule: str) -> tuple[str, re.Pattern[str] | None]:
-    """A rule without its point, and what parts a name from the number of the point; None where it
-    has none.
+    """Return a rule without its point, and the separator of name and point number, if it has a
+    point.
     """
     if not rule.endswith("{point}"):
         return rule, None
@@ -82,7 +82,7 @@ def without_point(rule: str) -> tuple[str, re.Pattern[str] | None]:
 
 
 def _split(name: str, rule: str, file: str) -> Parts | None:
-    """The parts of a name, of which nothing is known; None where it is not of the rule."""
+    """Return the parts of a name of an unknown experiment, if it matches the rule."""
     pieces = PLACE.split(rule)
     parts = []
     for quantifier in ("+?", "+"):
@@ -119,8 +119,8 @@ def _likely(names: Sequence[str], file: str) -> str:
 
 
 def _lookup(rule: str, design: Design, numbered: Sequence[str]) -> dict[str, Parts | None]:
-    """Names by a rule of all balls in all positions with all probes, folded; None where several
-    have the same. Of what is `numbered` the names have the number in its place, from 1.
+    """Return names by a rule of all balls in all positions with all probes, folded; None for
+    ambiguous ones. Names contain the number, from 1, of `numbered` parts.
     """
     places = [name for name in PLACE.findall(rule) if name != "point"]
     positions = enumerate(design.positions.names) if "position" in places else ((-1, ""),)
@@ -140,8 +140,8 @@ def _lookup(rule: str, design: Design, numbered: Sequence[str]) -> dict[str, Par
 
 
 def _known(names: Sequence[str], rule: str | None, design: Design, file: str) -> Named:
-    """The parts of names of an experiment's, by the rule that most of them follow; where none has
-    the names of balls, or of positions, by their numbers.
+    """Return the parts of names of an experiment, by the rule that most of them follow; by numbers
+    if no rule matches names of balls or positions.
     """
     folded = [fold(name) for name in names]
     for numbered in ((), ("ball",), ("position", "ball")):
@@ -176,9 +176,9 @@ def _known(names: Sequence[str], rule: str | None, design: Design, file: str) ->
 
 
 def _strange(names: Sequence[str], rule: str | None, design: Design, file: str) -> Named | None:
-    """The parts of names that are not an experiment's, by the rule that is stated, or by one that
-    all follow if these have numbers of balls; None where there are none, or where the plane of a
-    position has to be known to read it.
+    """Return the parts of names that are not an experiment's, by the stated rule, or by one that
+    all follow if these have numbers of balls; unavailable if the plane of a position has to be
+    known to read it.
     """
     if design.positions.across is not None:
         return None
@@ -221,9 +221,9 @@ def _fitting(
 
 
 def position_of_file(stem: str, design: Design | None, file: str) -> str:
-    """The position that a file's name tells: all of it, or the one of the experiment in it.
+    """Return the position in a file's name: all of it, or the one of the experiment in it.
 
-    :raises ExperimentError: it tells none, or several.
+    :raises ExperimentError: it contains no position, or several.
     """
     if design is None:
         return stem

@@ -20,14 +20,12 @@ from .wrong_offsets import only_position, wrong_offsets
 def refuse_gross_errors(
     design: Design, x: Array, marks: Sequence[Mark], settings: ReadingsSettings
 ) -> None:
-    """Refuse readings that cannot be of the ball, or with the probe, or of the length, that they
-    are said to be of.
+    """Refuse readings that cannot be of the stated ball, probe or length.
 
-    `marks` tell where each of the design's readings stands, and `settings` what the scale readings
-    x (readings, d) were made of. The rules are those of
-    `gross_errors` and `length_ratios`.
+    `marks` are the locations of the design's readings, and `settings` describe the source of the
+    scale readings x (readings, d). The rules are those of `gross_errors` and `length_ratios`.
 
-    :raises ExperimentError: some readings are wrong; names all of them.
+    :raises ExperimentError: gross errors; names all of them.
     """
     positions, readings = find_gross_errors(design, x)
     mistakes = wrong_offsets(design, design.readings, x) if positions or readings else []
@@ -75,8 +73,8 @@ def refuse_gross_errors(
 def with_names_swapped(
     design: Design, readings: Readings, x: Array, marks: Sequence[Mark]
 ) -> tuple[Readings, tuple[str, ...]]:
-    """Readings of plates with the names of two balls swapped wherever scale readings x (m, d) show
-    that they are, and that as text; all others as they are.
+    """Return readings of plates with the names of two balls exchanged if scale readings x (m, d)
+    show that they are, with a note; others are unchanged.
     """
     plate = np.flatnonzero(design.artefacts.is_plate[design.balls.artefact[readings.ball]])
     of_plates = replace(design, readings=readings.select(plate)).observed(
@@ -97,15 +95,15 @@ def with_names_swapped(
 
 
 def doubts_about_lengths(design: Design, x: Array) -> tuple[str, ...]:
-    """Sentences about standards whose lengths are all off by a factor that machines hardly have."""
+    """Return sentences about standards whose lengths all differ by an improbable factor."""
     return tuple(_of_length(design, length) for length in doubtful_lengths(design, x))
 
 
 def doubts_about_volume(design: Design, x: Array, marks: Sequence[Mark]) -> tuple[str, ...]:
-    """A sentence about readings outside the volume, where error models are extrapolated, or none.
+    """Return a sentence about readings outside the volume, where error models are extrapolated;
+    possibly empty.
 
-    By less than a thousandth of the volume a reading is outside if an artefact was not set up just
-    nominal.
+    Excess below a thousandth of the volume is normal for an artefact set up by hand.
     """
     volume = design.machine.volume
     beyond = np.maximum(volume.lower - x, x - volume.upper)

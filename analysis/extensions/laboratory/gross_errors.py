@@ -41,11 +41,11 @@ EXPLAINED = 0.25
 
 @dataclass(frozen=True)
 class WrongReading:
-    """A reading that is off by `misfit` (d,) metres; `other_ball`, `other_probe` explain it where
-    they are not -1.
+    """A reading off by `misfit` (d,) metres; `other_ball`, `other_probe` explain it if they are
+    not -1.
 
-    `partner` is a reading that is wrong in the reverse way (exchanged balls), or that disagrees
-    with this one where nothing tells which of the two is right (`undecided`); -1 without.
+    `partner` is a reading with the reverse error (exchanged balls), or one that disagrees with
+    this one without a decision between the two (`undecided`); -1 without.
     """
 
     reading: int
@@ -82,9 +82,9 @@ class _Motions:
 
 
 def find_gross_errors(design: Design, x: Array) -> tuple[list[WrongPosition], list[WrongReading]]:
-    """Positions and readings that cannot be right, from scale readings x (readings, d).
+    """Return positions and readings that cannot be right, from scale readings x (readings, d).
 
-    Readings of Bryan gauges pass: their directions need not be those of the drawing.
+    Readings of Bryan gauges pass: their directions need not be nominal.
     """
     compared = np.flatnonzero(~np.isin(design.readings.position, design.gauge_positions))
     if len(compared) < len(design.readings):
@@ -160,14 +160,14 @@ def _against_drawing(
 
 
 def _in_line(places: Array) -> bool:
-    """True if places (m, d) lie in one line in space, about which any turn fits."""
+    """True if points (m, d) lie on one line in space, about which any turn fits."""
     extent = np.linalg.svd(places - places.mean(axis=0), compute_uv=False)
     return places.shape[1] == 3 and bool(extent[1] < FLAT * extent[0])
 
 
 def _turned_onto_itself(design: Design, position: int, rotation: Array, pitch: Array) -> str:
-    """In words the turn, against the pose as planned, that puts every ball where another one should
-    be; or ''.
+    """Return a description of the turn from the planned pose that moves every ball to another's
+    location; possibly empty.
     """
     from scipy.spatial import cKDTree
 
@@ -186,7 +186,7 @@ def _turned_onto_itself(design: Design, position: int, rotation: Array, pitch: A
 
 
 def _in_frame(motions: _Motions, position: Integers, places: Array) -> Array:
-    """Places seen (m, d) in the frames of the artefacts."""
+    """Return points at (m, d) in the frames of the artefacts."""
     return np.asarray(
         np.einsum("mji,mj->mi", motions.rotations[position], places - motions.origins[position])
     )
@@ -202,8 +202,8 @@ def _against_readings(
 ) -> tuple[_Motions, Array, NDArray[np.bool_], list[tuple[int, int]]]:
     """Compare readings of the same ball, after assembling each plate from its positions.
 
-    Returns the motions of the assembled artefacts, their shapes (n, d), which readings are wrong,
-    and pairs of readings of which one must be.
+    Returns the motions of the assembled artefacts, their shapes (n, d), a mask of gross errors,
+    and pairs of readings with one gross error.
     """
     readings, wrong = design.readings, wrong.copy()
     right = np.flatnonzero(~wrong)
@@ -266,7 +266,9 @@ def _against_readings(
 
 
 def _offset_uncertainties(design: Design) -> Array:
-    """Standard uncertainties (l,) of the probes' offsets in all, infinite where one is unknown."""
+    """Return standard uncertainties (l,) of the probes' offsets in all axes, infinite for an
+    unknown one.
+    """
     variance = np.where(design.probes.free, np.inf, 0.0)
     uncertain = np.flatnonzero(design.of(Priors).probe >= 0)
     probe, axis = design.of(Priors).probe[uncertain], design.of(Priors).component[uncertain]
@@ -275,7 +277,7 @@ def _offset_uncertainties(design: Design) -> Array:
 
 
 def _medians(local: Array, ball: Integers, otherwise: Array) -> tuple[Array, Integers]:
-    """Median place (n, d) of the readings of each ball, and how many there are (n,)."""
+    """Return the median location (n, d) of the readings of each ball, and their number (n,)."""
     count = np.bincount(ball, minlength=len(otherwise))
     order = np.argsort(ball, kind="stable")
     place = np.arange(len(ball)) - (np.cumsum(count) - count)[ball[order]]
@@ -289,7 +291,7 @@ def _medians(local: Array, ball: Integers, otherwise: Array) -> tuple[Array, Int
 def _worst_of_each_ball(
     ball: Integers, apart: Array, suspect: NDArray[np.bool_]
 ) -> NDArray[np.bool_]:
-    """Of the suspect readings, the one of each ball that is furthest off."""
+    """Return the reading of each ball that is furthest off."""
     worst = np.zeros(len(ball), bool)
     rows = np.flatnonzero(suspect)
     rows = rows[np.argsort(-apart[rows], kind="stable")]
@@ -300,8 +302,8 @@ def _worst_of_each_ball(
 def _explained(
     design: Design, places: Array, pitch: Array, motions: _Motions, shape: Array, wrong: Integers
 ) -> list[WrongReading]:
-    """What the wrong readings probably are: of another ball, with another probe, or simply
-    wrong.
+    """Return probable explanations of gross errors: another ball, another probe, or
+    unexplained.
     """
     from scipy.spatial import cKDTree
 

@@ -98,7 +98,7 @@ def heading(cell: str) -> tuple[str, str | None]:
 
 
 def unit_of(cell: str) -> str | None:
-    """The unit that a cell or a line states by itself, in brackets or not; None where none.
+    """Return the unit that a text states, in brackets or not, if it states one.
 
     >>> unit_of("[mm]"), unit_of("inch"), unit_of("12")
     ('mm', 'in', None)
@@ -107,7 +107,8 @@ def unit_of(cell: str) -> str | None:
 
 
 def unit_of_further(cell: str, name: str) -> str | None:
-    """The unit of a heading that names a further column, empty without one; None if it does not.
+    """Return the unit of a heading that names a further column, empty without one; None for other
+    headings.
 
     >>> unit_of_further("t_scales_degC", "t_scales"), unit_of_further("T scales [°C]", "t_scales")
     ('degC', 'degC')

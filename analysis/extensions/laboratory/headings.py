@@ -1,4 +1,4 @@
-"""What the headings of a table of readings name: roles, co-ordinates of probes, and units."""
+"""Headings of a table of readings: roles, co-ordinates of probes, and units."""
 
 from __future__ import annotations
 
@@ -29,12 +29,12 @@ TEXTS = ("position", "ball", "probe")
 
 
 class HeadingError(ValueError):
-    """A line that names columns, but not as it has to; the text says what is wrong."""
+    """A line of headings with a fault; the text describes it."""
 
 
 @dataclass(frozen=True)
 class HeadedColumn:
-    """A column by its place, with the unit in its heading; or the `constant` that all rows have."""
+    """A column by its index, with the unit in its heading; or the `constant` of all rows."""
 
     place: int
     unit: str | None = None
@@ -43,7 +43,7 @@ class HeadedColumn:
 
 @dataclass(frozen=True)
 class Group:
-    """Columns of the co-ordinates of one reading: `axes` and what their headings say of them."""
+    """Columns of the co-ordinates of one reading: `axes` and the texts in their headings."""
 
     axes: tuple[HeadedColumn, ...]
     texts: Mapping[str, str]
@@ -53,8 +53,7 @@ class Group:
 class Headings:
     """Columns of a table: by role, and of co-ordinates in `groups`, several in a wide table.
 
-    `cells` are the headings, none in a table without; `unused` those of columns that nothing is
-    taken from.
+    `cells` are the headings, empty in a table without; `unused` those of unused columns.
     """
 
     roles: Mapping[str, HeadedColumn]
@@ -63,7 +62,7 @@ class Headings:
 
     @cached_property
     def used(self) -> frozenset[int]:
-        """Places of the columns that something is taken from."""
+        """Indices of the columns in use."""
         columns = [*self.roles.values(), *(axis for group in self.groups for axis in group.axes)]
         return frozenset(column.place for column in columns if column.constant is None)
 
@@ -74,8 +73,8 @@ class Headings:
 
 @dataclass(frozen=True)
 class Vocabulary:
-    """What headings may name: probes and positions, by their names, columns `stated`, and `further`
-    ones of numbers, with the units that each may have. Cells of the axes `empty` may be so.
+    """Names in headings: probes and positions, columns `stated`, and `further` ones of numbers,
+    with their permitted units. The axes `empty` may have empty entries.
     """
 
     axes: tuple[str, ...]
@@ -87,7 +86,9 @@ class Vocabulary:
 
     @cached_property
     def beside_axes(self) -> dict[str, dict[str, str]]:
-        """What a heading may say besides an axis, folded, and which texts of a reading that is."""
+        """Texts, folded, that a heading may contain with an axis, and the parts of a reading they
+        state.
+        """
         names_by_cell: dict[str, dict[str, str]] = {"": {}}
         probes = {folded(name): {"probe": name} for name in self.probes}
         positions = {folded(name): {"position": name} for name in self.positions}
@@ -103,9 +104,9 @@ class Vocabulary:
 
 
 def read_headings(cells: Sequence[str], words: Vocabulary) -> Headings | None:
-    """The columns that a line names; None where it does not name co-ordinates.
+    """Return the columns that a line names, if it names co-ordinates.
 
-    :raises HeadingError: it does, but in more than one way, or lacks what is stated.
+    :raises HeadingError: it does so ambiguously, or lacks a stated column.
     """
     parsed = [heading(cell) for cell in cells]
     columns_stated = words.stated
@@ -228,7 +229,7 @@ def _refuse_expanded(column: HeadedColumn, cells: Sequence[str]) -> None:
 
 
 def numbered_columns(words: Vocabulary, count: int) -> Headings:
-    """The columns of a table without headings, all of them stated by their numbers.
+    """Return the columns of a table without headings, all stated by number.
 
     :raises HeadingError: some are not.
     """
@@ -265,9 +266,10 @@ def _twice(role: str, cell: str) -> str:
 
 
 def _stated_column(name: str, cells: Sequence[str]) -> HeadedColumn:
-    """The column that the experiment file names, exactly, without its unit, or by its number.
+    """Return the column that the experiment file names, exactly, without its unit, or by its
+    number.
 
-    :raises HeadingError: there is none.
+    :raises HeadingError: it does not exist.
     """
     if name.startswith("="):
         return HeadedColumn(-1, constant=name[1:].strip())
@@ -285,9 +287,9 @@ def _stated_column(name: str, cells: Sequence[str]) -> HeadedColumn:
 
 
 def _stated_groups(cells: Sequence[str], words: Vocabulary) -> tuple[Group, ...] | None:
-    """Groups of co-ordinates that the experiment file names columns of; None where it names none.
+    """Return groups of co-ordinates whose columns the experiment file names, if it names any.
 
-    :raises HeadingError: it names some that are not there, or not all.
+    :raises HeadingError: it names missing columns, or only some.
     """
     columns_stated = {axis: getattr(words.stated, axis, None) for axis in words.axes}
     columns_given = {
@@ -319,7 +321,7 @@ def _stated_groups(cells: Sequence[str], words: Vocabulary) -> tuple[Group, ...]
 
 
 def _found_groups(cells: Sequence[str], words: Vocabulary) -> tuple[Group, ...] | None:
-    """Groups of co-ordinates by what headings say besides an axis; None where none is complete.
+    """Return groups of co-ordinates by the texts of headings next to an axis, if one is complete.
 
     :raises HeadingError: two columns could be the same co-ordinate.
     """
@@ -371,7 +373,7 @@ def _found_groups(cells: Sequence[str], words: Vocabulary) -> tuple[Group, ...] 
 
 
 def missing_columns(cells: Iterable[str], missing: Sequence[str]) -> str:
-    """What to say of a table that lacks columns: those there are, and what to write."""
+    """Return advice for a table that lacks columns: the existing ones, and the entry to write."""
     named = listing((f'"{shorten(cell)}"' for cell in cells if cell), 12)
     mapping = ", ".join(f"{role}: …" for role in missing)
     return (

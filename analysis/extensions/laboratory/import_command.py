@@ -76,7 +76,7 @@ def add_options(parser: ArgumentParser) -> None:
 
 
 def run(options: Namespace) -> int:
-    """Write the table of what the reports have."""
+    """Write the table of readings in the reports."""
     from ballplate.cli import single
 
     from .interface import read_report

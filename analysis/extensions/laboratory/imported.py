@@ -1,4 +1,4 @@
-"""Readings out of reports of measuring programs: which features they are, and what is left."""
+"""Readings from reports of measuring programs: features used and skipped."""
 
 from __future__ import annotations
 
@@ -44,9 +44,9 @@ IN_WORDS = {
 
 @dataclass(frozen=True, eq=False)
 class ImportedReading:
-    """A ball's centre (3,) in metres, with the names that its feature has; `uncertainty` is that of
-    a centre from points on the surface, of its least certain axis. Its co-ordinate along the axis
-    `across` is not read, -1 where all are.
+    """A ball's centre (3,) in metres, with the names in its feature; `uncertainty` is that of a
+    centre from points on the surface, of its least certain axis. The axis `across` is not read, -1
+    if all are.
     """
 
     mark: Mark
@@ -60,10 +60,10 @@ class ImportedReading:
 
 @dataclass(frozen=True)
 class ImportedReadings:
-    """Readings of reports, and everything that is to be known about how they were read.
+    """Readings of reports, and notes on how they were read.
 
-    `told` says per file what was taken and what was left, `remarks` what of it may matter, and
-    `coordinates` what `readings: {coordinates: …}` should say in the experiment.
+    `told` lists per file features used and skipped, `remarks` are further notes, and `coordinates`
+    is the entry `readings: {coordinates: …}` of the experiment.
     """
 
     readings: tuple[ImportedReading, ...]
@@ -73,8 +73,8 @@ class ImportedReadings:
     dimension: int = 3
 
     def columns(self, uncertainties: bool = False) -> dict[str, list[str] | list[float]]:
-        """The columns of a table of readings, in millimetres, NaN where a co-ordinate is not read;
-        without one of probes where no report names any.
+        """Columns of a table of readings, in millimetres, NaN for a co-ordinate that is not read;
+        without probes if no report names any.
         """
         rows = self.readings
         columns: dict[str, list[str] | list[float]] = {
@@ -93,7 +93,7 @@ class ImportedReadings:
         return columns
 
     def write(self, stream: TextIO, uncertainties: bool = False) -> None:
-        """Write a table of readings, below comments that say where they are from."""
+        """Write a table of readings, below comments on their sources."""
         for line in (*self.told, self.key):
             stream.write(f"# {line}\n")
         writer = CsvWriter(stream)
@@ -104,7 +104,7 @@ class ImportedReadings:
 
     @property
     def key(self) -> str:
-        """What the experiment has to say about the co-ordinates."""
+        """Entry of the experiment on the co-ordinates."""
         return (
             "these are centres of balls; say so in the experiment, readings: {coordinates:"
             f' {self.coordinates}}}, or with fit --coordinates "{self.coordinates}"'
@@ -113,9 +113,8 @@ class ImportedReadings:
 
 @dataclass(frozen=True)
 class ImportSettings:
-    """How reports are read: the experiment whose names features have, the rule of the names, the
-    name of the files' format, metres per unit of files that state none, and whether centres of
-    circles are readings, too.
+    """Options for reports: the experiment that names features, the rule of the names, the format,
+    metres per unit for files without a unit, and a flag for centres of circles.
     """
 
     design: Design | None = None
@@ -126,7 +125,7 @@ class ImportSettings:
 
     @property
     def kinds(self) -> set[str]:
-        """Kinds of features that may be readings."""
+        """Types of features that may be readings."""
         of_points = self.rule is not None and "{point}" in self.rule
         more = [CIRCLE] * self.circles + [POINT] * of_points
         return {POINT} if of_points else {SPHERE, UNSTATED, *more}
@@ -134,7 +133,7 @@ class ImportSettings:
 
 @dataclass
 class _Taken:
-    """What of a report are readings, with the parts of their names, and what is left."""
+    """Readings of a report, with the parts of their names, and skipped features."""
 
     report: Report
     features: list[tuple[Feature, dict[str, str], SphereFit | None]] = field(default_factory=list)
@@ -142,15 +141,15 @@ class _Taken:
     remarks: list[str] = field(default_factory=list)
 
     def leave(self, features: Sequence[Feature], why: str) -> None:
-        """Leave features for a reason, which is told with their names."""
+        """Skip features for a reason, reported with their names."""
         if features:
             self.left.update(f"{feature.kind} ({why})" for feature in features)
             names = listing((f'"{shorten(feature.name, 30)}"' for feature in features), 5)
             self.remarks.append(f"{self.report.file}: {len(features)} left, {why}: {names}")
 
     def centred(self, feature: Feature) -> tuple[Feature, SphereFit | None] | None:
-        """A feature with its centre, and the closest sphere where that is of points; None, and
-        left, where there is none.
+        """Return a feature with its centre, and the closest sphere of points; a feature without a
+        centre is skipped.
         """
         if feature.lacks or feature.points is None:
             return None if feature.lacks else (feature, None)
@@ -167,9 +166,9 @@ class _Taken:
 def report_readings(
     paths: Sequence[Path | GivenText], settings: ImportSettings
 ) -> ImportedReadings:
-    """Readings of reports whose features have names by a rule (see `feature_names`).
+    """Return readings of reports whose features have names by a rule (see `feature_names`).
 
-    :raises ExperimentError: a file cannot be read, is of no known format or wrong, or has no
+    :raises ExperimentError: a file cannot be read, is of unknown format or invalid, or has no
         reading.
     """
     taken_reports = [
@@ -267,7 +266,7 @@ def _taken(report: Report, path: Path | GivenText, settings: ImportSettings) -> 
 
 
 def _about_systems(file: str, features: Sequence[Feature]) -> list[str]:
-    """What co-ordinates are in, where that is not the machine's system throughout."""
+    """Return a note on co-ordinate systems other than the machine's."""
     remarks = []
     systems = Counter(feature.system for feature in features)
     for system, count in systems.items():
@@ -283,8 +282,8 @@ def _about_systems(file: str, features: Sequence[Feature]) -> list[str]:
 def _named(
     features: Sequence[Feature], rule: str | None, design: Design | None, file: str
 ) -> tuple[Named, str]:
-    """The parts of features' names, or of those of the dimensions that tell them, and whose names
-    it is in the latter case.
+    """Return the parts of features' names, or of the names of their dimensions, and whose names
+    they are in the latter case.
     """
     try:
         return named([feature.name for feature in features], rule, design, file), ""
@@ -340,7 +339,7 @@ def _grouped(
 def _readings(
     taken_report: _Taken, path: Path | GivenText, variance: float, design: Design | None
 ) -> list[ImportedReading]:
-    """The readings of a report, with the probe that its names, its sensors or the plan tell."""
+    """Return the readings of a report, with the probe from its names, its sensors or the plan."""
     readings = []
     for feature, parts, fit in taken_report.features:
         uncertainty = None
@@ -363,9 +362,9 @@ def _readings(
 
 
 def _probe(feature: Feature, position: str, design: Design | None, file: str) -> str:
-    """The probe of a feature whose name tells none.
+    """Return the probe of a feature whose name contains none.
 
-    :raises ExperimentError: it may be one of several.
+    :raises ExperimentError: several are possible.
     """
     if design is None:
         return feature.probe
@@ -402,7 +401,7 @@ def _counted(counts: Counter[str]) -> list[str]:
 
 
 def _told(taken: _Taken) -> str:
-    """What was taken of a file and what was left, counted by kind."""
+    """Return a line on features used and skipped, counted by type."""
     kinds_taken = Counter(
         "centre" if feature.kind == UNSTATED else f"{feature.kind} centre"
         for feature, _, _ in taken.features

@@ -12,9 +12,9 @@ from .imported import ImportedReadings
 
 @dataclass(frozen=True)
 class ReadReport(Result):
-    """Readings of reports; `to_frame` is a table that `fit` takes.
+    """Readings of reports; `to_frame` is a table that `fit` accepts.
 
-    `told` says what was taken of each report and what was left, `remarks` what may matter of it.
+    `told` lists features used and skipped in each report, `remarks` are further notes.
     """
 
     label: str

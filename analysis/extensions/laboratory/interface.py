@@ -26,13 +26,13 @@ def read_report(
     unit: Literal["mm", "cm", "m", "in"] | None = None,
     circles: bool = False,
 ) -> ReadReport:
-    """Readings out of reports that measuring programs write; their `to_frame()` is a table that
-    `fit` takes.
+    """Return readings from reports of measuring programs; their `to_frame()` is a table that `fit`
+    accepts.
 
     Positions, balls and probes are in the names of features, by a rule such as
     {position}_{ball}_{probe}: that of `name`, or the one by which the names are those of the
-    `experiment`. `form` is dmis, pcdmis, calypso or qif, and is recognised if it is left out;
-    `unit` is that of reports which state none; `circles` takes centres of circles, too.
+    `experiment`. `form` is dmis, pcdmis, calypso or qif, by default recognised; `unit` applies to
+    reports without one; `circles` includes centres of circles.
 
     >>> import ballplate as bp
     >>> bp.read_report("designs/reports/z-low.dmo", "designs/quickstart.yaml").told

@@ -1,7 +1,7 @@
 """Detection of standards whose lengths are all read too long or too short by one factor.
 
-A machine's scale errors would explain that as well, so that no fit shows it; but no scale is off by
-so much.
+Scale errors of the machine would explain that as well, so that no fit shows it; but no scale has
+such an error.
 """
 
 from __future__ import annotations
@@ -82,8 +82,8 @@ def doubtful_lengths(design: Design, x: Array) -> tuple[LengthRatio, ...]:
 
 
 def _of_radii(design: Design, places: Array, rows: np.ndarray) -> Array:
-    """Radii of the spheres through the readings over the stated one, without those that the
-    readings hardly show.
+    """Return radii of the spheres through the readings over the stated one, without poorly
+    determined ones.
     """
     lengths = design.of(Lengths)
     position = design.readings.position[lengths.first[rows]]

@@ -1,8 +1,8 @@
-"""Positions, balls and probes of tables by the names that the experiment has for them.
+"""Matching of positions, balls and probes of tables to the names in the experiment.
 
-Names that differ are taken for those of the experiment where one rule alone explains all of them:
-the same except case, signs and zeros before numbers; the number in the experiment's order; or the
-place, where nominal places tell. Every such match is told.
+Other names are matched if one rule alone explains all of them: the same except case, signs and
+zeros before numbers; the number in the experiment's order; or the location, if nominal ones
+decide. Every match is reported.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ _KINDS = re.compile(r"(?:ball|sphere|kugel|position|pos|lage|p|b|k|s|no|nr)\s*")
 
 @dataclass
 class Names:
-    """Names of a table that have been found, and what is to be told, or doubted, or asked."""
+    """Matched names of a table, with notes, doubts and questions."""
 
     told: list[str] = field(default_factory=list)
     doubted: list[str] = field(default_factory=list)
@@ -42,11 +42,9 @@ class Names:
 def with_known_names(
     rows: Sequence[FileRow], design: Design, places: Callable[[Sequence[FileRow]], Array] | None
 ) -> tuple[tuple[FileRow, ...], Names]:
-    """Rows with the names that the design has, and as text what was matched how, and what could
-    not be.
+    """Return rows with the names of the design, and notes on matched and unmatched names.
 
-    `places` makes places of balls in the machine, in metres, of rows; None where the table does
-    not have them.
+    `places` converts rows to locations of balls in the machine, in metres, if the table has them.
     """
     names = Names()
     positions, balls, probes = design.positions.names, set(design.balls.names), design.probes.names
@@ -96,7 +94,7 @@ def _pairs(names: Mapping[str, str], limit: int = 4) -> str:
 def _alike(
     noun: str, used: Sequence[str], names_known: Sequence[str], names: Names
 ) -> dict[str, str]:
-    """Names that are the same except case, signs and zeros; none unless all of them are."""
+    """Return names that are the same except case, signs and zeros, if all of them are."""
     by_folded: dict[str, set[str]] = {}
     for name in names_known:
         by_folded.setdefault(folded(name), set()).add(name)
@@ -115,7 +113,7 @@ def _alike(
 
 
 def _numbers(names: Sequence[str], most: int) -> dict[str, int] | None:
-    """Which of those in order each name is the number of, from 0; None unless all are numbers."""
+    """Return the index, from 0, of each name that is a number in order, if all are."""
     numbers = {}
     for name in names:
         plain = _KINDS.sub("", folded(name), count=1) if not name.isdecimal() else folded(name)
@@ -154,7 +152,7 @@ def _matched_positions(
     places: Callable[[Sequence[FileRow]], Array] | None,
     names: Names,
 ) -> Sequence[FileRow]:
-    """Rows whose positions are known by number, or by place."""
+    """Return rows whose positions are identified by number or location."""
     names_known = design.positions.names
     used = list(dict.fromkeys(row.texts[0] for row in rows))
     strange = [name for name in used if name not in names_known]
@@ -189,9 +187,10 @@ def _others_by_place(
     places: Callable[[Sequence[FileRow]], Array] | None,
     names: Names,
 ) -> Sequence[FileRow]:
-    """Rows of a table most of whose positions are known, with the others known by place.
+    """Return rows of a table most of whose positions are known, with the others identified by
+    location.
 
-    A few strange names among those of a position that is known are slips of the pen, and stay.
+    A few unknown names within a known position are slips of the pen, and stay.
     """
     if not strange or places is None:
         return rows
@@ -209,7 +208,7 @@ def _positions_by_place(
     places: Callable[[Sequence[FileRow]], Array],
     expected: Mapping[str, str],
 ) -> tuple[dict[str, str], str]:
-    """The position that is nearest to each one of the table, or nothing and why not.
+    """Return the position nearest to each one of the table, or a reason why there is none.
 
     One that is `expected`, by its number, need only be the nearest.
     """
@@ -262,7 +261,7 @@ def _pitch(places: Array) -> float:
 
 
 def _nearest(seen_places: Array, places: Array, position_index: int = 1) -> tuple[Array, Integers]:
-    """Distances (m,) to the nearest of some places, or to the second nearest, and which it is."""
+    """Return distances (m,) to the nearest location, or to the second nearest, and its index."""
     from scipy.spatial import cKDTree
 
     distance, index = cKDTree(places).query(seen_places, [position_index])
@@ -275,7 +274,7 @@ def _matched_balls(
     places: Callable[[Sequence[FileRow]], Array] | None,
     known_matches: Names,
 ) -> Sequence[FileRow]:
-    """Rows whose balls are known by number, or by place, artefact by artefact."""
+    """Return rows whose balls are identified by number or location, artefact by artefact."""
     positions = {name: k for k, name in enumerate(design.positions.names)}
     if known_matches.asked or any(row.texts[0] not in positions for row in rows):
         return rows
@@ -299,8 +298,8 @@ def _matched_balls(
 
 
 def _order_read(design: Design, artefact_balls: Integers) -> Integers:
-    """Balls of an artefact in the order in which its positions read them; empty where these
-    differ.
+    """Return the balls of an artefact in the order in which its positions read them; empty if
+    these differ.
     """
     orders = []
     for k in range(len(design.positions.names)):
@@ -324,8 +323,8 @@ def _by_number(
     turned_freely: bool,
     known_matches: Names,
 ) -> dict[str, str]:
-    """Balls by their numbers in reading order, if the readings then fit the artefact as it is
-    planned to stand, or however it is turned.
+    """Match balls by number in reading order, if the readings then fit the artefact as planned or
+    in another orientation.
     """
     numbers, order = _numbers(used, len(balls)), _order_read(design, balls)
     if numbers is None or not len(order):
@@ -361,8 +360,8 @@ def _doubt_numbers(
     names: Mapping[str, str],
     known_matches: Names,
 ) -> None:
-    """Ask about numbers of balls at `places` that co-ordinates of a part, with `rotations` against
-    the artefact's axes, contradict, and doubt them where these do not tell.
+    """Ask about numbers of balls at `places` that part co-ordinates, with `rotations` against the
+    artefact's axes, contradict, and doubt them if these do not decide.
     """
     if all(
         float(np.abs(rotation - np.eye(len(rotation))).max()) <= AS_PLANNED
@@ -396,7 +395,7 @@ def _by_place(
     places: Callable[[Sequence[FileRow]], Array] | None,
     known_matches: Names,
 ) -> dict[str, str]:
-    """Balls whose nominal places are nearest, if that is one of them for each name."""
+    """Match balls by the nearest nominal location, if each name has a different one."""
     names_known = [design.balls.names[b] for b in balls]
     strange = listing(f'"{shorten(name)}"' for name in used if name not in names_known)
     text = f"the balls {strange} are not in the experiment, nor numbers in reading order that fit"

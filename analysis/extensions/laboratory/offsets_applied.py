@@ -1,8 +1,8 @@
-"""True if co-ordinates are scale readings or ball centres, if the readings tell.
+"""Distinction between scale readings and ball centres, if the readings allow it.
 
-The offsets of two probes that read in one position differ; readings of both can be of one artefact
-only as what they are. A shift of all readings of a position is one of its pose: with one probe in
-each position, the two cannot be told apart.
+The offsets of two probes that read in one position differ; readings of both fit one artefact only
+as the right type. A shift of all readings of a position is one of its pose: with one probe in each
+position, the two are confounded.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ REPEATABILITIES = 5.0
 
 @dataclass(frozen=True)
 class Hypothesis:
-    """What co-ordinates may be: places of balls once so many times the offsets are added."""
+    """Possible type of co-ordinates: locations of balls after adding the offsets `times` times."""
 
     name: str
     times: float
@@ -70,8 +70,8 @@ UNTOLD = (
 
 @dataclass(frozen=True)
 class OffsetVerdict:
-    """How far readings of positions that tell are from their balls (metres, the median), by
-    hypothesis, and the one that clearly is right; None where that cannot be told.
+    """Distances of decisive readings from their balls (metres, the median), by hypothesis, and the
+    hypothesis that is clearly right, if one is.
     """
 
     scatter: dict[str, float]
@@ -81,11 +81,10 @@ class OffsetVerdict:
 def judge_offsets(
     design: Design, readings: Readings, x: Array, applied: Array | None = None
 ) -> OffsetVerdict:
-    """What co-ordinates (m, d) of readings of plates are; nothing is told where no position was
-    read with different offsets.
+    """Return the type of co-ordinates (m, d) of readings of plates, if a position was read with
+    different offsets.
 
-    `applied` (l, d) are the offsets that are in ball centres, where they are not those of the
-    design.
+    `applied` (l, d) are the offsets in ball centres, if they differ from the design's.
     """
     plate = np.flatnonzero(design.artefacts.is_plate[design.balls.artefact[readings.ball]])
     plate_readings = readings.select(plate)
@@ -123,7 +122,7 @@ def judge_offsets(
 
 
 def _of_several_offsets(readings: Readings, offsets: Array) -> NDArray[np.bool_]:
-    """Which readings are of positions that were read with offsets that differ: only these tell."""
+    """Return a mask of readings in positions that were read with different offsets."""
     telling = np.zeros(len(readings), bool)
     for k in np.unique(readings.position):
         is_of_position = readings.position == k
@@ -132,7 +131,7 @@ def _of_several_offsets(readings: Readings, offsets: Array) -> NDArray[np.bool_]
 
 
 def _is_of_drawing(design: Design, readings: Readings, places: Array, pitch: Array) -> bool:
-    """True if most places seen (m, d) are those of the artefact nominal, position by position."""
+    """True if most points at (m, d) are those of the nominal artefact, position by position."""
     for _, rows, nominal in read_in_positions(design, readings):
         if len(np.unique(readings.ball[rows])) < 2:
             continue
@@ -143,9 +142,7 @@ def _is_of_drawing(design: Design, readings: Readings, places: Array, pitch: Arr
 
 
 def _apart(design: Design, readings: Readings, seen_places: Array) -> Array:
-    """Distances (m,) of places seen (m, d) from those of their balls in the plates that they are
-    assembled to.
-    """
+    """Return distances (m,) of points at (m, d) from their balls in the assembled plates."""
     # Places seen are readings of a probe without an offset.
     probes = replace(design.probes, offsets=np.zeros_like(design.probes.offsets))
     state = initial_state(replace(design, readings=readings, probes=probes), seen_places)
@@ -157,10 +154,10 @@ def _apart(design: Design, readings: Readings, seen_places: Array) -> Array:
 def doubt_about_offsets(
     design: Design, readings: Readings, x: Array, settings: ReadingsSettings, mark: Mark
 ) -> tuple[str, ...]:
-    """What is doubtful about co-ordinates x (m, d) as the table has them: whether they are scale
-    readings, where nothing states it and the readings do not tell.
+    """Return a doubt about co-ordinates x (m, d) in the table: scale readings are assumed, and the
+    readings do not decide.
 
-    :raises ExperimentError: they clearly are other than stated, or than is taken for granted.
+    :raises ExperimentError: they clearly differ from the stated or assumed type.
     """
     coordinates_stated = settings.coordinates
     is_read = measured(design, readings)
@@ -198,8 +195,8 @@ def doubt_about_offsets(
 
 
 def said_of(settings: ReadingsSettings) -> tuple[str, ...]:
-    """What is to be known of estimates where co-ordinates are not scale readings of a machine
-    without correction.
+    """Return notes on estimates from co-ordinates other than scale readings of an uncorrected
+    machine.
     """
     sentences = []
     if settings.coordinates == "part":

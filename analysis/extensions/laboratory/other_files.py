@@ -1,6 +1,4 @@
-"""Files that are given as readings, or as certificate values, and hold something else: what they
-are, and where they belong.
-"""
+"""Recognition of files given as readings, or as certificate values, that hold something else."""
 
 from __future__ import annotations
 
@@ -17,7 +15,7 @@ RUN_SHEET = frozenset(("step", "set_up", "balls", "readings"))
 
 
 def what_it_is(source: GivenText) -> str:
-    """What a file without readings is, and what to do with it; empty where that is not known."""
+    """Return a description of a file without readings, and its use; empty if unknown."""
     names = headings(source.text)
     if names >= POINTS:
         return (
@@ -46,5 +44,5 @@ def what_it_is(source: GivenText) -> str:
 
 
 def is_program(form: Format, text: str) -> bool:
-    """True if a file of a format moves a machine, and has nothing that was measured."""
+    """True if a file of a format moves a machine, without any measured value."""
     return form.name == "dmis" and not re.search(r"^[ \t]*FA\(", text, re.MULTILINE)

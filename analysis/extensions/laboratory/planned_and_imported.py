@@ -1,4 +1,4 @@
-"""Readings that reports have beside those that an experiment plans."""
+"""Comparison of readings in reports with those that an experiment plans."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def import_readings(paths: Sequence[Path], settings: ImportSettings) -> Imported
 
 
 def against_plan(readings: Sequence[ImportedReading], design: Design) -> list[str]:
-    """Which planned readings the reports do not have, and which they have that are not planned."""
+    """Return notes on planned readings that are missing, and on unplanned ones."""
     balls, positions, probes = design.balls.names, design.positions.names, design.probes.names
     planned = {
         (positions[position], balls[ball], probes[probe])
@@ -49,8 +49,8 @@ def against_plan(readings: Sequence[ImportedReading], design: Design) -> list[st
 def _summed_up(
     some: set[tuple[str, str, str]], planned: set[tuple[str, str, str]], design: Design
 ) -> str:
-    """Readings by position, ball and probe, abbreviated; a position all of whose planned readings
-    are among them is told as one.
+    """Return readings by position, ball and probe, abbreviated; a position with all its planned
+    readings is listed as one.
     """
     words = []
     for name in design.positions.names:

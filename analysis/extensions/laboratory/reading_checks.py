@@ -1,4 +1,4 @@
-"""What the reader of plain tables asks for: other kinds of co-ordinates, and a person's mistakes in
+"""Checks that the reader of plain tables requests: types of co-ordinates, and gross errors in
 readings.
 """
 
@@ -32,10 +32,10 @@ def doubts_about_table(
     settings: ReadingsSettings,
     mark: Mark,
 ) -> tuple[str, ...]:
-    """What is doubtful about co-ordinates (m, d) as a table has them, and about uncertainties (m,)
-    that it states, as text; `mark` is where it begins.
+    """Return doubts about co-ordinates (m, d) in a table, and about its uncertainties (m,); `mark`
+    is its location.
 
-    :raises ExperimentError: they clearly are other than stated, or than is taken for granted.
+    :raises ExperimentError: they clearly differ from the stated or assumed type.
     """
     doubts = doubt_about_offsets(design, readings, values, settings, mark)
     doubts += doubts_about_digits(design, values, readings.uncertainty)
@@ -47,8 +47,8 @@ def doubts_about_table(
 
 
 def doubts_about_readings(design: Design, x: Array, marks: Sequence[Mark]) -> tuple[str, ...]:
-    """What of scale readings (readings, d) is possible, and unlikely to be meant: places, lengths,
-    temperatures.
+    """Return possible but improbable properties of scale readings (readings, d): locations,
+    lengths, temperatures.
     """
     of_volume = doubts_about_volume(design, x, marks)
     return (

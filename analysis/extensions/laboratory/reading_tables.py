@@ -111,9 +111,9 @@ def any_source_rows(
 
 
 def _refuse_wrong_times(sources: Sequence[Source], tables: Sequence[TableRows]) -> None:
-    """Refuse clock times that may be of several days, or beside other times.
+    """Refuse clock times that may be of several days, or mixed with other times.
 
-    :raises ExperimentError: there are such.
+    :raises ExperimentError: in these cases.
     """
     times = [time for table in tables for time in table.times]
     for source, table in zip(sources, tables, strict=True):

@@ -102,7 +102,7 @@ def _cells(line: str, separator: str) -> list[str]:
 
 
 def _table(text: Text) -> _Table | None:
-    """The table of a report: the first line whose cells are headings of either kind."""
+    """Return the table of a report: it begins with the first line of known headings."""
     for number, line in enumerate(text.lines[:MOST_BEFORE], start=1):
         for separator in ("\t", ";", r"\s{2,}", r"\s+"):
             cells = _cells(line, separator)
@@ -130,7 +130,7 @@ def recognises(beginning: str) -> bool:
 
 @dataclass
 class _Located:
-    """Co-ordinates of a feature if rows have told them."""
+    """Co-ordinates of a feature, collected from rows."""
 
     mark: Mark
     name: str
@@ -140,7 +140,7 @@ class _Located:
     axes: dict[str, float] = field(default_factory=dict)
 
     def feature(self) -> Feature:
-        """The feature, lacking its centre if an axis was not told."""
+        """Return the feature, without a centre if an axis is missing."""
         centre, missing = centre_of(self.axes)
         lacks = f"no value of {' or '.join(missing)}" if missing else ""
         system: System = "part" if self.alignment else "unstated"
@@ -163,7 +163,7 @@ class _Reader:
     ends_in_text: bool = False
 
     def rows(self) -> Iterator[tuple[Mark, dict[str, str]]]:
-        """Cells of each row by their columns; rows that end before the last needed one are told."""
+        """Yield each row by column; rows that end before the last required column are reported."""
         table, text = self.table, self.table.text
         names = ("id", *AXES) if table.is_of_features else ("id", "actual")
         needed = max(table.columns[name] for name in names)
@@ -247,9 +247,9 @@ def _has_number(cells: list[str]) -> bool:
 
 
 def _axis_and_name(row: dict[str, str]) -> tuple[str, str]:
-    """Which co-ordinate a characteristic is, and of which feature; an empty axis where it is none.
+    """Return the axis and the feature of a characteristic; the axis is empty for others.
 
-    Its type or symbol tells the axis, and a column the feature; else both are in its name.
+    Its type or symbol states the axis, and a column the feature; otherwise both are in its name.
     """
     types = (AXIS.fullmatch(row.get(column, "")) for column in ("type", "symbol"))
     axis = next((axis_match[1].upper() for axis_match in types if axis_match is not None), "")
@@ -276,9 +276,9 @@ def _agrees(row: dict[str, str]) -> bool:
 
 
 def read(content: bytes, file: str, unit: Fraction | None) -> Report:
-    """Features of a table of Calypso; see `Format`.
+    """Return features of a table of Calypso; see `Format`.
 
-    :raises ExperimentError: no headings, a row that is cut off or wrong, or no unit.
+    :raises ExperimentError: no headings, an invalid or incomplete row, or no unit.
     """
     text, problems = read_lines(content, file), ReportProblems(file)
     table = _table(text)

@@ -1,4 +1,4 @@
-"""Rows of printed tables: what the headings call the columns, and numbers in them."""
+"""Rows of printed tables: columns by heading, and numbers in them."""
 
 from __future__ import annotations
 

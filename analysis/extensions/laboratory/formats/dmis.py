@@ -61,7 +61,7 @@ SYSTEMS = ("DATSET", "TRANS", "ROTATE", "LOCATE", "TRMATX")
 
 @dataclass(frozen=True)
 class Statement:
-    """A statement with its continuation lines joined; what is left of = is `kind` and `name`."""
+    """A statement with its continuation lines joined; `kind` and `name` precede the =."""
 
     mark: Mark
     kind: str
@@ -72,12 +72,12 @@ class Statement:
 
     @property
     def parts(self) -> list[str]:
-        """What is between commas."""
+        """Parts between commas."""
         return [part.strip() for part in self.rest.split(",")]
 
 
 def statements(text: Text, problems: ReportProblems) -> Iterator[Statement]:
-    """Statements of a file, comments left out; those that cannot be parted are told."""
+    """Yield statements of a file without comments; invalid ones are reported."""
     joined, start = "", 0
     for number, line in enumerate(text.lines, start=1):
         stripped = line.strip()
@@ -105,7 +105,7 @@ def statements(text: Text, problems: ReportProblems) -> Iterator[Statement]:
 
 @dataclass
 class _Reader:
-    """What the statements so far have set, and the features that they gave."""
+    """State set by earlier statements, and the features read."""
 
     problems: ReportProblems
     unit: Fraction | None
@@ -285,9 +285,9 @@ def _of_points(reader: _Reader) -> Iterator[Feature]:
 
 
 def read(content: bytes, file: str, unit: Fraction | None) -> Report:
-    """Features of DMIS output; see `Format`.
+    """Return features of DMIS output; see `Format`.
 
-    :raises ExperimentError: a statement about a feature is wrong, or the unit is not stated.
+    :raises ExperimentError: an invalid statement about a feature, or no unit.
     """
     text = read_lines(content, file)
     reader = _Reader(ReportProblems(file), unit)

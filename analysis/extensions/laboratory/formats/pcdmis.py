@@ -51,8 +51,8 @@ AGREEMENT = Fraction(2)
 
 @dataclass
 class _Dimension:
-    """The location of a feature that is being read, its unit, its columns (what each is called and
-    where it ends), and whether it has had a row.
+    """The current location of a feature, its unit, its columns (heading and end of each), and a
+    flag for rows read.
     """
 
     mark: Mark
@@ -66,7 +66,7 @@ class _Dimension:
 
 @dataclass
 class _Located:
-    """Co-ordinates of a feature if dimensions have told them."""
+    """Co-ordinates of a feature, collected from dimensions."""
 
     mark: Mark
     name: str
@@ -76,7 +76,7 @@ class _Located:
     axes: dict[str, float] = field(default_factory=dict)
 
     def feature(self) -> Feature:
-        """The feature, lacking its centre if an axis was not told."""
+        """Return the feature, without a centre if an axis is missing."""
         centre, missing = centre_of(self.axes)
         lacks = f"no row {' or '.join(missing)}" if missing else ""
         return Feature(
@@ -139,7 +139,7 @@ class _Reader:
             self._row(first, line, mark, number == len(self.text.lines))
 
     def _end(self) -> None:
-        """End the dimension that is being read; a location that had no row is left, and told."""
+        """End the current dimension; a location without a row is skipped and reported."""
         ended, self.dimension = self.dimension, None
         if ended is None or ended.has_row:
             return
@@ -150,10 +150,10 @@ class _Reader:
             self.others[f"dimension (no row {' or '.join(AXES)})"] += 1
 
     def finish(self) -> tuple[str, ...]:
-        """End the file; a remark where its last line has no end and is of no known form.
+        """End the file; add a note if its last line is incomplete and of unknown form.
 
-        :raises ExperimentError: something was wrong, or the file ends before the first row of a
-            dimension or within its name.
+        :raises ExperimentError: earlier faults, or the file ends before the first row of a
+            dimension or     within its name.
         """
         last = self.text.lines[-1]
         if self.dimension is not None and not self.dimension.has_row:
@@ -235,9 +235,9 @@ class _Reader:
 
 
 def _by_column(line: str, columns: list[tuple[str, int]]) -> dict[str, str] | None:
-    """The numbers of a row by their columns; None where it is not clear which is which.
+    """Return the numbers of a row by column, if their assignment is unique.
 
-    Where some are blank, the others end where their headings do.
+    With blanks, numbers end below the ends of their headings.
     """
     matches = list(re.finditer(r"\S+", line))[1:]
     # Behind the numbers may stand a bar of characters.
@@ -252,9 +252,9 @@ def _by_column(line: str, columns: list[tuple[str, int]]) -> dict[str, str] | No
 
 
 def _agrees(row: dict[str, str]) -> bool:
-    """True if a row's deviation is what it measured less the nominal, if it tells them.
+    """True if a row's deviation, if stated, is measured less nominal.
 
-    Its sign may be turned round, by a setting, where the nominal is negative.
+    An option of the program reverses its sign for negative nominal values.
     """
     nominal = row.get("NOMINAL", row.get("NOM"))
     measured = row.get("MEAS", row.get("MEASURED"))
@@ -268,9 +268,9 @@ def _agrees(row: dict[str, str]) -> bool:
 
 
 def read(content: bytes, file: str, unit: Fraction | None) -> Report:
-    """Features of a text report of PC-DMIS; see `Format`.
+    """Return features of a text report of PC-DMIS; see `Format`.
 
-    :raises ExperimentError: a row of a location is wrong, or its unit is not stated.
+    :raises ExperimentError: an invalid row of a location, or no unit.
     """
     text = read_lines(content, file)
     reader = _Reader(text, ReportProblems(file), unit)

@@ -1,7 +1,7 @@
 """Results in the Quality Information Framework (QIF 2 and 3, ISO 23952), read by path.
 
-A measured sphere names the item of which it is a measurement, and that has the name; points are
-listed below the sphere (QIF 2) or in sets of points to which it refers (QIF 3).
+A measured sphere names the item that it measures, and this item has the name; points are listed
+below the sphere (QIF 2) or in sets of points to which it refers (QIF 3).
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ class _Document:
     units: dict[str, Fraction]
 
     def named(self, element: Element | None) -> Element | None:
-        """What an element refers to by an id, or None."""
+        """Return the element with the id that an element refers to, if it exists."""
         return None if element is None else self.by_id.get(element.text)
 
     def unit(self, element: Element) -> Fraction:
@@ -119,7 +119,7 @@ def _feature(document: _Document, element: Element, kind: str) -> Feature:
 
 
 def _points(document: _Document, element: Element) -> Array | None:
-    """Points (n, 3) of a sphere in metres, None where there are none that can be read."""
+    """Return points (n, 3) of a sphere in metres, if they can be read."""
     point_arrays: list[Array] = []
     for listed in element.all("PointList"):
         for child in listed.children:
@@ -163,9 +163,9 @@ def _of_set(document: _Document, element: Element) -> Array:
 
 
 def read(content: bytes, file: str, unit: Fraction | None) -> Report:
-    """Features of QIF results; see `Format`.
+    """Return features of QIF results; see `Format`.
 
-    :raises ExperimentError: not well-formed, no QIF, no results, or a wrong number.
+    :raises ExperimentError: not well-formed, not QIF, no results, or an invalid number.
     """
     root = parse_xml(content, file)
     if root.name != "QIFDocument" or not NAMESPACE.fullmatch(root.namespace):

@@ -1,4 +1,4 @@
-"""All formats that are read, and which of them a file has."""
+"""Readable formats, and recognition of a file's format."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ BEGINNING = 100_000
 
 
 def recognised(text: str) -> Format | None:
-    """The format that a text is in by its beginning; None where it is in none of them."""
+    """Return the format that the beginning of a text matches, if any."""
     beginning = "\n".join(text[:BEGINNING].splitlines())
     return next(
         (report_format for report_format in FORMATS if report_format.recognises(beginning)), None
@@ -58,11 +58,11 @@ def is_table(text: str) -> bool:
 def read_report(
     path: Path | GivenText, name: str | None = None, unit: Fraction | None = None
 ) -> Report:
-    """The report in a file, of the format with a name or of the one that recognises it.
+    """Return the report in a file, of the named format or of the one that recognises it.
 
-    `unit` is metres per unit for a file that states none.
+    `unit` is metres per unit for a file without a unit.
 
-    :raises ExperimentError: the file cannot be read, is of no known format, or is wrong.
+    :raises ExperimentError: the file cannot be read, is of unknown format, or is invalid.
     """
     content, file = read_bytes(path), str(path)
     if name is not None:

@@ -1,4 +1,4 @@
-"""What a report of a measuring program says, whatever its format: features with their centres."""
+"""Content of a report of a measuring program in a common form: features with their centres."""
 
 from __future__ import annotations
 
@@ -34,9 +34,9 @@ UNSTATED = "feature"
 class Feature:
     """A measured feature: its centre, or points (n, 3) on its surface, in metres.
 
-    `lacks` says why there is neither. `probe` is the label of the sensor that was in use, empty
-    where the report has none, `system` what its co-ordinates are in, and `of` that system's name.
-    `dimension` is what the report calls the characteristic that tells them, if it has a name.
+    `lacks` states why there is neither. `probe` is the label of the active sensor, possibly empty,
+    `system` the type of its co-ordinate system, and `of` the system's name. `dimension` is the
+    report's name of the characteristic, if it has one.
     """
 
     mark: Mark
@@ -53,9 +53,10 @@ class Feature:
 
 @dataclass(frozen=True)
 class Report:
-    """Features of a file in their order; `others` counts what is left and is no measured feature.
+    """Features of a file in their order; `others` counts skipped entries that are not measured
+    features.
 
-    `remarks` are to be known by whoever uses the features.
+    `remarks` are notes for the user of the features.
     """
 
     file: str
@@ -67,10 +68,10 @@ class Report:
 
 @dataclass(frozen=True)
 class Format:
-    """A format under the name that options have for it; `title` is its name in sentences.
+    """A format by its option; `title` is its name in sentences.
 
-    `recognises` tells whether the beginning of a file is of it, and `read` makes a report of the
-    whole of it, with a factor of metres per unit for files that do not state their own.
+    `recognises` is true for the beginning of a file of the format, and `read` returns its report,
+    with a factor of metres per unit for files without a unit.
     """
 
     name: str
@@ -80,7 +81,7 @@ class Format:
 
 
 def centre_of(axes: Mapping[str, float]) -> tuple[Place | None, list[str]]:
-    """The centre that co-ordinates by their axes make, None without all; and which are missing."""
+    """Return the centre from co-ordinates by axis, if complete; and the missing axes."""
     missing = [axis for axis in AXES if axis not in axes]
     return (None if missing else (axes["X"], axes["Y"], axes["Z"])), missing
 
@@ -93,7 +94,7 @@ class ReportProblems:
     messages: list[Message] = field(default_factory=list)
 
     def add(self, mark: Mark, text: str) -> None:
-        """Add a message about a place.
+        """Add a message about a location.
 
         :raises ExperimentError: there are too many.
         """

@@ -1,4 +1,4 @@
-"""Text of a report in whatever encoding its program writes."""
+"""Text of a report in the encoding of its program."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ LINE_END = re.compile("\r\n|\r|\n|\x0c")
 
 @dataclass(frozen=True)
 class Text:
-    """Lines of a file, and how it was read where that is not as UTF-8.
+    """Lines of a file, and its encoding if that is not UTF-8.
 
-    `is_cut` tells that the last line has no end: a number there may lack digits.
+    `is_cut` is true if the last line has no end: a number there may lack digits.
     """
 
     file: str
@@ -24,14 +24,14 @@ class Text:
     is_cut: bool
 
     def mark(self, number: int, column: int = 1) -> Mark:
-        """The place of a line, counted from 1."""
+        """Return the location of a line, counted from 1."""
         return Mark(self.file, number, column)
 
 
 def read_lines(content: bytes, file: str) -> Text:
-    """Lines of a text file.
+    """Return lines of a text file.
 
-    :raises ExperimentError: it holds what is no text.
+    :raises ExperimentError: it is not text.
     """
     text, encoding = decoded(content, file)
     refuse_controls(text, file)
