@@ -1,4 +1,4 @@
-"""Versions of the libraries that figures are computed with."""
+"""Versions of the numerical libraries."""
 
 from __future__ import annotations
 

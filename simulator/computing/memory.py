@@ -9,7 +9,7 @@ WITH_SIZE = re.compile(r"Unable to allocate ([0-9.]+ [KMGTPE]?i?B|[0-9]+ bytes)"
 
 
 def want_of_memory(error: BaseException) -> str | None:
-    """What stands after the name of what has failed for want of memory; None of any other error."""
+    """Return the end of a message about lack of memory, if the error is one."""
     if not isinstance(error, MemoryError) and getattr(error, "errno", None) != errno.ENOMEM:
         return None
     match = WITH_SIZE.search(str(error))

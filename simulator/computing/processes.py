@@ -29,11 +29,11 @@ def in_processes(
     ordered: bool = True,
     batch_size: int | str = 1,
 ) -> Iterator[Result]:
-    """Results of a function, called with each of the arguments in one of several processes; one
-    worker is this process.
+    """Yield results of a function, called with each of the arguments in one of several processes;
+    one worker is this process.
 
-    In the order of the arguments, or as they come. An end before the last of them ends the workers
-    as well, and so does within seconds whatever ends this process.
+    They come in the order of the arguments, or as completed. An early end also ends the workers,
+    and so does, within seconds, any end of this process.
 
     >>> list(in_processes(pow, [(2, 3), (2, 4)], workers=1))
     [8, 16]
@@ -73,8 +73,8 @@ def in_processes(
 
 @contextmanager
 def _managers_silenced() -> Iterator[None]:
-    """Let threads that manage processes end without a word: what is taken away from them amid their
-    work is no error.
+    """Let threads that manage processes end without a traceback: a task withdrawn during their
+    work is not an error.
 
     Joblib's may look for a task that was just withdrawn.
     """
@@ -124,7 +124,7 @@ def _end_with(parent: int) -> None:
 def _signals_held() -> Iterator[None]:
     """Answer signals at the end; processes started meanwhile never see one from the keyboard.
 
-    An exception amid the start of processes would leave some that nobody knows of.
+    An exception during the start of processes would leave orphans.
     """
     if threading.current_thread() is not threading.main_thread():
         yield
@@ -149,9 +149,9 @@ def _signals_held() -> Iterator[None]:
 
 
 def _start_trackers() -> None:
-    """Start the processes that remove shared memory when this one has ended.
+    """Start the processes that remove shared memory after this one has ended.
 
-    They let interruptions in again when they start, and say what they remove if this process was
+    They accept interruptions when they start, and print the names they remove if this process was
     killed.
     """
     from joblib.externals.loky.backend import resource_tracker as of_joblib

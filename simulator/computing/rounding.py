@@ -24,11 +24,11 @@ TOUCHED = 1e-7
 
 
 def comparable(values: ArrayLike, digits: int = DIGITS, axis: int | None = None) -> Array:
-    """Numbers (...) to `digits` binary digits, and 0 for what is nothing beside the largest, of all
-    or along an axis.
+    """Return numbers (...) to `digits` binary digits, and 0 for those negligible next to the
+    largest, of all or along an axis.
 
-    Binary ones, as a decimal fraction or one with a small divisor then never lies half-way between
-    two of them.
+    Binary digits, since a decimal fraction or one with a small divisor then never lies half-way
+    between two numbers.
 
     >>> int(np.argmax([0.3, 0.1 + 0.2])), int(np.argmax(comparable([0.3, 0.1 + 0.2])))
     (1, 0)
@@ -45,8 +45,8 @@ def comparable(values: ArrayLike, digits: int = DIGITS, axis: int | None = None)
 
 
 def first_largest(values: Array) -> int:
-    """Index of the largest of values (m,), one at least of which is no NaN: of those that are
-    equal except rounding the first.
+    """Return the index of the largest of values (m,), not all NaN: the first of those that are
+    equal except rounding.
 
     >>> first_largest(np.array([np.nan, 0.3, 0.1 + 0.2, 0.2]))
     1
@@ -59,8 +59,8 @@ def first_largest(values: Array) -> int:
 
 
 def first_largest_of_columns(values: Array) -> NDArray[np.int64]:
-    """Row (k,) of the largest of each column of values (m, k), none of which is a NaN, as
-    `first_largest` takes it.
+    """Return the row (k,) of the largest of each column of values (m, k) without NaN, by the rule
+    of `first_largest`.
 
     >>> first_largest_of_columns(np.array([[0.1, 3e-9], [0.3, 0.0], [0.1 + 0.2, 2e-9]])).tolist()
     [1, 0]
@@ -76,7 +76,7 @@ def first_largest_of_columns(values: Array) -> NDArray[np.int64]:
 
 
 def above(values: ArrayLike, limit: float) -> NDArray[np.bool_]:
-    """Which of `values` exceed a limit by more than rounding.
+    """Return a mask of `values` that exceed a limit by more than rounding.
 
     >>> above([0.1 + 0.2, 0.31, np.nan], 0.3).tolist()
     [False, True, False]

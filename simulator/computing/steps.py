@@ -11,9 +11,9 @@ Item = TypeVar("Item")
 
 @dataclass(frozen=True)
 class ProgressStep:
-    """How far a step has come: what is counted in it, how many of them are done, and of how many.
+    """Progress of a step: its name, the number done, and the total.
 
-    `before` of them were done in an earlier run; `remark` is what else there is to say.
+    `before` were done in an earlier run; `remark` is an additional text.
 
     >>> print(ProgressStep("data sets", 512, 2048, "accurate to 1.5 %"))
     512 of 2048 data sets, accurate to 1.5 %
@@ -35,11 +35,11 @@ Report = Callable[[ProgressStep], object]
 
 
 def unreported(step: ProgressStep) -> None:
-    """Show nothing."""
+    """Ignore progress."""
 
 
 def counted(items: Iterable[Item], unit_name: str, wanted: int, report: Report) -> Iterator[Item]:
-    """The items as they come, each reported as done when the next is asked for.
+    """Yield the items, each reported as done when the next is requested.
 
     >>> list(counted("ab", "letters", 2, print))
     0 of 2 letters

@@ -1,10 +1,9 @@
 """One thread of linear algebra: faster for the small matrices here, and the same bits on any
 machine.
 
-The matrices of an elimination have some hundred columns. Handing them to several threads gains
-little on an idle machine and loses a hundredfold on a busy one, where the threads wait for each
-other; and the order of summation, with it the last bits of every result, would depend on their
-number.
+The matrices of an elimination have about a hundred columns. Several threads save little time on an
+idle machine and lose a hundredfold on a busy one, where the threads wait for each other; and the
+order of summation, with it the last bits of every result, would depend on their number.
 """
 
 from __future__ import annotations
@@ -34,10 +33,10 @@ def _controller(with_scipy: bool) -> ThreadpoolController:
 
 
 def single_threaded(function: Callable[P, R]) -> Callable[P, R]:
-    """Run a function with one thread of linear algebra, and restore what was set before.
+    """Run a function with one thread of linear algebra, and restore the earlier setting.
 
-    What it calls takes SciPy's linear algebra from `scipy_linalg`, where it is not loaded from the
-    start.
+    Functions that it calls import SciPy's linear algebra by `scipy_linalg`, if it is not loaded
+    from the start.
     """
 
     @wraps(function)
@@ -56,7 +55,7 @@ def single_threaded(function: Callable[P, R]) -> Callable[P, R]:
 
 
 def scipy_linalg() -> Any:
-    """The module scipy.linalg, loaded when first asked for, and on one thread within a
+    """Return the module scipy.linalg, loaded on first use, and on one thread within a
     single-threaded function.
     """
     is_new = SCIPY not in sys.modules

@@ -18,9 +18,9 @@ LIMIT, LIMIT_OF_SCATTER = 10.0, 100.0
 
 @dataclass(frozen=True)
 class LackOfFit:
-    """The weighted sum of squares S^2 of a fit's residuals, at the uncertainties stated, with its
-    degrees of freedom, how many gross errors are suspected among the readings, and whether the
-    residuals have a pattern that scatter does not explain, which they have where nobody looked.
+    """The weighted sum of squares S^2 of a fit's residuals, at the stated uncertainties, with its
+    degrees of freedom, the number of flagged readings, and a flag for a significant pattern of the
+    residuals, set too if no test was made.
     """
 
     sum_of_squares: float
@@ -55,7 +55,7 @@ class LackOfFit:
 
     @property
     def complaint(self) -> str:
-        """Why the fit has failed; empty where it has not."""
+        """Reason for the failure of the fit; possibly empty."""
         if not self.is_beyond_limit:
             return ""
         return (
@@ -67,7 +67,7 @@ class LackOfFit:
 
     @property
     def caveat(self) -> str:
-        """What is added to a verdict on results of the fit; empty where it has not failed."""
+        """Addition to verdicts on results of a failed fit; otherwise empty."""
         if not self.is_beyond_limit:
             return ""
         return ", of which nothing can be relied on: lack of fit is beyond the limit"
@@ -87,7 +87,7 @@ class LackOfFit:
 
 
 def verdict_of(lack: LackOfFit | None) -> str:
-    """The verdict on a map's fit in few words; maps of earlier versions state none."""
+    """Return the short verdict on a map's fit; empty for maps of earlier versions."""
     if lack is None:
         return "not stated"
     if lack.is_beyond_limit:

@@ -1,4 +1,4 @@
-"""What a fit leaves behind: the estimated errors of a machine with their joint covariance."""
+"""Error map of a fit: the estimated errors of a machine with their joint covariance."""
 
 from __future__ import annotations
 
@@ -30,11 +30,11 @@ CONVERSION = "conversion"
 
 @dataclass(frozen=True)
 class LeftOut:
-    """A parameter that a fit estimated and its map does not apply: of an influence quantity, say;
-    or what a map lacks that was converted from another error model.
+    """A parameter that a fit estimated and its map does not apply, such as one of an influence
+    quantity; or the residual of a converted map.
 
     `kind` is as in the estimates of a fit, or `CONVERSION`; `value` and `standard_uncertainty` are
-    in `unit`, None where it is undetermined.
+    in `unit`, None if undetermined.
     """
 
     name: str
@@ -46,10 +46,9 @@ class LeftOut:
 
 @dataclass(frozen=True)
 class MapData:
-    """The readings that a map comes from: how many, and the SHA-256 of what they say.
+    """The readings of a map: their number, and the SHA-256 of their content.
 
-    `positions` are fingerprints of what was read in each position, those that a map rests on which
-    was prior knowledge among them.
+    `positions` are fingerprints of the readings of each position, those of a prior map included.
     """
 
     readings: int
@@ -65,17 +64,16 @@ class MapData:
 class FittedMap:
     """The estimated errors of a machine, b = (a, estimated probe offsets) with its covariance.
 
-    `settings` are those of the error `model` as a file states them, with absolute paths. `values`
-    (n,) are a, and `probes` have their offsets, estimated where they are `free`, and stated before
-    as `drawn_offsets` (l, d); `probe` is the one that is meant where none is named. `covariance`
-    (m, m) of b includes `sigma`, and leaves out the `undetermined` directions (m, k), orthonormal
-    where each parameter is measured by its effect: what they change is unknown. Parameters are in
-    metres, radians and ratios; `repeatability` (d,) is the stated one of a reading, in metres.
-    `coverage_factor` is what expanded uncertainties have. `frame` says which motion of the whole
-    the model holds, `temperatures` are in degrees Celsius, and `left_out` are estimates of the fit
-    that the map does not apply. `date` is that of the campaign, as 2026-11-22, where it is known.
-    `sum_of_squares` is S^2 at the stated uncertainties and `lack_of_fit` that of the fit, None of
-    maps that do not state them.
+    `settings` are those of the error `model` in the form of a file, with absolute paths. `values`
+    (n,) are a, and `probes` have their offsets, estimated if they are `free`, and earlier stated
+    as `drawn_offsets` (l, d); `probe` is the default one. `covariance` (m, m) of b includes
+    `sigma`, and omits the `undetermined` directions (m, k), orthonormal with each parameter scaled
+    by its effect: changes along them are unknown. Parameters are in metres, radians and ratios;
+    `repeatability` (d,) is the stated one of a reading, in metres. `coverage_factor` is that of
+    expanded uncertainties. `frame` describes the rigid motion that the model holds, `temperatures`
+    are in degrees Celsius, and `left_out` are estimates of the fit that the map does not apply.
+    `date` is that of the campaign, as 2026-11-22, if known. `sum_of_squares` is S^2 at the stated
+    uncertainties and `lack_of_fit` that of the fit, if the map states them.
     """
 
     title: str
@@ -120,8 +118,8 @@ class FittedMap:
 
     @property
     def known_lack_of_fit(self) -> LackOfFit:
-        """What warnings rest on: of a map that does not state its lack of fit, what an estimated
-        sigma says of it.
+        """Basis of warnings: the stated lack of fit, or else the one that an estimated sigma
+        implies.
         """
         if self.lack_of_fit is not None:
             return self.lack_of_fit
@@ -130,15 +128,13 @@ class FittedMap:
 
     @property
     def conversion_residual(self) -> float | None:
-        """By how much, in metres, corrected points differ at most from those of the map that this
-        one was converted from; None where a fit wrote it.
-        """
+        """Largest difference in metres of corrected points from the source of a converted map."""
         residuals = [part.value for part in self.left_out if part.kind == CONVERSION]
         return residuals[0] if residuals else None
 
     @cached_property
     def offset_columns(self) -> Integers:
-        """Places (l, d) of estimated offsets in b, -1 where an offset is as stated."""
+        """Indices (l, d) of estimated offsets in b, -1 for stated ones."""
         free = self.probes.free
         columns = np.full(free.shape, -1, np.int64)
         columns[free] = len(self.values) + np.arange(int(free.sum()))
@@ -146,7 +142,7 @@ class FittedMap:
 
     @cached_property
     def parameters(self) -> tuple[Parameter, ...]:
-        """What b (m,) consists of: the model's parameters, then estimated offsets."""
+        """Parameters b (m,): the model's, then estimated offsets."""
         offsets = (
             f"probe {self.probes.names[probe]}: offset {AXIS_NAMES[axis]}"
             for probe, axis in np.argwhere(self.probes.free).tolist()
@@ -163,7 +159,7 @@ class FittedMap:
 
     @cached_property
     def scale(self) -> Array:
-        """How much of each parameter (m,) moves some point by a metre."""
+        """Change of each parameter (m,) that moves some point by a metre."""
         return np.array([1.0 / parameter.effect for parameter in self.parameters])
 
     @cached_property
@@ -180,9 +176,9 @@ class FittedMap:
     def standard_uncertainties(
         self, rows: Array | None = None, drawn: Array | None = None
     ) -> Array:
-        """Of linear functions of b with derivatives `rows` (..., m), by default of b itself; NaN
-        where undetermined, which derivatives `drawn` (..., m) on a machine without errors tell if
-        they are others there.
+        """Return those of linear functions of b with derivatives `rows` (..., m), by default of b
+        itself; NaN if undetermined, judged by the derivatives `drawn` (..., m) on a machine
+        without errors if these differ.
         """
         rows = np.eye(len(self.scale)) if rows is None else rows
         return self._blanked(
@@ -190,15 +186,15 @@ class FittedMap:
         )
 
     def function_root(self, rows: Array, drawn: Array | None = None) -> Array:
-        """A square root (..., r) of the joint covariance of linear functions of b with derivatives
-        `rows` (..., m); NaN where undetermined, as `drawn` (..., m) tell.
+        """Return a square root (..., r) of the joint covariance of linear functions of b with
+        derivatives `rows` (..., m); NaN if undetermined by `drawn` (..., m).
         """
         points = rows if drawn is None else drawn
         return self._blanked(points[..., None, :], rows @ self.root)
 
     def function_covariance(self, rows: Array, drawn: Array | None = None) -> Array:
-        """Covariance (k, k) of linear functions of b with derivatives `rows` (k, m); NaN where one
-        is undetermined, as `drawn` (k, m) tell.
+        """Return the covariance (k, k) of linear functions of b with derivatives `rows` (k, m);
+        NaN for those undetermined by `drawn` (k, m).
         """
         root = self.function_root(rows, drawn)
         return np.asarray(root @ root.T)

@@ -1,4 +1,6 @@
-"""What a fitted map tells of its machine in another campaign, and the sigma of its own."""
+"""Prior information of a fitted map on its machine in another campaign, and the sigma of its
+own.
+"""
 
 from __future__ import annotations
 
@@ -16,10 +18,10 @@ LEAST = 1e-9
 
 @dataclass(frozen=True)
 class EarlierCampaign:
-    """The campaign of a map that is prior knowledge: its `file`, and what the map states of sigma.
+    """The campaign of a prior map: its `file`, and its statement on sigma.
 
-    `sum_of_squares` is S^2 at the stated uncertainties, None where it is unknown or rounding, and
-    `is_stated` whether the map has it itself.
+    `sum_of_squares` is S^2 at the stated uncertainties, None if unknown or rounding, and
+    `is_stated` is true if the map contains it.
     """
 
     file: str
@@ -30,7 +32,7 @@ class EarlierCampaign:
 
     @property
     def estimate(self) -> float:
-        """Sigma as the residuals show it; as it is stated where they do not."""
+        """Sigma from the residuals, or else the stated one."""
         if self.sum_of_squares is None or not self.degrees_of_freedom:
             return self.sigma
         return math.sqrt(self.sum_of_squares / self.degrees_of_freedom)
@@ -48,8 +50,8 @@ def campaign_of(fitted: FittedMap, file: str) -> EarlierCampaign:
 
 @dataclass(frozen=True)
 class MapShare:
-    """The standard uncertainty of a combination of parameters that the map of a `campaign` tells:
-    at its stated uncertainties, and by which the machine has moved since, in metres.
+    """The standard uncertainty of a combination of parameters in the map of a `campaign`: at its
+    stated uncertainties, and by the machine's change since, in metres.
     """
 
     campaign: EarlierCampaign
@@ -63,8 +65,8 @@ class MapShare:
 
 @dataclass(frozen=True, eq=False)
 class MapMarginal:
-    """Some of what a map holds: `estimates` (m,), their `covariance` (m, m), `undetermined`
-    directions (m, k) and `scale` (m,), as in the map.
+    """Part of a map: `estimates` (m,), their `covariance` (m, m), `undetermined` directions (m, k)
+    and `scale` (m,), as in the map.
     """
 
     estimates: Array
@@ -74,7 +76,7 @@ class MapMarginal:
 
 
 def marginal_of(fitted: FittedMap, kept_indices: Integers) -> MapMarginal:
-    """The marginal of the parameters `kept` (m,), by their places in b."""
+    """Return the marginal of parameters by their indices (m,) in b."""
     scale = fitted.scale[kept_indices]
     return MapMarginal(
         fitted.estimates[kept_indices],
@@ -85,10 +87,10 @@ def marginal_of(fitted: FittedMap, kept_indices: Integers) -> MapMarginal:
 
 
 def determined_combinations(marginal: MapMarginal) -> tuple[Array, Array, Array]:
-    """Combinations of parameters of which a map tells values that are not correlated: rows (r, m),
-    the values (r,) and their standard uncertainties (r,), in metres.
+    """Return uncorrelated combinations of parameters that a map determines: rows (r, m), the
+    values (r,) and their standard uncertainties (r,), in metres.
 
-    There is one for each direction that the map determines, across all that it does not.
+    There is one for each determined direction, across all undetermined ones.
     """
     spread = marginal.covariance / np.outer(marginal.scale, marginal.scale)
     null = marginal.undetermined / marginal.scale[:, None]

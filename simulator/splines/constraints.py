@@ -1,7 +1,7 @@
 """Linear conditions on a spline, as data.
 
 NISTIR 6517 prescribes values and slopes at both ends, equations (12) to (16). Here a condition may
-stand anywhere, concern any derivative, and tie one place to another.
+be at any point, concern any derivative, and link two points.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ NAMES = ("value", "slope", "second derivative")
 
 @dataclass(frozen=True)
 class Term:
-    """`factor` times a derivative (0 is the value) of the curve at a place, from one side where it
+    """`factor` times a derivative (0 is the value) of the curve at a point, from one side if it
     jumps.
     """
 
@@ -43,7 +43,7 @@ class Constraint:
 
     @property
     def words(self) -> str:
-        """What is constrained, with {0} and {1} for the places.
+        """Description of the condition, with {0} and {1} for the points.
 
         >>> prescribed(0.5, 1, 0.0).words
         'slope at {0}'
@@ -62,7 +62,9 @@ class Constraint:
 
 
 def prescribed(u: float, derivative: int, value: float, side: Side = "above") -> Constraint:
-    """A value (derivative 0), slope (1) or higher derivative at a place."""
+    """Return the condition for a value (derivative 0), slope (1) or higher derivative at a
+    point.
+    """
     return Constraint((Term(u, derivative, 1.0, side),), value)
 
 
@@ -79,17 +81,17 @@ def periodic(space: SplineSpace) -> tuple[Constraint, ...]:
 
 
 def straight(space: SplineSpace, lower: float, upper: float) -> tuple[Constraint, ...]:
-    """No curvature from one place to another: a straight line in every piece between the two."""
+    """Return the conditions of a straight line: no curvature in any piece between two points."""
     starts = [place for place in space.breaks[:-1].tolist() if lower <= place < upper]
     return tuple(prescribed(place, k, 0.0) for place in starts for k in range(2, space.order))
 
 
 def rows(space: SplineSpace, constraints: tuple[Constraint, ...]) -> tuple[Array, Array]:
-    """Matrix (m, count) and right-hand side (m,), each row scaled to length 1.
+    """Return the matrix (m, count) and right-hand side (m,), each row scaled to length 1.
 
-    Rows that are zero throughout, derivatives that no spline of this order has, stay as they are.
+    Zero rows, of derivatives that no spline of this order has, are unchanged.
 
-    :raises SplineError: a place beyond the ends.
+    :raises SplineError: a point beyond the ends.
     """
     matrix, values = np.zeros((len(constraints), space.count)), np.zeros(len(constraints))
     for k, constraint in enumerate(constraints):

@@ -1,4 +1,4 @@
-"""Places of knots: at every r-th point, and at the boundaries of features."""
+"""Locations of knots: at every r-th point, and at the boundaries of features."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ NEXT_TO_BOUNDARY = 3
 def at_every(
     x: Array, r: int, lower: float, upper: float, boundaries: Sequence[float] = ()
 ) -> tuple[float, ...]:
-    """Knots at every r-th of the points x between neighbouring boundaries, as NISTIR 6517, equation
-    (5), has them.
+    """Return knots at every r-th of the points x between neighbouring boundaries, as in NISTIR
+    6517, equation (5).
 
-    A knot that no point of its feature lies beyond would have nothing to determine it, and is left
-    out. So is one with fewer than three points from it to a boundary, the knot's own not counted.
-    Points of the same x count as one, a point on a boundary in both features.
+    A knot without a point of its feature beyond it would be undetermined, and is omitted. So is
+    one with fewer than three points from it to a boundary, the knot's own not counted. Points of
+    the same x count as one, a point on a boundary in both features.
 
     >>> at_every(np.arange(1.0, 9.0), 3, 1.0, 8.0)
     (3.0, 6.0)
@@ -46,8 +46,8 @@ def with_boundaries(
     order: int,
     corners: Sequence[float] = (),
 ) -> tuple[float, ...]:
-    """All knots in order, with those that leave only value and slope continuous at the boundaries,
-    and nothing at the corners.
+    """Return all knots in order, with multiplicities for continuous value and slope at the
+    boundaries, and no continuity at the corners.
 
     >>> with_boundaries((1.0, 3.0), (2.0,), 4)
     (1.0, 2.0, 2.0, 3.0)

@@ -1,8 +1,8 @@
-"""A spline as polynomials, one for each piece, for a controller that evaluates nothing else.
+"""A spline as polynomials, one for each piece, for a controller that evaluates these only.
 
 NISTIR 6517, equations (27) to (33), has them in powers of x itself. Far from x = 0 their terms are
-larger than their sum and cancel, so that powers of the distance from the start of the piece are
-what to use where there is a choice.
+larger than their sum and cancel, so powers of the distance from the start of the piece are
+preferable.
 """
 
 from __future__ import annotations

@@ -26,9 +26,9 @@ class SplineSpace:
     """Splines of an `order` (degree plus one) from `lower` to `upper` with interior `knots` in
     ascending order.
 
-    A knot that stands m times leaves order - 1 - m derivatives continuous, the value counted as one
-    of none: twice for cubic splines leaves value and slope, `order` times
-    leaves nothing. Abscissae are in metres or radians.
+    A knot repeated m times leaves order - 1 - m continuous derivatives, the value included: twice
+    for cubic splines leaves value and slope, `order` times allows a jump. Abscissae are in metres
+    or radians.
 
     >>> SplineSpace(4, 0.0, 2.0, (0.5, 1.0, 1.0)).count
     7
@@ -111,10 +111,10 @@ class SplineSpace:
         return pieces_found
 
     def rows(self, x: Array, derivative: int = 0, side: Side = "above") -> Array:
-        """The B-splines' values or derivatives at x (m,), as (m, count), per metre or radian to the
-        power `derivative`.
+        """Return the B-splines' values or derivatives at x (m,), as (m, count), per metre or
+        radian to the power `derivative`.
 
-        :raises SplineError: an x beyond the ends, where there is no curve.
+        :raises SplineError: an x beyond the ends of the curve.
         """
         x = np.asarray(x, dtype=float)
         outside = np.unique(x[~((x >= self.lower) & (x <= self.upper))])

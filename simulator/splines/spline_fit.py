@@ -30,8 +30,8 @@ class SplineFit:
 
     `coefficients` (count,) are those of the B-splines of `space`; with `root` (count, free) their
     covariance is sigma² root root'. x, y (m,) are the points, `uncertainties` (m,) those of y, all
-    1 where none are stated: then `sigma` is a standard uncertainty, otherwise a factor. `redundant`
-    are constraints that the others imply.
+    1 if not stated: then `sigma` is a standard uncertainty, otherwise a factor. `redundant` are
+    constraints that the others imply.
     """
 
     space: SplineSpace
@@ -79,7 +79,7 @@ class SplineFit:
 
     @property
     def sigma(self) -> float:
-        """Estimated from the residuals; not a number where there are no degrees of freedom."""
+        """Estimate from the residuals; NaN without degrees of freedom."""
         if self.degrees_of_freedom < 1:
             return float("nan")
         return float(np.sqrt(self.sum_of_squares / self.degrees_of_freedom))
@@ -100,12 +100,12 @@ def fit(
     uncertainties: Array | None = None,
     constraints: tuple[Constraint, ...] = (),
 ) -> SplineFit:
-    """The spline that fits points x, y (m,) best among those that meet the constraints.
+    """Return the spline that fits points x, y (m,) best among those that meet the constraints.
 
-    Points count by the inverse squares of their `uncertainties` (m,), alike where there are none.
+    Points are weighted by the inverse squares of their `uncertainties` (m,), equally without any.
 
-    :raises SplineError: constraints that contradict one another, points that do not determine the
-        curve, or places beyond its ends; all of a kind at once.
+    :raises SplineError: contradictory constraints, points that do not determine the curve, or
+        points     beyond its ends; all faults of one sort at once.
     """
     from scipy.linalg import solve_triangular
 
@@ -126,8 +126,8 @@ def fit(
 def _constrained(
     space: SplineSpace, constraints: tuple[Constraint, ...]
 ) -> tuple[Array, Array, tuple[Constraint, ...]]:
-    """A solution (count,) of the constraints, what they leave free (count, free), and constraints
-    that others imply.
+    """Return a solution (count,) of the constraints, the free directions (count, free), and
+    redundant constraints.
     """
     from scipy.linalg import qr, solve_triangular
 
@@ -153,7 +153,7 @@ def _constrained(
 def _contradiction(
     constraints: tuple[Constraint, ...], matrix: Array, kept_rows: Array, k: int
 ) -> SplineProblem:
-    """Say what a constraint contradicts: those of which it is a combination."""
+    """Return a message on the constraints that a constraint contradicts."""
     if not matrix[k].any():
         text = f"the {constraints[k].words} is zero for every spline of this order; leave it out"
         return SplineProblem(text, constraints[k].places)
@@ -187,7 +187,7 @@ def _contradiction(
 
 
 def _refuse_undetermined(space: SplineSpace, x: Array, design: Array, null: Array) -> None:
-    """Name the parts of the curve that the points leave open.
+    """Name the undetermined parts of the curve.
 
     :raises SplineError: there are such parts.
     """

@@ -1,4 +1,4 @@
-"""Reasons why a spline cannot be fitted, with the places in the caller's units."""
+"""Reasons why a spline cannot be fitted, with locations in the caller's units."""
 
 from __future__ import annotations
 
@@ -8,15 +8,13 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class SplineProblem:
-    """What is wrong and what would be right; `text` has {0}, {1}, … for the `places`, in metres or
-    radians.
-    """
+    """A fault and its remedy; `text` has {0}, {1}, … for the `places`, in metres or radians."""
 
     text: str
     places: tuple[float, ...] = ()
 
     def told(self, place: Callable[[float], str]) -> str:
-        """The text with each place written by `place`.
+        """Return the text with each location written by `place`.
 
         >>> SplineProblem("nothing beyond {0}", (0.25,)).told(lambda x: f"{1000 * x:g} mm")
         'nothing beyond 250 mm'
@@ -25,8 +23,8 @@ class SplineProblem:
 
 
 class SplineError(ValueError):
-    """A spline is impossible or undetermined, or is asked for where it is not defined; `problems`
-    has all reasons.
+    """A spline is impossible, undetermined, or evaluated outside its range; `problems` has all
+    reasons.
     """
 
     def __init__(self, problems: Iterable[SplineProblem]) -> None:
