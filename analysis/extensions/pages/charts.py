@@ -23,8 +23,8 @@ LETTERS = 12
 
 @dataclass(frozen=True, eq=False)
 class Trace:
-    """Values `y` (m,) over `x` (m,), NaN where there are none: a line, dots, or a band up to
-    `upper` (m,). `style` is a class of the page.
+    """Values `y` (m,) over `x` (m,), possibly NaN: a line, dots, or a band up to `upper` (m,).
+    `style` is a class of the page.
     """
 
     kind: str
@@ -37,7 +37,7 @@ class Trace:
 @dataclass(frozen=True, eq=False)
 class Chart:
     """Traces over two axes. `places` are names along the first axis instead of numbers, each with
-    where it stands; `words` tell those who do not see the chart what it shows.
+    its co-ordinate; `words` describe the chart for those who do not see it.
     """
 
     traces: Sequence[Trace]
@@ -101,7 +101,7 @@ def _ends(values: Array) -> tuple[float, float]:
 
 
 def ticks(low: float, high: float, count: int = TICKS) -> list[float]:
-    """Round values between two ends, about so many.
+    """Return about `count` round values between two ends.
 
     >>> ticks(0.0, 1000.0), ticks(-1.2, 3.1)
     ([0.0, 200.0, 400.0, 600.0, 800.0, 1000.0], [-1.0, 0.0, 1.0, 2.0, 3.0])
@@ -137,7 +137,7 @@ def _grid(chart: Chart, scale: _Scale) -> list[Html]:
 
 
 def _shown_places(chart: Chart, scale: _Scale) -> list[tuple[float, str]]:
-    """Names along the axis where there is room for them, otherwise some of their numbers."""
+    """Return names along the axis if they fit, otherwise some of their numbers."""
     where = scale.x(np.array([x for x, _ in chart.places])).tolist()
     room = (WIDTH - LEFT - RIGHT) / max(len(where), 1)
     longest = max(len(name) for _, name in chart.places)
@@ -200,12 +200,12 @@ def figure(caption: str | Html, *content: str, class_: str = "") -> Html:
 
 
 def figures(*content: str) -> Html:
-    """Figures beside one another where there is room."""
+    """Return figures in a row if they fit."""
     return element("div", *content, class_="figures")
 
 
 def legend(*entries: tuple[str, str, str]) -> Html:
-    """What marks mean: kind and style of each, and the words."""
+    """Return the legend: sort and style of each mark, and its text."""
     marks = {"dots": "M9 6h0", "band": "M1 1H17V11H1Z"}
     items = []
     for kind, style, words in entries:

@@ -1,4 +1,4 @@
-"""Section on error functions: curves with their bands, and what they reach."""
+"""Section on error functions: curves with their bands, and their ranges."""
 
 from __future__ import annotations
 

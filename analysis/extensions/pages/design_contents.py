@@ -1,4 +1,4 @@
-"""What the page of a design is made of: the results of all commands that judge a design."""
+"""Contents of the page of a design: the results of all commands that evaluate a design."""
 
 from __future__ import annotations
 
@@ -26,8 +26,8 @@ NO_TARGET = "1 um"
 def page_of_design(
     experiment: Experiment, prediction: Prediction, report: Report = unreported
 ) -> str:
-    """The page of an experiment's design with its `prediction`; `report` is told of the search for
-    suggested changes and of the map of lengths.
+    """Return the page of an experiment's design with its `prediction`; `report` receives the
+    progress of the search for suggested changes and of the map of lengths.
     """
     design = prediction.design
     linearisation = linearise(design)

@@ -1,4 +1,4 @@
-"""The page of a design: what it will determine and how well, before anything is measured."""
+"""The page of a design: its predicted rank and uncertainties before any measurement."""
 
 from __future__ import annotations
 
@@ -38,9 +38,9 @@ MOST_DRAWN = 12
 
 @dataclass(frozen=True, eq=False)
 class DesignContents:
-    """What a page of a design is made of: plain data as the commands print them, by the command's
+    """Contents of a page of a design: plain data as printed by the commands, by the command's
     name; the linearised design with its undetermined and weak motions; `target` as text; the
-    `file` and what was assumed. `unreliable` is the reason why there is no reliability among the
+    `file` and its assumptions. `unreliable` is the reason why there is no reliability among the
     data.
     """
 
@@ -90,12 +90,12 @@ def design_page(contents: DesignContents) -> str:
 
 
 def _experiment(contents: DesignContents) -> Html:
-    """The volume with what is in it, and what was assumed."""
+    """Section on the volume with its artefacts, and on assumptions."""
     return figures_wide([figure_of(volume_view(contents.at.design)), facts_list(contents.facts)])
 
 
 def figures_wide(content: Iterable[Html]) -> Html:
-    """Pictures beside one another where there is much room."""
+    """Return pictures in a row on wide screens."""
     return element("div", *content, class_="figures views")
 
 
@@ -138,8 +138,8 @@ def _verdict(run: QuotedData, target: str, lengths: QuotedData) -> Html:
 
 
 def _throughout(run: QuotedData, lengths: QuotedData) -> list[str | Html]:
-    """How lengths throughout the volume compare with the target, beside those between the
-    evaluation points, which may be kinder.
+    """Section on lengths throughout the volume relative to the target, compared with those between
+    the evaluation points, which may be more favourable.
     """
     judged = run.data["quantities"].get("U6", {}).get("within_target") is not None
     shares = {
@@ -201,7 +201,7 @@ def _rank(run: QuotedData, contents: DesignContents) -> Html:
 
 # In one piece: the columns of one table, and what is said of them.
 def _suggestions(quoted: Mapping[str, QuotedData]) -> Html:
-    """What would determine the rest, and what each change would do."""
+    """Section on changes that would determine the rest, and their effects."""
     if quoted["check"].data.get("repairs") is None:
         return sentence("None is needed: nothing is undetermined or weakly determined.")
     repairs, run = quoted["check"].at("repairs"), quoted["run"]

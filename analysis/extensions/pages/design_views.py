@@ -100,7 +100,7 @@ def volume_view(design: Design, most: int = MOST_BALLS) -> SpatialPicture:
 
 
 def turning_words(design: Design) -> Html:
-    """How a picture is turned, for screens."""
+    """Return instructions for turning a picture on screens."""
     if design.dimension == 2:
         return Html()
     words = " Drag it, or press arrow keys while it has the focus, to turn it."
@@ -135,7 +135,7 @@ def point_view(linearisation: Linearisation, factor: float, sigma: float = 1.0) 
 def ball_views(
     linearisation: Linearisation, factor: float, sigma: float = 1.0
 ) -> Iterator[SpatialPicture]:
-    """Ellipsoids of each plate's balls in the plate's frame, likewise."""
+    """Return ellipsoids of each plate's balls in the plate's frame."""
     design = linearisation.design
     of_balls = linearisation.of_balls()
     spread = np.concatenate([linearisation.balls.common, linearisation.balls.own], axis=2)
@@ -174,8 +174,8 @@ def _ellipsoids(
     names: tuple[str, str, str],
     factor: float,
 ) -> SpatialPicture:
-    """Ellipsoids about points (m, d) with covariances of square roots `spread` (m, d, r), `told`
-    by a name, in short, and as text.
+    """Return ellipsoids about points (m, d) with covariances of square roots `spread` (m, d, r),
+    with a name, a label and a title.
     """
     name, label, title = names
     variances, axes = np.linalg.eigh(spread @ spread.transpose(0, 2, 1))
@@ -207,8 +207,8 @@ def motion_view(
     kind: str,
     most: int = MOST_MOVING,
 ) -> SpatialPicture | None:
-    """A direction as an enlarged, moving picture of the machine's grid and of the balls that are
-    read, about `most` of them; None where it moves neither.
+    """Return a direction as an enlarged, moving picture of the machine's grid and of at most
+    `most` balls, if it moves any.
     """
     design = linearisation.design
     grid, sizes = _grid(design)
@@ -294,13 +294,13 @@ def _outline(points: Array) -> Array:
 
 
 def _some(balls: Integers, most: int) -> Integers:
-    """Places of each ball's first reading, and of many balls some."""
+    """Return locations of each ball's first reading, or of a selection of balls."""
     _, first = np.unique(balls, return_index=True)
     return np.asarray(first[:: -(-len(first) // most) or 1])
 
 
 def _counts(design: Design) -> Sequence[int]:
-    """How many balls are read in each position."""
+    """Return the number of balls read in each position."""
     pairs = np.stack([design.readings.position, design.readings.ball], axis=1)
     counts: list[int] = np.unique(np.unique(pairs, axis=0)[:, 0], return_counts=True)[1].tolist()
     return counts

@@ -1,4 +1,4 @@
-"""The page that sections stand on: head, list of sections, style, and what its script may do."""
+"""The page around the sections: head, list of sections, style, and permissions of its script."""
 
 from __future__ import annotations
 
@@ -25,8 +25,8 @@ class PageSection:
 
 @dataclass(frozen=True)
 class Page:
-    """A page: its title, what it was made of and when, the verdict in few words and whether it is a
-    good one, and sections.
+    """A page: its title, its source and date, the verdict in few words, a flag for a good one, and
+    sections.
     """
 
     title: str
@@ -39,7 +39,7 @@ class Page:
 
 @cache
 def shipped(name: str) -> str:
-    """Text of a file that stands beside this module."""
+    """Return the text of a file in this folder."""
     return resources.files(__package__).joinpath(name).read_text(encoding="utf-8")
 
 
@@ -103,7 +103,7 @@ def head(title: str, script: str) -> Html:
 
 
 def origin(*files: str) -> Html:
-    """What a page was made of, when, and with which version."""
+    """Return source, date and version of a page."""
     moment = f"{datetime.now(UTC):%Y-%m-%d %H:%M} UTC"
     return joined([*filter(None, files), moment, f"ballplate {version('ballplate')}"], " · ")
 

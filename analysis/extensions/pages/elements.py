@@ -1,4 +1,4 @@
-"""Elements of a page: what a person wrote is escaped, what is HTML already is marked as such."""
+"""Elements of a page: texts are escaped, HTML is marked as such."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ class Html(str):
 
 
 def as_html(content: str) -> Html:
-    """HTML as it is, and any other text in one line and with its special characters escaped.
+    """Return HTML unchanged, and any other text in one line with its special characters escaped.
 
     >>> as_html("a < b"), as_html(Html("<b>"))
     ('a &lt; b', '<b>')
@@ -30,10 +30,10 @@ def joined(parts: Iterable[str], between: str = "") -> Html:
 
 
 def element(tag: str, *content: str, **attributes: str | float | bool | None) -> Html:
-    """An element of a page.
+    """Return an element of a page.
 
-    A name of an attribute may end in an underscore, and has hyphens in the place of others. What
-    is None or False is left out.
+    A name of an attribute may end in an underscore, and its other underscores become hyphens.
+    Attributes that are None or False are omitted.
 
     >>> element("p", "a < b", element("br"), class_="note", data_path="/a", hidden=False)
     '<p class="note" data-path="/a">a &lt; b<br></p>'
@@ -57,7 +57,7 @@ def sentence(*parts: str) -> Html:
 
 
 def note(*parts: str) -> Html:
-    """A paragraph in small letters below what it explains."""
+    """Return a paragraph in small letters, below its subject."""
     return element("p", *parts, class_="note")
 
 
@@ -69,9 +69,9 @@ def table(
     words: Iterable[int] = (0,),
     is_long: bool = False,
 ) -> Html:
-    """A table of cells; the columns `words` are texts, all others numbers.
+    """Return a table; the columns `words` are texts, all others numbers.
 
-    `name` is an id that the page has once; a table that `is_long` scrolls by itself on screens.
+    `name` is an id, unique on the page; a table that `is_long` scrolls separately on screens.
     """
     texts = set(words)
     head = joined(
@@ -106,11 +106,11 @@ def table(
 
 
 def _width(content: str) -> str:
-    """Class of a cell with words, which go over several lines where they are many."""
+    """Return the class of a long text, which may wrap."""
     shown = len(re.sub("<[^>]*>", "", content) if isinstance(content, Html) else content)
     return "long" if shown > 40 else "some" if shown > 16 else ""
 
 
 def folded(summary: str, *content: str, is_open: bool = False) -> Html:
-    """What is shown on demand, and in print."""
+    """Return content shown on demand, and in print."""
     return element("details", element("summary", summary), *content, open=is_open)

@@ -27,8 +27,8 @@ MOST_BYTES = 180_000
 
 @dataclass(frozen=True, eq=False, repr=False)
 class View:
-    """Pictures in space of what has this `label`, the most important one first: a notebook shows
-    them, one at a time, to be turned by mouse or keyboard.
+    """Pictures in space of a subject with this `label`, the most important one first: a notebook
+    shows them, one at a time, to be turned by mouse or keyboard.
     """
 
     label: str
@@ -36,11 +36,11 @@ class View:
     pictures: tuple[SpatialPicture, ...]
 
     def save(self, path: str | Path) -> None:
-        """Write the pictures as a page that needs no other file, or, where the path ends in .svg,
-        the first one as it stands.
+        """Write the pictures as a page that needs no other file or, if the path ends in .svg, the
+        first one as shown.
 
-        :raises ValueError: the path ends in neither .html nor .svg.
-        :raises OSError: the file cannot be written.
+        :raises ValueError: the path has another suffix than .html and .svg. :raises OSError: the
+            file cannot be written.
 
         >>> import tempfile
         >>> import ballplate as bp

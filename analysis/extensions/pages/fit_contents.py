@@ -1,4 +1,4 @@
-"""What the page of a fit is made of."""
+"""Contents of the page of a fit."""
 
 from __future__ import annotations
 
@@ -28,8 +28,8 @@ def fit_contents(
     has_scatter: bool,
     untested: str,
 ) -> FitContents:
-    """The contents for a fit of an experiment with its plain `data`; without scatter residuals are
-    mere rounding, and none are drawn. `untested` says why there was no test for gross errors.
+    """Return the contents for a fit of an experiment with its plain `data`; residuals of exact
+    readings are rounding and not drawn. `untested` states why there was no test for gross errors.
     """
     design = observed.design
     volume = design.machine.volume

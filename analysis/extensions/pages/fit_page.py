@@ -1,4 +1,4 @@
-"""The page of a fit: what was estimated from readings, how well, and whether to believe it."""
+"""The page of a fit: estimates from readings, their uncertainties, and their validity."""
 
 from __future__ import annotations
 
@@ -55,11 +55,10 @@ class PlateResiduals:
 
 @dataclass(frozen=True, eq=False)
 class FitContents:
-    """What a page of a fit is made of: plain data of the fit and of its design's reliability, None
-    where that was left out for the reason `unreliable`; why residuals were not tested for gross
-    errors, empty where they were; `kinds` of the estimates by name; the edges (k, 2, d) of the
-    volume; `target` as text; `files` that it comes from, and what was assumed; the `caveat` to
-    what is said of the target.
+    """Contents of a page of a fit: plain data of the fit and of its design's reliability (or the
+    reason `unreliable`); the reason for untested residuals, possibly empty; `kinds` of the
+    estimates by name; the edges (k, 2, d) of the volume; `target` as text; source `files` and
+    assumptions; the `caveat` on the target.
     """
 
     title: str
@@ -133,7 +132,7 @@ def _results(fit: QuotedData, contents: FitContents) -> list[PageSection]:
 
 
 def _is_good(data: Mapping[str, Any]) -> bool:
-    """True if nothing on the page asks for a person's attention."""
+    """True if the page has no warning."""
     shares = [quantity.get("within_target") for quantity in data["quantities"].values()]
     wrong = (
         data["degrees_of_freedom"] <= 0
@@ -217,7 +216,7 @@ def _rank(fit: QuotedData) -> Html:
 
 
 def _course(fit: QuotedData) -> PageSection:
-    """How the iterations went."""
+    """Section on the iterations."""
     rows = [
         [
             str(k),
@@ -254,7 +253,9 @@ def _adjustments(fit: QuotedData) -> Html:
 
 
 def _plate(fit: QuotedData, kinds: Mapping[str, str]) -> Html:
-    """Co-ordinates of the balls: in the plate's own axes where there are such, and as estimated."""
+    """Section on co-ordinates of the balls: in the plate's own axes, if it has any, and as
+    estimated.
+    """
     parts = []
     k = expansion(fit.at("quantities"))
     for number, plate in enumerate(fit.at("plates").each() if "plates" in fit else ()):

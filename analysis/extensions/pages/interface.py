@@ -20,11 +20,12 @@ if TYPE_CHECKING:
 
 
 def view(subject: Experiment | PathLike | Prediction | Fit) -> View:
-    """A design in space: positions of plates, balls and probes of an experiment; of a prediction or
-    a fit also ellipsoids of uncertainty, residuals, and what undetermined directions move.
+    """Return a design in space: positions of plates, balls and probes of an experiment; of a
+    prediction or a fit also ellipsoids of uncertainty, residuals, and motions of undetermined
+    directions.
 
-    A notebook shows it, to be turned by mouse, buttons or keyboard, and shows it below experiments,
-    predictions and fits by itself. `save(path)` of the result writes a page, or the picture alone.
+    A notebook shows it, to be turned by mouse, buttons or keyboard, and appends it to experiments,
+    predictions and fits. `save(path)` of the result writes a page, or the picture alone.
 
     >>> import ballplate as bp
     >>> bp.view(bp.quickstart())
@@ -56,18 +57,17 @@ def page(
     compare: PathLike | None = None,
     report: Report = unreported,
 ) -> str:
-    """The page of a design, a fit or a sweep, which `run --report`, `fit --report` and
-    `sweep --report` write: HTML that needs no other file and no network. With a path it is written
+    """Return the page of a design, a fit or a sweep, as written by `run --report`, `fit --report`
+    and `sweep --report`: HTML that needs no other file and no network. With a path it is written
     as well.
 
     Of an experiment it is the page of its design, with the prediction of `run`. Of a sweep,
-    drawings of designs whose error models are in Python need `run_modules`, and the store of
-    another one to `compare` with is set beside it.
+    drawings of designs whose error models are in Python need `run_modules`; `compare` names
+    another store for comparison.
 
-    :raises ValueError: a fit or a prediction that does not know its experiment; sweeps that cannot
-        be compared.
-    :raises ImportError: what pages of sweeps need is not installed.
-    :raises OSError: the file cannot be written.
+    :raises ValueError: a fit or a prediction without its experiment; sweeps that cannot be
+        compared. :raises ImportError: modules for pages of sweeps are not installed. :raises
+        OSError: the file cannot be written.
 
     >>> import ballplate as bp
     >>> bp.page(bp.fit(bp.quickstart(), bp.simulate(bp.quickstart()))).splitlines()[0]

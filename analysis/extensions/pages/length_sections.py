@@ -1,4 +1,4 @@
-"""Section on lengths throughout the volume: against the target, by place, length and direction."""
+"""Section on lengths throughout the volume: against the target, by point, length and direction."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ CELL, ROW, LEFT, BELOW, ABOVE = 46.0, 26.0, 46.0, 32.0, 18.0
 
 
 def lengths_section(lengths: QuotedData, target: str) -> Html:
-    """Maps of the largest uncertainty of lengths from each point, by level, and by length; without
-    a `target` of them themselves.
+    """Section with maps of the largest uncertainty of lengths from each point, by level, and by
+    length; relative to the `target`, if there is one.
     """
     data = lengths.data
     k = data["target_coverage_factor"] if target else data["coverage_factor"]
@@ -74,7 +74,7 @@ def lengths_section(lengths: QuotedData, target: str) -> Html:
 
 
 def _map(lengths: QuotedData, chosen: list[int], k: float, of_target: bool, words: str) -> Html:
-    """Cells of a level, each with its figure."""
+    """Return the map of a level, with a value per point."""
     name, factor = ("maximum_ratio", k) if of_target else ("maximum", 1e6 * k)
     every = [point[name] for point in lengths.data["by_point"]]
     finite = [factor * point for point in every if point is not None]

@@ -1,4 +1,4 @@
-"""What undetermined and weakly determined directions do to machine, plates and positions."""
+"""Motions of machine, plates and positions along undetermined and weakly determined directions."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from ballplate.simulator.machines import Array, Integers
 @dataclass(frozen=True, eq=False)
 class Motion:
     """A change of all parameters: `shared` (s,) and `balls` (n, d) of all balls, in metres and
-    radians, with the size and the sign that the rank report tells it with.
+    radians, with the size and sign of the rank report.
     """
 
     shared: Array
@@ -32,8 +32,8 @@ def null_motions(linearisation: Linearisation) -> tuple[Motion, ...]:
 
 @single_threaded
 def weak_motions(linearisation: Linearisation, target: Target | None) -> tuple[Motion, ...]:
-    """The weakly determined directions, one standard deviation long, weakest first; balls go with
-    them as the observations make them.
+    """Return the weakly determined directions, one standard deviation long, weakest first, with
+    the motions of balls that the observations imply.
     """
     motions = []
     for shared in weak_changes(linearisation, target):
@@ -58,10 +58,10 @@ def moved_points(
 
 
 def moved_balls(linearisation: Linearisation, motion: Motion, readings: Readings) -> Array:
-    """By how much (m, d) the places of balls of plates that are read change, in metres.
+    """Return the changes (m, d) of the locations of balls of plates that are read, in metres.
 
-    With T(y) = R y + t, and R turned by a small rotation w about the machine's axes, it is
-    dt + w x R y + R dy.
+    With T(y) = R y + t, and R turned by a small rotation w about the machine's axes, it is dt + w
+    x R y + R dy.
     """
     state, d = linearisation.state, linearisation.design.dimension
     columns = linearisation.layout.pose_columns[readings.position]

@@ -1,4 +1,4 @@
-"""Views and pages of predictions and fits, as the kernel asks for them."""
+"""Views and pages of predictions and fits, as services for the kernel."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What pages of results take for granted of an experiment, by name and as text."""
+"""Assumptions of results, by name and as text."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ MOST_JUDGED = 1500
 
 
 def target_in_words(experiment: Experiment) -> str:
-    """The target of lengths; empty where the file states none."""
+    """Return the target of lengths; empty without one."""
     target = experiment.target_uncertainty
     return "" if target is None else target_words(target.stated)
 
 
 def assumptions(experiment: Experiment, parameters: int) -> list[tuple[str, str]]:
-    """File, error model with so many `parameters`, repeatability, certificates, probes, influence
-    quantities and target.
+    """Return file, error model with its number of `parameters`, repeatability, certificates,
+    probes, influence quantities and target.
     """
     sides = zip(*experiment.machine.volume.corners, strict=True)
     volume = " x ".join(f"{1e3 * (high - low):.6g}" for low, high in sides)
@@ -74,7 +74,7 @@ def _influences(experiment: Experiment) -> str:
 
 
 def unjudged(design: Design) -> str:
-    """Why a page does not judge every bias; empty where it does."""
+    """Return why a page does not evaluate every bias; possibly empty."""
     count = len(design.plate_readings)
     if count <= MOST_JUDGED:
         return too_many_entries(design)

@@ -1,8 +1,8 @@
-"""Figures of a page, each quoted from the plain data that the command's --json prints.
+"""Values of a page, each quoted from the plain data that the command's --json prints.
 
-A page states no other figure of a result, and says of each where it comes from: `data-path` is the
-place in the data (as in RFC 6901, with the result's name in front), `value` what stands there, and
-`data-factor` what it is multiplied by before it is shown.
+A page states no other value of a result, and gives the source of each: `data-path` is the path in
+the data (as in RFC 6901, with the result's name in front), `value` the number there, and
+`data-factor` its multiplier.
 """
 
 from __future__ import annotations
@@ -21,13 +21,13 @@ UNDETERMINED = "undetermined"
 
 @dataclass(frozen=True)
 class QuotedData:
-    """A part of the plain data of a result, with its `path` there."""
+    """Plain data of a result below its `path`."""
 
     path: str
     data: Any
 
     def at(self, *steps: str | int) -> QuotedData:
-        """A part of it."""
+        """Return the data below further steps."""
         path, data = self.path, self.data
         for step in steps:
             path += "/" + str(step).replace("~", "~0").replace("/", "~1")
@@ -78,7 +78,7 @@ class QuotedData:
         return quoted._shown(percent(quoted.data), 100.0)
 
     def text(self, *steps: str | int) -> Html:
-        """A text of the data as it is."""
+        """Return a text of the data, unchanged."""
         quoted = self.at(*steps)
         return element("span", str(quoted.data), data_path=quoted.path)
 

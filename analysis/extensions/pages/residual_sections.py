@@ -1,6 +1,4 @@
-"""Sections on what a fit leaves over: residuals, suspected gross errors, variance components,
-reliability.
-"""
+"""Sections on residuals of a fit: flagged readings, variance components, reliability."""
 
 from __future__ import annotations
 
@@ -26,12 +24,12 @@ MOST = 12
 
 
 def _size(values: Array) -> str:
-    """Class of dots: small where there are many."""
+    """Return the class of dots: small if there are many."""
     return "" if len(values) <= FEW else "fine"
 
 
 def dots_by_group(values: Array, group: Integers, names: Sequence[str], across: str) -> Html:
-    """Standardised residuals (m, d), NaN where nothing is read, by the group that each is of."""
+    """Return standardised residuals (m, d), NaN without a reading, by group."""
     d = values.shape[1]
     traces = []
     for k in range(d):
@@ -84,8 +82,8 @@ def residual_charts(
 
 
 def residual_view(places: Array, residuals: Array, edges: Array) -> SpatialPicture:
-    """Residuals (m, d) at `places` (m, d) as enlarged vectors, with the edges (k, 2, d) of the
-    volume.
+    """Return residuals (m, d) at `places` (m, d) as enlarged vectors, with the edges (k, 2, d) of
+    the volume.
     """
     size = float(np.ptp(edges, axis=(0, 1)).max())
     longest = float(np.linalg.norm(residuals, axis=1).max(initial=0.0))
@@ -134,7 +132,7 @@ def residual_tables(fit: QuotedData) -> Html:
 
 
 def suspects_section(fit: QuotedData, untested: str) -> Html:
-    """What the residuals make suspect, or why they were not tested."""
+    """Section on flagged readings, or why the residuals were not tested."""
     if untested:
         return sentence(f"Not tested: {untested}.")
     if "suspected" not in fit:
@@ -144,7 +142,7 @@ def suspects_section(fit: QuotedData, untested: str) -> Html:
 
 
 def components_section(fit: QuotedData) -> Html:
-    """Variance components, where these were asked for."""
+    """Section on variance components, if requested."""
     if fit.data.get("variance_components") is None:
         return Html()
     components = fit.at("variance_components")
@@ -178,7 +176,7 @@ def components_section(fit: QuotedData) -> Html:
 
 
 def reliability_section(reliability: QuotedData) -> Html:
-    """Which biases would be noticed, and what those change that would not."""
+    """Section on detectable biases, and effects of undetectable ones."""
     data = reliability.data
     words = sentence(
         "The observations have a redundancy of ",
@@ -209,7 +207,7 @@ def reliability_section(reliability: QuotedData) -> Html:
 
 
 def _harm(bias: Mapping[str, Any], symbol: str) -> float:
-    """What a bias that goes unnoticed changes at most; infinite where it can never be noticed."""
+    """Return the largest effect of an undetected bias; infinite if it can never be detected."""
     if bias["minimal_detectable"] is None:
         return -1.0 if bias.get("harmless") else np.inf
     # Equal effects stay in their order, whatever the rounding.

@@ -24,10 +24,10 @@ MARGIN = 30.0
 
 @dataclass(frozen=True, eq=False)
 class Layer:
-    """What is drawn alike, of class `style`: lines or areas through `points` (m, d) in metres,
-    `sizes` points each; dots; labels with `names`; ellipsoids with square roots `shapes` (m, d, d).
+    """Marks of one class `style`: lines or areas through `points` (m, d) in metres, `sizes` points
+    each; dots; labels with `names`; ellipsoids with square roots `shapes` (m, d, d).
 
-    With `moves` (m, d) points swing by so much, in metres of the picture.
+    With `moves` (m, d) points swing by these amounts, in metres of the picture.
     """
 
     kind: str
@@ -41,7 +41,7 @@ class Layer:
 
 @dataclass(frozen=True, eq=False)
 class _Eye:
-    """What takes points to the paper: a projection (2, d), the middle (d,) and the scale."""
+    """Projection of points to paper: a matrix (2, d), the middle (d,) and the scale."""
 
     view: Array
     centre: Array
@@ -66,7 +66,7 @@ class SpatialPicture:
 
 
 def figure_of(picture: SpatialPicture) -> Html:
-    """The picture as a figure of a page, with its controls."""
+    """Return the picture for a page, with its controls."""
     layers = [layer for layer in picture.layers if len(layer.points)]
     eye = _eye(layers)
     d = len(eye.centre)
@@ -132,7 +132,7 @@ def _eye(layers: Sequence[Layer]) -> _Eye:
 
 
 def _controls(dimension: int, moving: bool) -> Html:
-    """Buttons that the script shows; without it there is nothing to press."""
+    """Return buttons, hidden without the script."""
     views = ("oblique", "above", "front", "right") if dimension == 3 else ()
     parts = [
         element(

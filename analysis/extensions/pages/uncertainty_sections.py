@@ -1,4 +1,4 @@
-"""Sections on uncertainties: U1 to U6, measuring tasks, and what carries scale."""
+"""Sections on uncertainties: U1 to U6, measuring tasks, and the source of scale."""
 
 from __future__ import annotations
 
@@ -62,7 +62,7 @@ def uncertainty_table(result: QuotedData, caveat: str = "") -> Html:
 
 
 def task_table(result: QuotedData, caveat: str = "") -> Html:
-    """Measuring tasks one by one; a `caveat` is added to what is said of the target."""
+    """Return the table of measuring tasks; a `caveat` is added to statements on the target."""
     if "tasks" not in result:
         return Html()
     rows = []
@@ -85,8 +85,8 @@ def task_table(result: QuotedData, caveat: str = "") -> Html:
 
 
 def lengths_words(result: QuotedData, target: str, caveat: str = "") -> Html:
-    """In a sentence, how the lengths that the corrected machine measures compare with the
-    target, or how uncertain they are where none is stated.
+    """Return a sentence on the lengths that the corrected machine measures, relative to the target
+    if there is one.
     """
     u6 = result.at("quantities").data.get("U6")
     if u6 is None:

@@ -30,7 +30,7 @@ def position_picture(design: Design) -> SpatialPicture:
 
 
 def residual_pictures(observed: ObservedReadings, solution: Solution) -> tuple[SpatialPicture, ...]:
-    """Residuals of a fit where the balls of plates were read; none if there are no such balls."""
+    """Return pictures of residuals of a fit at the balls of plates; possibly empty."""
     design = observed.design
     if not len(design.plate_readings):
         return ()
@@ -49,9 +49,9 @@ def judged_pictures(
     sigma: float = 1.0,
     residuals: Sequence[SpatialPicture] = (),
 ) -> tuple[SpatialPicture, ...]:
-    """A design that was judged, the most important first: an undetermined direction, where there is
-    one, positions, `residuals`, ellipsoids of points and balls with `sigma` times the stated
-    uncertainties, further undetermined directions, and weak ones.
+    """Return pictures of a design with its rank, the most important first: an undetermined
+    direction, if any, positions, `residuals`, ellipsoids of points and balls with `sigma` times
+    the stated uncertainties, further undetermined directions, and weak ones.
     """
     coverage_factor = 1.0 if target is None else target.coverage_factor
     factor = coverage_factor if coverage_factor != 1.0 else 2.0
@@ -77,7 +77,7 @@ def _moving(
     directions: Sequence[Direction],
     kind: str,
 ) -> Iterator[SpatialPicture]:
-    """Directions that move something, the first few of them."""
+    """Return the first few directions that move anything."""
     of_count = f" of {len(directions)}" if len(directions) > 1 else ""
     shown = 0
     for k, (motion, direction) in enumerate(zip(motions, directions, strict=True), start=1):

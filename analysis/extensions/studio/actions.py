@@ -1,7 +1,7 @@
-"""Actions on a design: what a person does in the studio, as changes of the file's text.
+"""Actions on a design: operations in the studio, as changes of the file's text.
 
-An action is a mapping with its name under `do` and what it needs besides. A new one is a function
-and its line in `ACTIONS`.
+An action is a mapping with its name under `do` and its arguments. A new one is a function and its
+line in `ACTIONS`.
 """
 
 from __future__ import annotations
@@ -35,14 +35,14 @@ STEP = 1e-5
 
 
 class ActionError(ValueError):
-    """An action is unknown, or lacks something; the text says what it needs."""
+    """An action is unknown, or lacks an argument, which the text names."""
 
 
 def done(document: DesignDocument, action: Arguments) -> DesignDocument:
-    """The document after an action.
+    """Return the document after an action.
 
-    :raises ActionError: the action is unknown or incomplete.
-    :raises ExperimentError: the text is wrong, or cannot be changed in this way.
+    :raises ActionError: the action is unknown or incomplete. :raises ExperimentError: the text is
+        invalid, or cannot be changed in this way.
     """
     name = action.get("do")
     if not isinstance(name, str) or name not in ACTIONS:
@@ -59,7 +59,7 @@ def done(document: DesignDocument, action: Arguments) -> DesignDocument:
 
 
 def _moved(document: DesignDocument, action: Arguments) -> str:
-    """A position by so many metres along each axis."""
+    """Move a position by given metres along each axis."""
     by = _vector(action["by"])
 
     def move(experiment: Experiment, place: Position) -> Pose:
@@ -83,7 +83,7 @@ def _turned(document: DesignDocument, action: Arguments) -> str:
 
 
 def _stood(document: DesignDocument, action: Arguments) -> str:
-    """A position across another axis, its middle where it was."""
+    """Place a position across another axis, its middle unchanged."""
     axis = str(action["across"])
     if axis not in ("x", "y", "z"):
         raise ActionError(f"across is x, y or z, not {axis}")
@@ -115,7 +115,7 @@ def _about_middle(experiment: Experiment, place: Position, rotation: Array) -> P
 
 
 def _copied(document: DesignDocument, action: Arguments) -> str:
-    """A position once more, where it stands."""
+    """Copy a position at its location."""
     experiment = experiment_of(document, planning=True)
     new = with_added(experiment, _position(experiment, str(action["position"])))
     return with_experiment(document.text, document.path, experiment, new)
@@ -128,7 +128,7 @@ def _added(document: DesignDocument, action: Arguments) -> str:
 
 
 def _repaired(document: DesignDocument, action: Arguments) -> str:
-    """A suggested repair, as the edits of the file that it was told with."""
+    """Apply the edits of a suggested repair to the file."""
     text = document.text
     experiment = experiment_of(document, planning=True)
     needed = [
@@ -181,7 +181,7 @@ def _with_groups(
 
 
 def _set(document: DesignDocument, action: Arguments) -> str:
-    """A value at a path, as a file states it; nothing takes it away."""
+    """Set a value at a path, in the form of a file; an absent value removes it."""
     steps = _steps(action["path"])
     text = str(action["value"])
     if not text.strip():
@@ -228,7 +228,7 @@ def _place_of(document: DesignDocument, name: str) -> Steps:
 
 
 def settings_of(document: DesignDocument, name: str) -> dict[str, Any]:
-    """What a file would say of a position.
+    """Return a position in the form of a file.
 
     :raises ActionError: there is no such position.
     """

@@ -1,5 +1,5 @@
-"""What the studio shows of a design: where everything stands, how uncertain it will be, how what is
-undetermined moves.
+"""The studio's view of a design: its objects, its uncertainties, and motions of undetermined
+directions.
 """
 
 from __future__ import annotations
@@ -36,8 +36,8 @@ MAP_NODES = 11
 
 @single_threaded
 def answer(experiment: Experiment) -> dict[str, Any]:
-    """What a page shows of a design at once, as plain data in metres, with the seconds that the
-    engine took.
+    """Return the immediate view of a design, as plain data in metres, with the seconds of
+    computation.
     """
     start = perf_counter()
     design, target = lay_out(experiment), experiment.target_uncertainty
@@ -69,8 +69,8 @@ def answer(experiment: Experiment) -> dict[str, Any]:
 
 @single_threaded
 def scale_answer(experiment: Experiment) -> list[str]:
-    """What carries the scale of a design, as text: it is told after the rest, since the design is
-    evaluated once more without each of those that may.
+    """Return the source of scale of a design, as text, later than the rest: the design is
+    evaluated again without each possible source.
     """
     scale = scale_of(experiment, linearise(lay_out(experiment)))
     return [*scale_lines(scale), *scale_warnings(scale)]
@@ -98,7 +98,7 @@ def _scene(experiment: Experiment) -> dict[str, Any]:
 
 
 def place_data(experiment: Experiment, place: Position) -> dict[str, Any]:
-    """Where a position stands, as plain data in metres."""
+    """Return the pose of a position, as plain data in metres."""
     layout = experiment.layouts[place.artefact]
     plane = plane_of(place.pose.rotation)
     is_read = np.zeros(len(layout.names), bool)
@@ -120,10 +120,10 @@ def place_data(experiment: Experiment, place: Position) -> dict[str, Any]:
 def _motions(
     linearisation: Linearisation, judged: Verdict, target: Target | None
 ) -> dict[str, Any]:
-    """How each undetermined and each weak direction moves a lattice through the volume, nodes of x
-    running slowest, and the balls that are read, per unit of the largest displacement.
+    """Return the motion of a lattice through the volume (x running slowest) and of the balls read
+    along each undetermined and each weak direction, per unit of the largest displacement.
 
-    Their common rigid motion, which no distance shows, is taken out.
+    Their common rigid motion, which no distance shows, is removed.
     """
     design = linearisation.design
     volume, readings, offsets = (
@@ -168,7 +168,9 @@ def _motions(
 
 
 def _map(linearisation: Linearisation) -> dict[str, Any]:
-    """Standard uncertainty of corrected points through the volume, None where undetermined."""
+    """Return standard uncertainties of corrected points through the volume, None if
+    undetermined.
+    """
     mapped = point_map(linearisation, MAP_NODES)
     return {
         "x": mapped.x.tolist(),

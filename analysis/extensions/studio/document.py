@@ -27,16 +27,16 @@ BYTE_ORDER_MARK = "\ufeff"
 
 
 class ChangedOnDiskError(Exception):
-    """The file is not as it was when it was read or written last."""
+    """The file differs from its last reading or writing."""
 
 
 @dataclass(frozen=True)
 class DesignDocument:
-    """A design file and its text, which need not be saved.
+    """A design file and its text, possibly unsaved.
 
-    `content` is what the file held when it was read or written last, None where there was none
-    yet. `back` and `forward` are texts that undoing and redoing lead to, the next one last.
-    `trust` is that in a file that the user has opened by name.
+    `content` is the file's content at the last reading or writing, None before the first. `back`
+    and `forward` are the texts of undoing and redoing, the next one last. `trust` is that in a
+    file that the user has opened by name.
     """
 
     path: Path
@@ -49,7 +49,7 @@ class DesignDocument:
 
     @property
     def fingerprint(self) -> str:
-        """What tells this design from others, and from itself after a change."""
+        """Key that identifies this design and its present text."""
         state = f"{self.path}\0{self.variant}\0{self.text}"
         return hashlib.blake2b(state.encode("utf-8", "surrogatepass"), digest_size=12).hexdigest()
 
@@ -73,9 +73,9 @@ def opened(path: Path, variant: str | None = None, trust: Trust = OPENED) -> Des
 
 
 def experiment_of(document: DesignDocument, planning: bool = False) -> Experiment:
-    """The experiment that the text says.
+    """Return the experiment of the text.
 
-    :raises ExperimentError: the text is wrong, or has no such variant.
+    :raises ExperimentError: the text is invalid, or has no such variant.
     """
     experiments = load(document.path, planning, document.trust, document.text)
     for experiment in experiments:
@@ -86,7 +86,7 @@ def experiment_of(document: DesignDocument, planning: bool = False) -> Experimen
 
 
 def data_of(document: DesignDocument) -> Any:
-    """What the text says, as plain data; None where it is no YAML."""
+    """Return the text as plain data, if it is YAML."""
     try:
         return to_python(parse_tree(document.text, str(document.path)))
     except ExperimentError:
@@ -94,7 +94,7 @@ def data_of(document: DesignDocument) -> Any:
 
 
 def variants_of(document: DesignDocument) -> tuple[str, ...]:
-    """The names of the variants that the text has, none where it is invalid."""
+    """Return the names of the text's variants; empty for an invalid text."""
     try:
         experiments = load(document.path, True, document.trust, document.text)
     except ExperimentError:
@@ -111,7 +111,7 @@ def changed(document: DesignDocument, text: str) -> DesignDocument:
 
 
 def undone(document: DesignDocument) -> DesignDocument:
-    """One step back; the same where there is none."""
+    """Return the document one step back; unchanged at the first step."""
     if not document.back:
         return document
     forward = (*document.forward, document.text)
@@ -119,7 +119,7 @@ def undone(document: DesignDocument) -> DesignDocument:
 
 
 def redone(document: DesignDocument) -> DesignDocument:
-    """One step forward; the same where there is none."""
+    """Return the document one step forward; unchanged at the last step."""
     if not document.forward:
         return document
     back = (*document.back, document.text)
@@ -127,16 +127,16 @@ def redone(document: DesignDocument) -> DesignDocument:
 
 
 def encoded(document: DesignDocument) -> bytes:
-    """What the file is to hold, with the byte order mark that it had."""
+    """Return the new content of the file, with its byte order mark."""
     mark = BYTE_ORDER_MARK.encode()
     starts = document.content is not None and document.content.startswith(mark)
     return (mark if starts else b"") + document.text.encode()
 
 
 def ensure_as_read(document: DesignDocument) -> None:
-    """Make sure that saving takes away nothing that others wrote.
+    """Ensure that saving overwrites no change by others.
 
-    :raises ChangedOnDiskError: the file holds something else than what was read or written last.
+    :raises ChangedOnDiskError: the file differs from its last reading or writing.
     """
     try:
         content: bytes | None = document.path.read_bytes()
@@ -152,17 +152,16 @@ def ensure_as_read(document: DesignDocument) -> None:
 
 
 def reopened(document: DesignDocument) -> DesignDocument:
-    """The document as it is on disk now, with the present text a step back."""
+    """Return the document with the file's present content, and the present text one step back."""
     reopened_document = opened(document.path, document.variant, document.trust)
     return replace(changed(document, reopened_document.text), content=reopened_document.content)
 
 
 def saved(document: DesignDocument, path: Path | None = None) -> DesignDocument:
-    """Write the text into its file, or into a new one; what others wrote meanwhile stays.
+    """Write the text into its file, or into a new one, unless others have changed it.
 
-    :raises ChangedOnDiskError: the file holds something else than what was read or written last,
-        or there is a new one of that name already.
-    :raises OSError: it cannot be written.
+    :raises ChangedOnDiskError: the file differs from its last reading or writing, or a file of
+        that     name exists. :raises OSError: it cannot be written.
     """
     if path is not None:
         document = replace(document, path=path, content=None)

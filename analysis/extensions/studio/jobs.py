@@ -1,4 +1,4 @@
-"""Long computations beside the studio: each in a process of its own, which can be stopped."""
+"""Long computations of the studio: each in a process of its own, which can be stopped."""
 
 from __future__ import annotations
 
@@ -117,9 +117,9 @@ CHECKS: Mapping[str, Callable[[DesignDocument, Mapping[str, Any]], None]] = {"sw
 @dataclass
 class Job:
     """A computation in a process of its own, of the design with a `fingerprint`: `state` is
-    running, done or failed, `step` how far it has come, `result` what came of it, or why nothing
-    did, and `page` one that it has made. Its temporary files are in a `folder` that ends with it,
-    since a process that is stopped takes nothing away.
+    running, done or failed, `step` its progress, `result` its outcome or the reason of its
+    failure, and `page` its page, if any. Its temporary files are in a `folder` that is removed
+    with it, since a stopped process removes no file.
     """
 
     name: str
@@ -133,7 +133,7 @@ class Job:
     page: str = ""
 
     def look(self) -> None:
-        """Take what the process has told since."""
+        """Receive messages of the process."""
         try:
             while self.state == "running" and self.connection.poll():
                 kind, message = self.connection.recv()
@@ -166,13 +166,10 @@ class Job:
 
 
 def started(name: str, document: DesignDocument, settings: Mapping[str, Any]) -> Job:
-    """Start a computation with the document as it is now.
+    """Start a computation with the present document.
 
-    :raises KeyError: there is no such job.
-
-    :raises ActionError: its settings are invalid.
-
-    :raises ExperimentError: the text is wrong, where this is found before the start.
+    :raises KeyError: there is no such job. :raises ActionError: its settings are invalid. :raises
+        ExperimentError: the text is invalid, if this is detected before the start.
     """
     JOBS[name]
     if name in CHECKS:

@@ -1,4 +1,4 @@
-"""What is computed of a design while it is changed, in a process that what comes after it stops."""
+"""Computations during changes of a design, in a process that later ones stop."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from .document import DesignDocument, data_of, experiment_of, variants_of
 
 @dataclass(frozen=True)
 class DesignJudgement:
-    """What a page shows of a document's text; without an `answer` where the text is wrong."""
+    """View of a document's text; without an `answer` for an invalid one."""
 
     answer: dict[str, Any] | None
     messages: tuple[Message, ...]
@@ -29,7 +29,7 @@ class DesignJudgement:
 
 
 def judgement(document: DesignDocument) -> DesignJudgement:
-    """What a page shows of a document, or faults of its text."""
+    """Return the view of a document, or faults of its text."""
     variants = variants_of(document) if document.variant else ()
     try:
         experiment = experiment_of(document)
@@ -40,17 +40,17 @@ def judgement(document: DesignDocument) -> DesignJudgement:
 
 
 def figures(document: DesignDocument) -> dict[str, Any]:
-    """The answer to a document.
+    """Return the answer to a document.
 
-    :raises ExperimentError: its text is wrong.
+    :raises ExperimentError: its text is invalid.
     """
     return answer(experiment_of(document))
 
 
 def scale(document: DesignDocument) -> list[str]:
-    """What carries the scale of a document's design.
+    """Return the source of scale of a document's design.
 
-    :raises ExperimentError: its text is wrong.
+    :raises ExperimentError: its text is invalid.
     """
     return scale_answer(experiment_of(document))
 
@@ -68,7 +68,7 @@ class Judge:
         self._connection: Connection | None = None
 
     def begin(self, work: Callable[[DesignDocument], Any], document: DesignDocument) -> None:
-        """Begin the work, instead of what is under way."""
+        """Begin a computation, and stop the running one."""
         if self.is_busy or self._process is None or not self._process.is_alive():
             self.stop()
             self._start()
@@ -79,9 +79,9 @@ class Judge:
             self._connection.send((work, replace(document, back=(), forward=())))
 
     def look(self) -> Any:
-        """What came of the work, None as long as it is under way, and if there is none.
+        """Return the outcome of the computation, if complete.
 
-        :raises ExperimentError: the text is wrong, or the work failed for another reason.
+        :raises ExperimentError: the text is invalid, or the work failed for another reason.
         """
         if not self.is_busy or self._connection is None or not self._connection.poll():
             return None
@@ -98,7 +98,7 @@ class Judge:
         return received[0]
 
     def stop(self) -> None:
-        """Stop what is under way."""
+        """Stop the running computation."""
         if self._process is not None and self._connection is not None:
             self._process.kill()
             self._process.join()

@@ -1,4 +1,6 @@
-"""What was not saved when a studio ended, kept beside the file until it is saved or given up."""
+"""Unsaved changes at the end of a studio, kept in the file's folder until they are saved or
+discarded.
+"""
 
 from __future__ import annotations
 
@@ -26,10 +28,10 @@ def kept_in(path: Path, owner: str = "") -> Path:
 
 
 def keep(document: DesignDocument, owner: str) -> Path | None:
-    """Keep the text if it is not saved, with what the file held when it was read; where it is kept
-    now, None where the folder cannot be written or nothing is to be kept.
+    """Keep the text if it is unsaved, with the file's content at its reading; return the path, if
+    one was written.
 
-    What another owner has kept stays.
+    Text kept by another owner stays.
     """
     if not document.has_changes:
         give_up(document, owner)
@@ -45,7 +47,7 @@ def keep(document: DesignDocument, owner: str) -> Path | None:
 
 
 def give_up(document: DesignDocument, owner: str) -> None:
-    """Forget what an owner has kept of a document."""
+    """Discard the kept text of an owner."""
     with suppress(OSError):
         kept_in(document.path, owner).unlink(missing_ok=True)
         if _owner(kept_in(document.path)) == owner:
@@ -53,11 +55,11 @@ def give_up(document: DesignDocument, owner: str) -> None:
 
 
 def recovered(document: DesignDocument, owner: str) -> tuple[DesignDocument, str]:
-    """The document with the text that was not saved, which is the owner's from now on, and what is
-    to be said of it; the text of the file is a step back.
+    """Return the document with the unsaved text, now the owner's, and a note; the text of the file
+    is a step back.
 
-    Where the file has changed since, saving is refused as if it had changed under the studio. A
-    text with other models in Python than the file's is set aside, since nobody has opened it.
+    If the file has changed since, saving is refused as for a change during the session. A text
+    with other models in Python than the file's is set aside, since no user has opened it.
     """
     document_found, note = _recovered(document, owner)
     names_set_aside = [file.name for file in _set_aside(document.path) if file.name not in note]
@@ -106,7 +108,7 @@ def _recovered(document: DesignDocument, owner: str) -> tuple[DesignDocument, st
 
 
 def _write(path: Path, document: DesignDocument, owner: str) -> None:
-    """Write what is to be kept, unless it is there.
+    """Write the kept text, unless it exists.
 
     :raises OSError: it cannot be written.
     """
@@ -128,7 +130,7 @@ def _write(path: Path, document: DesignDocument, owner: str) -> None:
 
 
 def _owner(path: Path) -> str | None:
-    """Who has kept a text there, None where there is none; what cannot be read is a stranger's."""
+    """Return the owner of a kept text, if there is one; unreadable ones have an unknown owner."""
     try:
         return str(json.loads(path.read_bytes())["owner"])
     except FileNotFoundError:
@@ -138,7 +140,7 @@ def _owner(path: Path) -> str | None:
 
 
 def _put_aside(path: Path) -> Path:
-    """Rename what was kept, so that nothing is kept over it; its name then."""
+    """Rename a kept text, so that it is not overwritten; return its name."""
     try:
         return path.rename(f"{path}-{secrets.token_hex(4)}")
     except OSError:
@@ -146,7 +148,7 @@ def _put_aside(path: Path) -> Path:
 
 
 def _set_aside(path: Path) -> list[Path]:
-    """What is kept of a file under other names."""
+    """Return texts kept under other names."""
     start = f"{kept_in(path).name}-"
     try:
         return sorted(file for file in path.parent.iterdir() if file.name.startswith(start))
@@ -155,8 +157,8 @@ def _set_aside(path: Path) -> list[Path]:
 
 
 def _code(text: str, file: Path) -> list[object] | None:
-    """The settings by which a text has models in Python, its own or those of maps, in any of its
-    variants; None where it is no YAML.
+    """Return the settings by which a text has models in Python, its own or those of maps, in any
+    of its variants, if it is YAML.
     """
     try:
         root, variants, _ = trees_of(text, file, [])

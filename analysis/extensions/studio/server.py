@@ -83,7 +83,7 @@ def application(session: Session, token: str, port: int) -> Starlette:
 
 
 class Guard:
-    """Refuses what the person at this machine has not asked for."""
+    """Refuses requests that do not come from the user at this machine."""
 
     def __init__(self, app: ASGIApp, token: str, hosts: set[str], cookie: str) -> None:
         self.app, self.token, self.hosts, self.cookie = app, token, hosts, cookie
@@ -135,7 +135,7 @@ def _page(page: str, token: str, port: int) -> Callable[[Request], Awaitable[Res
 
 
 def _made_page(session: Session) -> Callable[[Request], Awaitable[Response]]:
-    """A page that a computation has made, which may run nothing and ask nobody."""
+    """Return a page of a computation, without permission for scripts and requests."""
 
     async def show(request: Request) -> Response:
         try:

@@ -30,9 +30,9 @@ class _Server(uvicorn.Server):
 def serve(session: Session, port: int, tell: Callable[[str], None]) -> None:
     """Serve a session until the command is interrupted; `tell` receives the address to open.
 
-    Port 0 is any that is free.
+    Port 0 is any free one.
 
-    :raises OSError: the port cannot be had.
+    :raises OSError: the port cannot be opened.
     """
     # Of a socket whose protocol is not named, asyncio does not know that it may send at once, and
     # every answer waits 40 ms for an acknowledgement.

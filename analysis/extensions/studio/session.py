@@ -1,4 +1,4 @@
-"""A session of the studio: one design at a time, what is shown of it, and what runs beside it."""
+"""A session of the studio: one design at a time, its view, and its computations."""
 
 from __future__ import annotations
 
@@ -36,25 +36,24 @@ PATIENCE, INTERVAL = 2.0, 0.005
 
 
 class RefusedError(Exception):
-    """What was asked for is not allowed, or not possible now; the text says why."""
+    """A request is not permitted, or not possible now; the text states why."""
 
 
 class Session:
-    """What one person does in the studio; every method may be called from any thread.
+    """Session of one user in the studio; every method may be called from any thread.
 
-    A change is kept before it is judged, in a process of its own, and a further change stops that.
+    A change is kept before it is evaluated, in a process of its own, which a further change stops.
 
-    `revision` counts the changes, so that a page which shows an earlier state changes nothing, and
-    `name` tells the session from one that was here before.
-    Only files in the folder of the one that was opened first are opened or written, and error
-    models in Python run only from files that the command itself has named.
+    `revision` counts the changes, so that a page with an earlier state cannot change the design,
+    and `name` identifies the session. Only files in the folder of the first file are opened or
+    written, and error models in Python run only from files that the command itself has named.
     """
 
     def __init__(self, path: Path, variant: str | None = None, beginning: str = "") -> None:
-        """Open a file; where there is none yet, begin with a text that is not saved.
+        """Open a file, or begin an unsaved one.
 
-        :raises ExperimentError: the file cannot be read, or there is none and no text either; or
-            its folder cannot be.
+        :raises ExperimentError: the file cannot be read, does not exist although no text is given,
+            or its     folder cannot be read.
         """
         self._lock = RLock()
         self._first = path.resolve()
@@ -81,9 +80,9 @@ class Session:
         self._begin()
 
     def state(self) -> dict[str, Any]:
-        """Everything that the page shows, as plain data.
+        """Return the whole view, as plain data.
 
-        While figures are `pending`, those of the `design` are of an earlier text of the file.
+        While values are `pending`, those of the `design` are of an earlier text of the file.
         """
         self._await()
         with self._lock:
@@ -126,21 +125,20 @@ class Session:
 
     @property
     def is_recoverable(self) -> bool:
-        """True if nothing is lost if the studio ends now."""
+        """True if an end of the studio now would lose no change."""
         with self._lock:
             return self.is_saved or self.kept() is not None
 
     def kept(self) -> Path | None:
-        """Where what is not saved is kept; None where nothing is, or nothing can be."""
+        """Return the path of unsaved changes, if they are kept."""
         with self._lock:
             return keep(self._document, self.name)
 
     def act(self, action: Mapping[str, Any]) -> None:
-        """Do something with the design; where it fails in any way all is as before.
+        """Change the design; a failure leaves it unchanged.
 
-        :raises ActionError: it is unknown or incomplete.
-        :raises ExperimentError: the file cannot say it.
-        :raises RefusedError: it is not allowed.
+        :raises ActionError: the action is unknown or incomplete. :raises ExperimentError: a file
+            cannot express it. :raises RefusedError: it is not permitted.
         """
         with self._lock:
             self._ensure_seen(action)
@@ -151,7 +149,7 @@ class Session:
                 control(action)
 
     def preview(self, action: Mapping[str, Any]) -> dict[str, Any]:
-        """What the design would be after an action that is not made.
+        """Return the view of the design after an action, without the change.
 
         :raises ActionError, ExperimentError, RefusedError: as for `act`.
         """
@@ -162,11 +160,10 @@ class Session:
         return data
 
     def scale(self) -> dict[str, Any]:
-        """What carries the scale of the design, as text, and which design that is.
+        """Return the source of scale of the design, as text, and its fingerprint.
 
-        :raises ExperimentError: the text is wrong.
-
-        :raises RefusedError: something else was asked for meanwhile.
+        :raises ExperimentError: the text is invalid. :raises RefusedError: another request came
+            meanwhile.
         """
         with self._lock:
             document = self._document
@@ -175,8 +172,8 @@ class Session:
     def start(self, name: str, settings: Mapping[str, Any]) -> int:
         """Start a computation, and return its number.
 
-        :raises RefusedError: there is no such computation, or too many are running.
-        :raises ActionError, ExperimentError: its settings, or the text, are wrong.
+        :raises RefusedError: there is no such computation, or too many are running. :raises
+            ActionError, ExperimentError: its settings, or the text, are invalid.
         """
         with self._lock:
             if name not in JOBS:
@@ -197,9 +194,9 @@ class Session:
             return [job.to_dict(number) for number, job in self._jobs.items()]
 
     def page(self, number: int) -> str:
-        """The page that a computation has made.
+        """Return the page of a computation.
 
-        :raises RefusedError: it has made none.
+        :raises RefusedError: it has no page.
         """
         with self._lock:
             job = self._jobs.get(number)
@@ -208,9 +205,9 @@ class Session:
             return job.page
 
     def stop(self, number: int) -> None:
-        """Stop a computation and forget it.
+        """Stop a computation and remove it.
 
-        :raises RefusedError: there is none of that number.
+        :raises RefusedError: its number is unknown.
         """
         with self._lock:
             if number not in self._jobs:
@@ -227,7 +224,7 @@ class Session:
                 self.stop(number)
 
     def _controls(self) -> dict[str, Callable[[Mapping[str, Any]], None]]:
-        """What is done with the file rather than with the design in it."""
+        """Actions on the file instead of the design."""
         return {
             "undo": lambda action: self._become(undone(self._document)),
             "redo": lambda action: self._become(redone(self._document)),
@@ -241,9 +238,9 @@ class Session:
         }
 
     def _ensure_seen(self, action: Mapping[str, Any]) -> None:
-        """Make sure that the page shows what it is about to change.
+        """Ensure that the page shows the state it is about to change.
 
-        :raises RefusedError: it shows something else.
+        :raises RefusedError: it shows another one.
         """
         if action.get("session", self.name) != self.name:
             raise RefusedError("the studio was started anew; this page shows an earlier design")
@@ -251,9 +248,8 @@ class Session:
             raise RefusedError("the design has changed in another window; look again")
 
     def _become(self, document: DesignDocument) -> None:
-        """Go on with another document, which is kept at once, and begin to judge it; until that is
-        done, and where its text is wrong, the answer until now is shown if it is of the same
-        design.
+        """Continue with another document, which is kept at once, and begin its evaluation; until
+        it is complete, or if its text is invalid, the last answer of the same design is shown.
         """
         last, self._document = self._document, document
         if (document.path, document.variant) != (last.path, last.variant):
@@ -290,7 +286,8 @@ class Session:
             self._answer = result.answer or self._answer
 
     def _computed(self, work: Callable[[DesignDocument], Any], document: DesignDocument) -> Any:
-        """What comes of work on a document that is not judged; further such work stops it.
+        """Return the result for a document that is not evaluated in the view; further such
+        requests stop it.
 
         :raises RefusedError: it was stopped.
         """
@@ -323,7 +320,7 @@ class Session:
         self.revision += 1
 
     def _switch_off(self, action: Mapping[str, Any]) -> None:
-        """Take a position out, and remember what the file said of it."""
+        """Remove a position, and remember its text."""
         name, document = str(action.get("position")), self._document
         settings = settings_of(document, name)
         self._become(done(document, {"do": "remove", "position": name}))
@@ -367,9 +364,9 @@ class Session:
             give_up(before, self.name)
 
     def _inside(self, name: str) -> Path:
-        """The path of a design in the folder.
+        """Return the path of a design in the folder.
 
-        :raises RefusedError: it would be elsewhere, or is no design's name.
+        :raises RefusedError: it would be outside, or is not the name of a design.
         """
         folder = self._first.parent
         path = folder / name

@@ -39,7 +39,7 @@ def _port(text: str) -> int:
 
 
 def unsaved(session: Session) -> str:
-    """What is to be said when the studio ends."""
+    """Return the note at the end of the studio."""
     from .recovery import kept_in
 
     if session.is_saved:

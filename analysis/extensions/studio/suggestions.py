@@ -1,5 +1,5 @@
-"""Suggestions: repairs of what is undetermined, and positions more that lower the uncertainty
-most.
+"""Suggestions: repairs of undetermined directions, and further positions that lower the
+uncertainty most.
 """
 
 from __future__ import annotations
@@ -27,10 +27,9 @@ MOST_TOLD = 5
 def suggested_repairs(
     document: DesignDocument, report: Report = unreported
 ) -> list[dict[str, Any]]:
-    """Changes that leave nothing undetermined, as text, with the positions that they add or move,
-    as plain data.
+    """Return full repairs, as text, with the positions that they add or move, as plain data.
 
-    :raises ExperimentError: the text is wrong.
+    :raises ExperimentError: the text is invalid.
     """
     experiment = experiment_of(document, planning=True)
     repairs_found = repairs(experiment, report=report)
@@ -55,7 +54,7 @@ def _repair_data(experiment: Experiment, repair: Repair) -> dict[str, Any]:
 
 
 def _expectation(experiment: Experiment) -> tuple[Edit, ...]:
-    """That nothing is undetermined any more, where the file expects otherwise."""
+    """Return the edit of an expected rank deficiency to full rank, if the file expects one."""
     expected_deficiency = experiment.expected_rank_deficiency
     return (Edit(("expected_rank_deficiency",), 0),) if expected_deficiency else ()
 
@@ -65,11 +64,12 @@ def _edit_data(edit: Edit) -> dict[str, Any]:
 
 
 def next_positions(document: DesignDocument, report: Report = unreported) -> list[dict[str, Any]]:
-    """Positions more, of the pool where there is one, with U6 if each is added; the best first.
+    """Return further positions, of the pool if there is one, with U6 after adding each; the best
+    first.
 
     A position that leaves U6 undetermined comes after those that determine it.
 
-    :raises ExperimentError: the text is wrong.
+    :raises ExperimentError: the text is invalid.
     """
     experiment = experiment_of(document, planning=True)
     changes = [

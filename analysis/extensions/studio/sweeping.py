@@ -1,6 +1,4 @@
-"""A sweep from the studio: some keys of the design as it is on the page, every value of each with
-every value of the others.
-"""
+"""A sweep from the studio: keys of the present design, every combination of their values."""
 
 from __future__ import annotations
 
@@ -52,11 +50,11 @@ class _Axis:
 
 
 def swept(document: DesignDocument, axis_data: Any, report: Report) -> dict[str, Any]:
-    """Compute a sweep over axes, each with `paths` and `values`: what is told of each cell, and
-    the `page`, empty where what it needs is not installed.
+    """Compute a sweep over axes, each with `paths` and `values`: the text of each combination, and
+    the `page`, empty if its modules are not installed.
 
-    :raises ActionError: an axis is incomplete, or there are too many cells.
-    :raises ExperimentError: the text is wrong, a path leads nowhere, or a value would run a model
+    :raises ActionError: an axis is incomplete, or there are too many combinations. :raises
+        ExperimentError: the text is invalid, a path leads nowhere, or a value would run a model
         in Python in a design that the user has not opened by name.
     """
     axes = _axes(axis_data)
@@ -80,11 +78,10 @@ def swept(document: DesignDocument, axis_data: Any, report: Report) -> dict[str,
 
 
 def ensure_possible(document: DesignDocument, axis_data: Any) -> None:
-    """Make sure that a sweep over axes may begin, and numbers may stand where there are texts.
+    """Ensure that a sweep over axes can begin, and that numbers replace texts only with units.
 
-    :raises ActionError: an axis is incomplete, there are too many cells, or a number lacks its
-        unit.
-    :raises ExperimentError: the text is wrong.
+    :raises ActionError: an axis is incomplete, there are too many combinations, or a number lacks
+        its     unit. :raises ExperimentError: the text is invalid.
     """
     experiment = experiment_of(document)
     for axis in _axes(axis_data):
@@ -169,8 +166,8 @@ def _axis(axis_data: Mapping[str, Any]) -> _Axis:
 
 
 def _written(document: DesignDocument, tree: Node, axes: Sequence[_Axis], folder: Path) -> Path:
-    """The sweep's file in a folder, with the design as it is on the page and copies of the files
-    that it names.
+    """Write the sweep's file in a folder, with the present design and copies of the files that it
+    names.
     """
     mark = Mark("sweep", 0, 0)
     nodes = [("", tree)] + [
