@@ -366,7 +366,7 @@ def _in_line(value: Any) -> Any:
 def _of_chosen(
     influence: dict[str, Any], unused: Collection[str], short: Mapping[str, str]
 ) -> dict[str, Any]:
-    """Return the settings of an influence quantity without positions in `others`; empty if it
+    """Return the settings of an influence quantity without positions in `unused`; empty if it
     concerns only these.
     """
     position_settings = influence.get("positions", {})

@@ -148,7 +148,7 @@ def offer(
     """Return the choices of a pool after some set-ups have been read.
 
     `standing` is true if the artefact is still where it was read last, so that this position can
-    be completed; `known` are short names of an earlier plan.
+    be completed; `known_names` are short names of an earlier plan.
     """
     candidates = list(pool.candidates)
     index: dict[str, int] = {}

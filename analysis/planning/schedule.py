@@ -314,8 +314,8 @@ def ordered(
     done_candidates: Sequence[Candidate] = (),
     first: Candidate | None = None,
 ) -> tuple[Sequenced, float]:
-    """Return positions, `done` ones first, in the cheapest order, each with the order of its
-    probes; and the largest possible saving in seconds of another order.
+    """Return positions, `done_candidates` ones first, in the cheapest order, each with the order
+    of its probes; and the largest possible saving in seconds of another order.
 
     Positions of one class keep their given order. One of the remaining may be required as `first`.
     """

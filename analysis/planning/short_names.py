@@ -19,8 +19,8 @@ def short_names(
 ) -> dict[str, str]:
     """Return short names by the names of candidates, P1, P2 … in the order of measuring.
 
-    Positions named in the file keep their names, and those `known` from an earlier plan keep
-    these. No name is `taken`, or differs from another in capitals alone; numbers in use are
+    Positions named in the file keep their names, and those `names_known` from an earlier plan keep
+    these. No name is `names_taken`, or differs from another in capitals alone; numbers in use are
     skipped, so that each number means one position.
     """
     used = {name.casefold() for name in (*names_taken, *names_known.values())}

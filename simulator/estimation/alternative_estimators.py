@@ -291,7 +291,7 @@ def _differences(
 def _prescribed(
     measured: _Measured, length: Array, by_model: Array, row: Integers, calibrated: Integers
 ) -> tuple[Array, Array]:
-    """Rows that say that measured distances `row` are those of the certificate, `known`."""
+    """Rows that say that measured distances `row` are those of the certificate, `calibrated`."""
     weight = 1.0 / np.sqrt(measured.variance[row] + measured.uncertainty[calibrated] ** 2)
     return weight * (length[row] - measured.value[calibrated]), weight[:, None] * by_model[row]
 

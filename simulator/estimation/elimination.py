@@ -372,8 +372,8 @@ def _batches(
     """Balls a batch at a time: their indices (b,), rows by the ball (b, rows, d), by the rest (b,
     rows, s + 1).
 
-    `known` are the balls (m,) of observations of single ones, and their rows. Balls with fewer rows
-    than the most in their batch are filled up with rows of zeros.
+    `rows_by_ball` are the balls (m,) of observations of single ones, and their rows. Balls with
+    fewer rows than the most in their batch are filled up with rows of zeros.
     """
     d, s = design.dimension, len(layout)
     readings = design.readings

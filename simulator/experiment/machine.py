@@ -179,8 +179,8 @@ def _task(
 
 
 def target_of(sections: Sections, own_target: LengthFunction | None = None) -> Target | None:
-    """Return the target of uncertainties: a length of its `own`, or else the file's, with its
-    scope.
+    """Return the target of uncertainties: a length of its `own_target`, or else the file's, with
+    its scope.
     """
     target = own_target or sections.get("target_uncertainty")
     return None if target is None else Target(target, sections.get("coverage_factor"))

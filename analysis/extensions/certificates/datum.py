@@ -56,7 +56,7 @@ def chosen_datum(
     """The datum that names choose: none for that of the layout, "all", or as many balls as there
     are dimensions, first the origin, then one on an axis, then one in the xy plane.
 
-    The axis is the one that the second ball is drawn along. `stated` are the axes that an
+    The axis is the one that the second ball is drawn along. `axes_stated` are the axes that an
     experiment chooses, if it does.
 
     :raises ValueError: there is no such ball, another number of them, or they are in line; the

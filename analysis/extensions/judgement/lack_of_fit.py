@@ -74,8 +74,12 @@ def chance_words(chance: float) -> str:
 def chance_of(
     square: float, dimensions: int, sum_of_rest: float, freedom: int, is_given: bool
 ) -> float:
-    """Return the p-value of a sum of squares in a number of dimensions, relative to a `rest` with
-    its degrees of freedom: of chi-squared with `given` sigma, otherwise of Fisher's F.
+    """Return the p-value of a sum of squares in a number of dimensions, relative to a
+    `sum_of_rest` with its degrees of freedom: of chi-squared for a sigma that `is_given`,
+    otherwise of Fisher's F.
+
+    >>> round(chance_of(3.841459, 1, 90.0, 90, True), 6) 0.05 >>> round(chance_of(4.0, 1, 90.0, 90,
+    False), 4) 0.0485
 
     >>> round(chance_of(3.841459, 1, 90.0, 90, True), 6)
     0.05

@@ -91,8 +91,8 @@ def kinematic_rung(
     rotation: int,
     own_degrees: Mapping[str, int] | None = None,
 ) -> LadderModel:
-    """A kinematic model with polynomials of so many coefficients, those of single functions `own`;
-    arranged as the file says if its model is kinematic.
+    """A kinematic model with polynomials of so many coefficients, those of single functions
+    `own_degrees`; arranged as the file says if its model is kinematic.
     """
     kinematic = experiment.error_model
     if not isinstance(kinematic, KinematicSettings):

@@ -136,8 +136,8 @@ def draw_line(
     quantity: str = "error",
 ) -> Figure:
     """A picture of the errors along a line: components, resultant, and a `factor` times the random
-    part about them, as `band` says, with `what` they are; it is written to the path, if there is
-    one.
+    part about them, as `band` says, with `quantity` they are; it is written to the path, if there
+    is one.
 
     :raises OSError: the file cannot be written.
     """

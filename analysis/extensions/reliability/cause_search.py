@@ -195,7 +195,9 @@ class Search:
         return Unexplained(words, math.sqrt(total / freedom), too_large, *statistics)
 
     def _log_p(self, square: float, dimensions: float, remainder: Leftover) -> float:
-        """Return the logarithm of the p-value of a sum of squares among the residuals `left`."""
+        """Return the logarithm of the p-value of a sum of squares among the residuals
+        `remainder`.
+        """
         total, freedom = remainder.sum_of_squares, remainder.freedom
         log_p_of_rest = log_chance(total - square, total, freedom - dimensions, freedom, True)
         by_size = not self.estimated and float(log_p_of_rest) > BELIEVED

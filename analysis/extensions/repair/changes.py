@@ -164,7 +164,7 @@ def with_pose(experiment: Experiment, name: str, pose: Pose) -> Experiment:
 
 
 def with_repeats(experiment: Experiment, name: str, times: int) -> Experiment:
-    """Return the experiment with every reading of a position repeated `count` times as often."""
+    """Return the experiment with every reading of a position repeated `times` times as often."""
     position = _named(experiment, name)
     groups = tuple(replace(group, repeats=times * group.repeats) for group in position.readings)
     return with_position(experiment, replace(position, readings=groups))

@@ -81,7 +81,7 @@ def _what_is_missing(design: Design, strains: Array, unseen: Array) -> str:
     """Return the common property of all directions that leaves strains undetermined, or an empty
     text if there is another reason.
 
-    `left` is the undetermined strain space without the overall scale of a machine whose lengths
+    `unseen` is the undetermined strain space without the overall scale of a machine whose lengths
     are all unknown.
     """
     lengths, d = design.of(Lengths), design.dimension

@@ -115,7 +115,7 @@ class Calibration(ABC):
         return cast(Self, replace(cast(Any, self), values=values, certified=True))
 
     def times_as_uncertain(self, factor: float) -> Self:
-        """Return the same with `times` the standard uncertainties."""
+        """Return the same with `factor` the standard uncertainties."""
         changed = {
             name: factor * value
             for name, value in vars(self).items()
