@@ -133,7 +133,8 @@ def _planned_probes(rows: Sequence[FileRow], design: Design, names: Names) -> Se
         if len(probes) == 1:
             only[name] = design.probes.names[probes[0]]
     rows_completed = [
-        replace(row, texts=(*row.texts[:2], only.get(row.texts[0], ""))) for row in rows
+        replace(row, texts=(*row.texts[:2], row.texts[2] or only.get(row.texts[0], "")))
+        for row in rows
     ]
     missing = sorted({row.texts[0] for row in rows_completed if not row.texts[2]})
     if missing:
