@@ -155,8 +155,8 @@ def check_outputs(options: Namespace) -> None:
     are inputs.
 
     :raises UsageError: an output is an input, another output, or the target of standard output.
-        :raises ExperimentError: a file exists, without `--force`; cannot be written; or needs an
-        extra that     is missing.
+    :raises ExperimentError: a file exists, without `--force`; cannot be written; or needs an extra
+        that is missing.
     """
     from ballplate.simulator.inputs.messages import ExperimentError
 

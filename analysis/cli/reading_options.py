@@ -90,8 +90,8 @@ def refuse_other_files(path: Path) -> None:
 def observed_readings(options: Namespace) -> tuple[Experiment, ObservedReadings]:
     """Return the experiment that the options choose and its readings, and print their notes.
 
-    :raises UsageError: the readings come first, and the experiment file after them. :raises
-        ExperimentError: one of the files is invalid.
+    :raises UsageError: the readings come first, and the experiment file after them.
+    :raises ExperimentError: one of the files is invalid.
     """
     from ballplate.simulator.inputs.extensions import service
 

@@ -94,7 +94,8 @@ def campaign(
     receives each step and its progress.
 
     :raises ExperimentError: there is no pool or no candidate, or required candidates break the
-        limits. :raises InternalError: the choice is better than the bound.
+        limits.
+    :raises InternalError: the choice is better than the bound.
     """
     pool = experiment.pool
     if pool is None:

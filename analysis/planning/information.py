@@ -206,7 +206,7 @@ def pool_information(
     of balls, keeps all combinations of balls and holds no unused plate.
 
     :raises ExperimentError: no candidate is a position, the matrices are too large, or the request
-        cannot     be planned.
+        cannot be planned.
     """
     positions = [candidate.item for candidate in candidates if isinstance(candidate.item, Position)]
     if not positions:

@@ -192,8 +192,8 @@ class Campaign(Selection, Result):
 
         With a path, which ends in .svg, .png or .pdf, the picture is written as well.
 
-        :raises ImportError: matplotlib is missing. :raises ValueError: the path has another
-            suffix.
+        :raises ImportError: matplotlib is missing.
+        :raises ValueError: the path has another suffix.
         """
         figure: Figure = service("draw_campaign")(self, path)
         return figure

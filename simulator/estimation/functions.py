@@ -114,8 +114,8 @@ class Distances:
 
     `targets` are target uncertainties of the pairs, if they have any.
 
-    :raises ValueError: a pair without a name, or without a target if others have one; or a pair
-        not of     two of the points.
+    :raises ValueError: a pair without a name, or without a target if others have one; or a pair not
+        of two of the points.
     """
 
     places: Places

@@ -34,7 +34,7 @@ def write_map(fitted: FittedMap, path: str | os.PathLike[str]) -> None:
     with all their digits.
 
     :raises ExperimentError: the error model cannot be named in a file, or a file that it uses
-        cannot     be read.
+        cannot be read.
     """
     target = Path(path)
     head = head_of(fitted, target.parent)

@@ -105,7 +105,7 @@ def fit(
     Points are weighted by the inverse squares of their `uncertainties` (m,), equally without any.
 
     :raises SplineError: contradictory constraints, points that do not determine the curve, or
-        points     beyond its ends; all faults of one sort at once.
+        points beyond its ends; all faults of one sort at once.
     """
     from scipy.linalg import solve_triangular
 

@@ -426,7 +426,6 @@ def read_compensation_files(
     """The table that files in the format of that name hold.
 
     :raises ExperimentError: the files are invalid, or leave open what nobody says.
-
     :raises ValueError: no arrangement.
     """
     own_arrangement = None if arrangement is None else parse_arrangement(arrangement)

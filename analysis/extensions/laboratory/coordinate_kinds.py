@@ -42,7 +42,7 @@ def as_scale_readings(
     of the machine is subtracted last.
 
     :raises ExperimentError: a position has too few balls to move its part co-ordinates, the
-        correction     is too large to subtract, or some co-ordinates were not read.
+        correction is too large to subtract, or some co-ordinates were not read.
     """
     correction = settings.compensation
     is_taken_off = isinstance(correction, CompensationSettings)

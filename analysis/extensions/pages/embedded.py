@@ -39,8 +39,8 @@ class View:
         """Write the pictures as a page that needs no other file or, if the path ends in .svg, the
         first one as shown.
 
-        :raises ValueError: the path has another suffix than .html and .svg. :raises OSError: the
-            file cannot be written.
+        :raises ValueError: the path has another suffix than .html and .svg.
+        :raises OSError: the file cannot be written.
 
         >>> import tempfile
         >>> import ballplate as bp

@@ -66,8 +66,9 @@ def page(
     another store for comparison.
 
     :raises ValueError: a fit or a prediction without its experiment; sweeps that cannot be
-        compared. :raises ImportError: modules for pages of sweeps are not installed. :raises
-        OSError: the file cannot be written.
+        compared.
+    :raises ImportError: modules for pages of sweeps are not installed.
+    :raises OSError: the file cannot be written.
 
     >>> import ballplate as bp
     >>> bp.page(bp.fit(bp.quickstart(), bp.simulate(bp.quickstart()))).splitlines()[0]

@@ -52,8 +52,8 @@ def mended(
 
     The new text is loaded and its rank computed.
 
-    :raises ExperimentError: writing the repair would change neighbouring text, or text that
-        aliases     refer to.
+    :raises ExperimentError: writing the repair would change neighbouring text, or text that aliases
+        refer to.
     """
     loaded = load(source, True, trust, text)
     (experiment,) = (

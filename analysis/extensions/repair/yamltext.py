@@ -81,7 +81,7 @@ def with_changes(text: str, file: str, changes: Iterable[TextChange]) -> str:
     r"""Return the text with changes made in sequence; the rest keeps its meaning.
 
     :raises ExperimentError: a path with an alias or anchor; a comment there would be lost; or the
-        rest     of the text would change its meaning.
+        rest of the text would change its meaning.
 
     >>> text = "plate: {balls: 5}  # ours\n"
     >>> with_changes(text, "example", [TextChange(("plate", "balls"), 6)])

@@ -114,8 +114,8 @@ class Reach(Result):
 
         With a path, which ends in .svg, .png or .pdf, the picture is written as well.
 
-        :raises ImportError: matplotlib is missing. :raises ValueError: the path has another
-            suffix, or no values were tried.
+        :raises ImportError: matplotlib is missing.
+        :raises ValueError: the path has another suffix, or no values were tried.
         """
         panels = [_panel(answer) for answer in self.answers if answer.tried]
         if not panels:

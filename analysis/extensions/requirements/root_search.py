@@ -60,9 +60,9 @@ def reach(
     `artefact` and `calibration`, an index, select the varied ones among several; `target` replaces
     the target uncertainty of the file, and `report` receives the number of unknowns done.
 
-    :raises GoalError: the experiment lacks the subject of the goal. :raises NotVariableError: the
-        experiment lacks the single requested unknown. :raises ExperimentError: the target is
-        invalid, or there are more than 10,000 evaluation points.
+    :raises GoalError: the experiment lacks the subject of the goal.
+    :raises NotVariableError: the experiment lacks the single requested unknown.
+    :raises ExperimentError: the target is invalid, or there are more than 10,000 evaluation points.
     """
     count = len(experiment.evaluation.points)
     if count > MOST_POINTS:

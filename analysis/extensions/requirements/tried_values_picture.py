@@ -52,8 +52,9 @@ def draw_tried(
     """Draw the distance from a goal by value tried, one panel per unknown, with the limit below
     which it is met.
 
-    :raises ImportError: matplotlib is missing. :raises ValueError: the name has another suffix
-        than pictures. :raises OSError: the file cannot be written.
+    :raises ImportError: matplotlib is missing.
+    :raises ValueError: the name has another suffix than pictures.
+    :raises OSError: the file cannot be written.
     """
     height = PANEL + BELOW + ABOVE
     with drawing(len(panels) * height, WIDTH) as figure:

@@ -144,7 +144,6 @@ def error_curve(
     `check` may refuse points before anything is fitted.
 
     :raises ExperimentError: the file is invalid, or there is no such curve.
-
     :raises OptionError: a text that does not say what it should.
     """
     asked = asked or Asked()

@@ -41,8 +41,8 @@ class ActionError(ValueError):
 def done(document: DesignDocument, action: Arguments) -> DesignDocument:
     """Return the document after an action.
 
-    :raises ActionError: the action is unknown or incomplete. :raises ExperimentError: the text is
-        invalid, or cannot be changed in this way.
+    :raises ActionError: the action is unknown or incomplete.
+    :raises ExperimentError: the text is invalid, or cannot be changed in this way.
     """
     name = action.get("do")
     if not isinstance(name, str) or name not in ACTIONS:

@@ -160,8 +160,9 @@ def reopened(document: DesignDocument) -> DesignDocument:
 def saved(document: DesignDocument, path: Path | None = None) -> DesignDocument:
     """Write the text into its file, or into a new one, unless others have changed it.
 
-    :raises ChangedOnDiskError: the file differs from its last reading or writing, or a file of
-        that     name exists. :raises OSError: it cannot be written.
+    :raises ChangedOnDiskError: the file differs from its last reading or writing, or a file of that
+        name exists.
+    :raises OSError: it cannot be written.
     """
     if path is not None:
         document = replace(document, path=path, content=None)

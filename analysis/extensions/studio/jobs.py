@@ -168,8 +168,9 @@ class Job:
 def started(name: str, document: DesignDocument, settings: Mapping[str, Any]) -> Job:
     """Start a computation with the present document.
 
-    :raises KeyError: there is no such job. :raises ActionError: its settings are invalid. :raises
-        ExperimentError: the text is invalid, if this is detected before the start.
+    :raises KeyError: there is no such job.
+    :raises ActionError: its settings are invalid.
+    :raises ExperimentError: the text is invalid, if this is detected before the start.
     """
     JOBS[name]
     if name in CHECKS:

@@ -53,7 +53,7 @@ class Session:
         """Open a file, or begin an unsaved one.
 
         :raises ExperimentError: the file cannot be read, does not exist although no text is given,
-            or its     folder cannot be read.
+            or its folder cannot be read.
         """
         self._lock = RLock()
         self._first = path.resolve()
@@ -137,8 +137,9 @@ class Session:
     def act(self, action: Mapping[str, Any]) -> None:
         """Change the design; a failure leaves it unchanged.
 
-        :raises ActionError: the action is unknown or incomplete. :raises ExperimentError: a file
-            cannot express it. :raises RefusedError: it is not permitted.
+        :raises ActionError: the action is unknown or incomplete.
+        :raises ExperimentError: a file cannot express it.
+        :raises RefusedError: it is not permitted.
         """
         with self._lock:
             self._ensure_seen(action)
@@ -162,8 +163,8 @@ class Session:
     def scale(self) -> dict[str, Any]:
         """Return the source of scale of the design, as text, and its fingerprint.
 
-        :raises ExperimentError: the text is invalid. :raises RefusedError: another request came
-            meanwhile.
+        :raises ExperimentError: the text is invalid.
+        :raises RefusedError: another request came meanwhile.
         """
         with self._lock:
             document = self._document
@@ -172,8 +173,8 @@ class Session:
     def start(self, name: str, settings: Mapping[str, Any]) -> int:
         """Start a computation, and return its number.
 
-        :raises RefusedError: there is no such computation, or too many are running. :raises
-            ActionError, ExperimentError: its settings, or the text, are invalid.
+        :raises RefusedError: there is no such computation, or too many are running.
+        :raises ActionError, ExperimentError: its settings, or the text, are invalid.
         """
         with self._lock:
             if name not in JOBS:

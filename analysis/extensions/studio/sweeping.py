@@ -53,8 +53,8 @@ def swept(document: DesignDocument, axis_data: Any, report: Report) -> dict[str,
     """Compute a sweep over axes, each with `paths` and `values`: the text of each combination, and
     the `page`, empty if its modules are not installed.
 
-    :raises ActionError: an axis is incomplete, or there are too many combinations. :raises
-        ExperimentError: the text is invalid, a path leads nowhere, or a value would run a model
+    :raises ActionError: an axis is incomplete, or there are too many combinations.
+    :raises ExperimentError: the text is invalid, a path leads nowhere, or a value would run a model
         in Python in a design that the user has not opened by name.
     """
     axes = _axes(axis_data)
@@ -81,7 +81,8 @@ def ensure_possible(document: DesignDocument, axis_data: Any) -> None:
     """Ensure that a sweep over axes can begin, and that numbers replace texts only with units.
 
     :raises ActionError: an axis is incomplete, there are too many combinations, or a number lacks
-        its     unit. :raises ExperimentError: the text is invalid.
+        its unit.
+    :raises ExperimentError: the text is invalid.
     """
     experiment = experiment_of(document)
     for axis in _axes(axis_data):

@@ -153,7 +153,7 @@ class _Reader:
         """End the file; add a note if its last line is incomplete and of unknown form.
 
         :raises ExperimentError: earlier faults, or the file ends before the first row of a
-            dimension or     within its name.
+            dimension or within its name.
         """
         last = self.text.lines[-1]
         if self.dimension is not None and not self.dimension.has_row:
