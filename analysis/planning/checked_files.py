@@ -131,8 +131,8 @@ def check_files(
             designs = chosen if is_single else counted(chosen, "designs", len(chosen), within)
             of_search = within if is_single else unreported
             judged = tuple(
-                checked_design(variant, pools.get(variant.name), wanted, of_search)
-                for variant in designs
+                checked_design(design, pools.get(design.name), wanted, of_search)
+                for design in designs
             )
             yield CheckedFile(str(path), judged, (), doubts, notes)
         except ExperimentError as error:

@@ -45,10 +45,10 @@ def in_time(
     }
     times = DriftTimesSettings.model_construct(probe_change=changes.probe)
     timed = tuple(
-        position.model_copy(update={"positions": positions, "times": times})
-        if isinstance(position, DriftSettings)
-        else position
-        for position in chosen.influences
+        influence.model_copy(update={"positions": positions, "times": times})
+        if isinstance(influence, DriftSettings)
+        else influence
+        for influence in chosen.influences
     )
     return replace(chosen, influences=timed)
 

@@ -138,10 +138,10 @@ def _content(
 ) -> dict[str, Any]:
     settings: dict[str, Any] = to_list(to_python(tree))
     positions = [entry for entry in chosen if isinstance(entry.item, Position)]
-    placed = {entry.item.artefact for entry in positions}
-    names = {entry.name for entry in positions}
+    placed = {position.item.artefact for position in positions}
+    names = {position.name for position in positions}
     unused = (
-        {entry.name for entry in experiment.pool.candidates} - names - set(short)
+        {candidate.name for candidate in experiment.pool.candidates} - names - set(short)
         if experiment.pool is not None
         else set()
     )
@@ -160,10 +160,10 @@ def _content(
     settings["artefacts"] = {
         name: entry for name, entry in settings["artefacts"].items() if name in placed
     }
-    settings["positions"] = [to_list(entry.settings) for entry in positions]
+    settings["positions"] = [to_list(position.settings) for position in positions]
     settings["calibration"] = items
     if "priors" in settings:
-        gone = {entry.path for entry in experiment.priors if entry.position in unused}
+        gone = {prior.path for prior in experiment.priors if prior.position in unused}
         paths = [format_path(("priors", i, "parameter")) for i in range(len(settings["priors"]))]
         settings["priors"] = [
             entry for entry, path in zip(settings["priors"], paths, strict=True) if path not in gone

@@ -152,18 +152,18 @@ def offer(
     """
     candidates = list(pool.candidates)
     index: dict[str, int] = {}
-    for candidate in set_ups:
-        index[candidate.name] = candidate.base
-        if candidate.name == pool.candidates[candidate.base].name:
-            candidates[candidate.base] = candidate.read
+    for set_up in set_ups:
+        index[set_up.name] = set_up.base
+        if set_up.name == pool.candidates[set_up.base].name:
+            candidates[set_up.base] = set_up.read
         else:
-            index[candidate.name] = len(candidates)
-            candidates.append(candidate.read)
+            index[set_up.name] = len(candidates)
+            candidates.append(set_up.read)
     names = [candidate.name for candidate in candidates]
     interrupted: list[Interrupted] = []
     replaced: dict[int, tuple[int, ...]] = {}
-    for base in dict.fromkeys(candidate.base for candidate in set_ups):
-        of_base = [candidate for candidate in set_ups if candidate.base == base]
+    for base in dict.fromkeys(set_up.base for set_up in set_ups):
+        of_base = [set_up for set_up in set_ups if set_up.base == base]
         complete = [index[candidate.name] for candidate in of_base if candidate.rest is None]
         if complete:
             replaced[base] = (
@@ -188,7 +188,7 @@ def offer(
             interrupted.append(
                 Interrupted(index[candidate.name], rest_index, again, candidate.whole)
             )
-    done_indices = tuple(index[candidate.name] for candidate in set_ups)
+    done_indices = tuple(index[set_up.name] for set_up in set_ups)
     must = [replaced.get(k, (k,)) for k in pool.must]
     return Offer(
         tuple(candidates),

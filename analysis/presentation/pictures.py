@@ -53,13 +53,13 @@ def scene_figure(drawn: Scene) -> Iterator[Figure]:
 def draw_scene(axes: Axes, drawn: Scene, by_number: bool) -> None:
     """Draw the volume and its positions, labelled by names or numbers, on axes without a frame."""
     label_points, size = draw_box(axes, drawn.box), drawn.box.size
-    for position in drawn.places:
-        _place(axes, position)
-    for position in drawn.places:
-        _name(axes, position, label_points, size, by_number)
+    for place in drawn.places:
+        _place(axes, place)
+    for place in drawn.places:
+        _name(axes, place, label_points, size, by_number)
     # Room for labels around the volume and for plates that protrude from it.
     drawn_points = np.concatenate(
-        [drawn.box.edges.reshape(-1, 2), *(position.outline for position in drawn.places)]
+        [drawn.box.edges.reshape(-1, 2), *(place.outline for place in drawn.places)]
     )
     low = np.minimum(
         drawn_points.min(axis=0) - 0.11 * size, np.min(label_points, axis=0) - 0.05 * size

@@ -205,7 +205,8 @@ class Fit(FitResult):
             "sum_of_squares": self.sum_of_squares,
             **given(campaigns=self.campaigns and self.campaigns.to_dict()),
             "iterations": [
-                picked(item, "step", "sum_of_squares") for item in self.solution.iterations
+                picked(iteration, "step", "sum_of_squares")
+                for iteration in self.solution.iterations
             ],
             "quantities": quantities_data(self.quantities),
             **given(tasks=task_data(self.tasks)),
@@ -218,7 +219,7 @@ class Fit(FitResult):
                 for item in self.largest
             ],
             **given(
-                error_functions=[item.to_dict() for item in curves],
+                error_functions=[curve.to_dict() for curve in curves],
                 residuals=self._residual_groups(),
                 suspected=self.diagnosis and self.diagnosis.data(self.observed.marks),
             ),

@@ -377,7 +377,7 @@ def check_use(
             )
         elif name in references.layouts and name not in uncertain:
             _check_balls_read(
-                name, [candidate for candidate in readers if candidate.artefact == name], references
+                name, [reader for reader in readers if reader.artefact == name], references
             )
     calibration_count = len(sections.entries("calibration"))
     for name, settings in references.artefacts.items():
@@ -389,9 +389,9 @@ def check_use(
         ):
             kinds = (
                 [
-                    candidate.kind
-                    for candidate in sections.entries("calibration").values()
-                    if getattr(candidate, "artefact", "") in (name, None)
+                    calibration.kind
+                    for calibration in sections.entries("calibration").values()
+                    if getattr(calibration, "artefact", "") in (name, None)
                 ]
                 if calibration_count
                 else []
@@ -536,7 +536,7 @@ def check_lengths(
         if not isinstance(calibration, DistanceCalibration):
             continue
         if references.artefacts[name].role == "length_standard":
-            times = sum(len(pivot.probes) for pivot in positions if pivot.artefact == name)
+            times = sum(len(position.probes) for position in positions if position.artefact == name)
             if len(calibration.pairs) * times > MOST_LENGTHS:
                 text = (
                     f'{len(calibration.pairs)} distances of "{name}", read {times} times, are too'

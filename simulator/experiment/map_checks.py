@@ -74,7 +74,7 @@ def map_of_tree(
     probes = _probes(settings, len(lower), problems)
     if model is None or probes is None:
         return None
-    values = np.array([entry.value for entry in settings.parameters])
+    values = np.array([parameter.value for parameter in settings.parameters])
     _check_parameters(settings, model, problems)
     if problems.messages:
         return None
@@ -101,7 +101,7 @@ def map_of_tree(
         values=values,
         probes=probes,
         drawn_offsets=np.array(
-            [entry.nominal or entry.offset for entry in settings.probes.values()]
+            [probe.nominal or probe.offset for probe in settings.probes.values()]
         ),
         probe=settings.probe,
         covariance=covariance,

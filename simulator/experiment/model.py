@@ -339,9 +339,9 @@ class Experiment:
                 (f"artefact {name}", f"{len(entry.names)} balls")
                 for name, entry in self.layouts.items()
             ),
-            *((f"position {entry.name}", _words_of(entry)) for entry in self.positions),
+            *((f"position {position.name}", _words_of(position)) for position in self.positions),
             ("calibrations", str(len(self.calibration))),
-            ("measuring tasks", ", ".join(entry.name for entry in self.evaluation.tasks) or "none"),
+            ("measuring tasks", ", ".join(task.name for task in self.evaluation.tasks) or "none"),
         ]
         cells = (f"<tr><td>{escape(name)}</td><td>{escape(text)}</td></tr>" for name, text in rows)
         title = escape(f"{self.label}: {self.title}")

@@ -31,7 +31,7 @@ def resolve_own_sections(sections: Sections, references: References) -> dict[str
 def needed_extensions(sections: Sections) -> tuple[str, ...]:
     """Names of the extensions that a file states, or has kinds or keys of."""
     classes = {type(part) for value in sections.values.values() for part in _parts(value)}
-    used = {name for part in classes if (name := owner(part)) is not None}
+    used = {name for settings_class in classes if (name := owner(settings_class)) is not None}
     return tuple(dict.fromkeys((*(sections.get("extensions") or ()), *sorted(used))))
 
 

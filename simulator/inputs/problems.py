@@ -80,7 +80,9 @@ def in_order(
     """
     substituted = {(error.file, error.line, error.column) for error in made_up}
     genuine = [
-        error for error in messages if (error.file, error.line, error.column) not in substituted
+        message
+        for message in messages
+        if (message.file, message.line, message.column) not in substituted
     ]
     return sorted({*genuine, *made_up}, key=lambda error: (error.file != str(source), error))
 

@@ -132,12 +132,15 @@ def least_drift(
     """
     positions = [item for item in chosen if isinstance(item.item, Position)]
     settings = ScaleByBlockSettings(
-        reading=tuple(item.reading_seconds for item in positions), probe_change=changes.probe
+        reading=tuple(position.reading_seconds for position in positions),
+        probe_change=changes.probe,
     )
     plain = without_drift(experiment)
     by_block = replace(plain, influences=(*plain.influences, settings))
     design = lay_out(with_chosen(by_block, chosen))
-    (scales,) = [item for item in design.influences if isinstance(item, ScaleByBlock)]
+    (scales,) = [
+        influence for influence in design.influences if isinstance(influence, ScaleByBlock)
+    ]
     uncertainty, effects, _ = effects_on_distances(design, len(scales.blocks.weight) + 1)
     ways = _ways(positions, scales.blocks, design.probes.names, changes)
     drift = _Drift(ways, scales.blocks.weight, effects[np.isfinite(uncertainty)])

@@ -158,10 +158,10 @@ def _result(element: Element, temperatures: tuple[tuple[str, float], ...]) -> Di
         if part.is_relative:
             # What is stated in the unit of the values as well says the same, and of which kind.
             values = [
-                replace(item, problem=RELATIVE)
-                if math.isnan(item.uncertainty) and not item.problem
-                else item
-                for item in values
+                replace(value, problem=RELATIVE)
+                if math.isnan(value.uncertainty) and not value.problem
+                else value
+                for value in values
             ]
         start = len(lengths)
         lengths += values

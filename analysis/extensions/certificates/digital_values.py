@@ -50,9 +50,9 @@ def read_digital(
     except ExperimentError as error:
         problems.take(error, place)
         return None
-    labels = listing(item.label for item in results)
+    labels = listing(result.label for result in results)
     name = settings.result
-    chosen = [item for item in results if name is None or item.is_called(name)]
+    chosen = [result for result in results if name is None or result.is_called(name)]
     if not chosen or name is not None and len(chosen) > 1:
         many = "several results are" if chosen else "no result is"
         text = f'{path.name}: {many} called "{shorten(name)}"; it has {labels}'
@@ -77,7 +77,7 @@ def read_digital(
     for k, names in enumerate(wanted):
         values = [result.lengths[i] for i in matches[k]]
         if len(values) > 1:
-            lines = listing(str(item.mark.line) for item in values)
+            lines = listing(str(value.mark.line) for value in values)
             text = f"{value_name(names, is_pair)} has several values, in lines {lines}"
             problems.add_at(values[1].mark, place, text)
         # Who states the uncertainty needs none of the file.

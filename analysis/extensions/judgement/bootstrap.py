@@ -255,7 +255,7 @@ def bootstrap(
     """
     linearisation = functions.at
     design = linearisation.design
-    names = [item.name for item in functions.functions if item.kind == "machine"]
+    names = [function.name for function in functions.functions if function.kind == "machine"]
     monomials = names != [parameter.name for parameter in design.model.parameters]
     truth = replace(linearisation.state, lengths=design.unknown_lengths.drawn)
     true = functions.values.copy()
@@ -272,7 +272,7 @@ def bootstrap(
             report(ProgressStep(f"data sets of {label}", len(replicates), trials))
     except NoReadingError as error:
         raise ValueError(str(error)) from None
-    converged = [item for item in replicates if item.status == "converged"]
+    converged = [replicate for replicate in replicates if replicate.status == "converged"]
     uncertainties = sigma * functions.uncertainties()
     is_open = np.isnan(uncertainties)
     values = np.array([item.values for item in converged]).reshape(len(converged), len(true))

@@ -369,7 +369,7 @@ def _mistakes(fits: list[RungFit], file: LadderModel, x: Array, is_given: bool) 
     """Return descriptions of errors in the file's offsets or arrangement that explain an excessive
     S^2 of its own model.
     """
-    fit = next(suspect for suspect in fits if suspect.model.words == file.words)
+    fit = next(fit for fit in fits if fit.model.words == file.words)
     square, freedom = fit.fitted.sum_of_squares, fit.fitted.degrees_of_freedom
     if too_many_entries(fit.at.design) or chance_of(square, freedom, 0.0, 0, True) > MISFIT:
         return ()

@@ -174,7 +174,7 @@ def report_readings(
     taken_reports = [
         _taken(read_report(path, settings.form, settings.unit), path, settings) for path in paths
     ]
-    fits = [fit for item in taken_reports for _, _, fit in item.features if fit is not None]
+    fits = [fit for taken in taken_reports for _, _, fit in taken.features if fit is not None]
     freedom = sum(fit.degrees_of_freedom for fit in fits)
     squares = sum(float((fit.residuals**2).sum()) for fit in fits)
     variance = squares / freedom if freedom else 0.0
@@ -183,22 +183,24 @@ def report_readings(
         for item, path in zip(taken_reports, paths, strict=True)
         for reading in _readings(item, path, variance, settings.design)
     ]
-    notes = [_told(item) for item in taken_reports]
+    notes = [_told(taken) for taken in taken_reports]
     if fits:
-        worst = max(item.uncertainty or 0.0 for item in readings)
+        worst = max(reading.uncertainty or 0.0 for reading in readings)
         notes.append(
             f"{len(fits)} {'centre is' if len(fits) == 1 else 'centres are'} of points on the"
             " surface, which leave"
             f" {1e6 * variance**0.5:.3g} µm ({freedom} degrees of freedom):"
             f" standard uncertainty of a co-ordinate of a centre up to {1e6 * worst:.3g} µm"
         )
-    left_out = sum(item.across >= 0 for item in readings)
+    left_out = sum(reading.across >= 0 for reading in readings)
     if left_out:
         notes.append(
             f"the co-ordinates across plates that are read in their plane, {left_out}, are left out"
         )
-    remarks = [remark for item in taken_reports for remark in (*item.report.remarks, *item.remarks)]
-    systems = {feature.system for item in taken_reports for feature, _, _ in item.features}
+    remarks = [
+        remark for taken in taken_reports for remark in (*taken.report.remarks, *taken.remarks)
+    ]
+    systems = {feature.system for taken in taken_reports for feature, _, _ in taken.features}
     if {"machine", "part"} <= systems:
         remarks.append(
             "warning: centres in the machine's and in a part's system; import each apart"
@@ -223,9 +225,11 @@ def _taken(report: Report, path: Path | GivenText, settings: ImportSettings) -> 
         candidates = _grouped(candidates, apart, taken_report)
     else:
         candidates = _with_points(candidates, report, taken_report)
-    for why in dict.fromkeys(feature.lacks for feature in candidates if feature.lacks):
-        taken_report.leave([feature for feature in candidates if feature.lacks == why], why)
-    complete = [feature for feature in map(taken_report.centred, candidates) if feature is not None]
+    for why in dict.fromkeys(candidate.lacks for candidate in candidates if candidate.lacks):
+        taken_report.leave([candidate for candidate in candidates if candidate.lacks == why], why)
+    complete = [
+        candidate for candidate in map(taken_report.centred, candidates) if candidate is not None
+    ]
     if not complete:
         left_text = ", ".join(_counted(taken_report.left)) or "nothing"
         text = (
@@ -299,7 +303,7 @@ def _with_points(candidates: list[Feature], report: Report, taken_report: _Taken
     """Spheres that were not measured, with the points that have their names and a number; without
     any sphere, all points that have the same name except their number.
     """
-    lacking = {feature.name: feature for feature in candidates if feature.lacks}
+    lacking = {candidate.name: candidate for candidate in candidates if candidate.lacks}
     points: dict[str, list[Feature]] = {}
     for feature in report.features:
         match = NUMBERED.fullmatch(feature.name[:LONGEST_NAME]) if feature.kind == POINT else None
@@ -311,7 +315,9 @@ def _with_points(candidates: list[Feature], report: Report, taken_report: _Taken
             points.setdefault(match[1], []).append(feature)
     taken_report.left[POINT] -= sum(map(len, points.values()))
     taken_report.left += Counter()
-    made = [feature for feature in candidates if not (feature.lacks and feature.name in points)]
+    made = [
+        candidate for candidate in candidates if not (candidate.lacks and candidate.name in points)
+    ]
     return [*made, *(_of_points(name, several) for name, several in points.items())]
 
 

@@ -84,12 +84,12 @@ class MapComparison:
     @property
     def groups(self) -> tuple[FigureGroup, ...]:
         """All groups of values, in printed order."""
-        of_functions = (compared_part.figures for compared_part in self.functions)
+        of_functions = (function.figures for function in self.functions)
         return (
             *self.lengths,
             self.places,
             *of_functions,
-            *(compared_part.figures for compared_part in self.plates),
+            *(plate.figures for plate in self.plates),
         )
 
 

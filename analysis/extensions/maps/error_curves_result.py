@@ -75,15 +75,15 @@ class ErrorCurves(Result):
         data = map_data(self.label, self.fitted)
         data["functions"] = [
             {
-                "error": error.name,
-                **picked(error, "meaning", "unit"),
-                "line": error.line or None,
-                "axis": None if error.axis is None else AXIS_NAMES[error.axis],
-                "position": error.positions,
-                "value": error.values,
-                "expanded_uncertainty": self.k * error.uncertainties,
+                "error": curve.name,
+                **picked(curve, "meaning", "unit"),
+                "line": curve.line or None,
+                "axis": None if curve.axis is None else AXIS_NAMES[curve.axis],
+                "position": curve.positions,
+                "value": curve.values,
+                "expanded_uncertainty": self.k * curve.uncertainties,
             }
-            for error in self.functions.curves
+            for curve in self.functions.curves
         ]
         for key in ("squareness", "numbers"):
             data[key] = [
@@ -102,10 +102,10 @@ class ErrorCurves(Result):
         ratios.
         """
         rows = [
-            _row(error.name, error.line, x, value, self.k * u, self.k, error.unit)
-            for error in self.functions.curves
+            _row(curve.name, curve.line, x, value, self.k * u, self.k, curve.unit)
+            for curve in self.functions.curves
             for x, value, u in zip(
-                *(part.tolist() for part in (error.positions, error.values, error.uncertainties)),
+                *(part.tolist() for part in (curve.positions, curve.values, curve.uncertainties)),
                 strict=True,
             )
         ]

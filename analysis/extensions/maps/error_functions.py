@@ -76,14 +76,14 @@ def error_functions(
     """
     curves: list[FunctionCurve] = []
     numbers: list[EstimatedNumber] = []
-    functions = dict.fromkeys(error.function for error in fitted.model.parameters)
+    functions = dict.fromkeys(parameter.function for parameter in fitted.model.parameters)
     for name in functions:
         own_curves = list(_curves(fitted, name, positions))
         curves += own_curves
         numbers += [] if own_curves else _numbers(fitted, name)
     own_names = {error.name for error in numbers}
     square = [error for error in numbers if error.name in SQUARENESS_ERRORS]
-    square += [error for error in _by_ends(fitted) if error.name not in own_names]
+    square += [end for end in _by_ends(fitted) if end.name not in own_names]
     other_numbers = [error for error in numbers if error.name not in SQUARENESS_ERRORS]
     known_names = [
         *functions,
@@ -100,7 +100,7 @@ def error_functions(
         return tuple(error for error in some if not names or error.name in names)
 
     return ErrorFunctions(
-        tuple(error for error in curves if not names or error.name in names),
+        tuple(curve for curve in curves if not names or curve.name in names),
         chosen(square),
         chosen(other_numbers),
     )

@@ -67,7 +67,9 @@ def draw_functions(
             axes = placed_axes(figure, x, y, PANEL, HEIGHT)
             _draw_panel(axes, curves, k, limits[curves[0].unit])
             is_last = not any((later, column) in panels for later in rows[rows.index(row) + 1 :])
-            is_first = not any((row, later) in panels for later in columns[: columns.index(column)])
+            is_first = not any(
+                (row, before) in panels for before in columns[: columns.index(column)]
+            )
             axes.tick_params(labelbottom=is_last, labelleft=is_first)
             if is_last:
                 axis = curves[0].axis
@@ -79,7 +81,7 @@ def draw_functions(
             (f"band: expanded uncertainty U, k = {k:g}, at each position by itself", 9.0),
             (CONVENTION, 9.0),
         ]
-        if any(error.line for error in functions.curves):
+        if any(curve.line for curve in functions.curves):
             heads.append(("full lines: the other axes low; dashed: the other axes high", 9.0))
         for i, (text, size) in enumerate(heads):
             figure.text(LEFT / width, 1.0 - (18.0 + LINE * i) / height, text, fontsize=size)

@@ -17,14 +17,14 @@ def curves_section(fit: QuotedData) -> Html:
         return Html()
     k = expansion(fit.at("quantities"))
     functions = list(fit.at("error_functions").each())
-    curves = [curve for curve in functions if len(curve.data["values"]) > 1]
+    curves = [function for function in functions if len(function.data["values"]) > 1]
     drawn = [figure(_name(curve), _curve(curve, k)) for curve in curves]
     words = (
         "An error is where the tip is, less where the scales say: the correction that is to be"
         f" added to a reading. Bands are expanded uncertainties U, k = {k:g}; where there is"
         " no curve, the function is undetermined."
     )
-    rows = [_row(curve, k) for curve in functions]
+    rows = [_row(function, k) for function in functions]
     heads = ["error", "meaning", "largest, either sign", f"U there, k = {k:g}", "unit"]
     made = table("error-functions", "Largest values of the error functions", heads, rows, (0, 1, 4))
     return joined([note(words), element("div", *drawn, class_="figures curves"), made])

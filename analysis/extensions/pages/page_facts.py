@@ -52,7 +52,7 @@ def _certificates(experiment: Experiment) -> str:
         f"{certificate.kind} of {certificate.subject} ({certificate.size})"
         for certificate in experiment.calibration
     ]
-    descriptions += [f"prior of {certificate.name}" for certificate in experiment.priors]
+    descriptions += [f"prior of {prior.name}" for prior in experiment.priors]
     return listing(descriptions) or "none: nothing is known of artefacts but what the readings say"
 
 

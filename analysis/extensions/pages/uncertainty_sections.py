@@ -11,7 +11,7 @@ from .quoted import UNDETERMINED, QuotedData
 def expansion(quantities: QuotedData) -> float:
     """The factor of expanded uncertainties on a page: that of the target, or 2."""
     factors = [quantity.data.get("target_coverage_factor") for quantity in quantities.each()]
-    return next((quantity for quantity in factors if quantity is not None and quantity != 1.0), 2.0)
+    return next((factor for factor in factors if factor is not None and factor != 1.0), 2.0)
 
 
 def uncertainty_table(result: QuotedData, caveat: str = "") -> Html:

@@ -358,8 +358,8 @@ class _Search:
             return True
         changed, volume = apply_all(changes, experiment), experiment.machine.volume
         return all(
-            is_inside(change, changed.layouts[change.artefact], volume, changed.probes)
-            for change in changed.positions
+            is_inside(position, changed.layouts[position.artefact], volume, changed.probes)
+            for position in changed.positions
         )
 
     def greedy(self, changes: Sequence[Change]) -> tuple[Change, ...]:

@@ -536,30 +536,27 @@ def _section_data(section: Section) -> dict[str, Any]:
         **picked(section, "title", "agrees"),
         "rests_on": list(section.rests_on),
         "ranks": [
-            picked(compared, "design", "published", "ours", "gap", "agrees")
-            for compared in section.ranks
+            picked(rank, "design", "published", "ours", "gap", "agrees") for rank in section.ranks
         ],
         "factors": [
             {
-                **picked(compared.column, "table", "design", "statistic"),
-                **picked(compared, "factor", "within"),
-                "agrees": compared.factor_agrees,
+                **picked(column.column, "table", "design", "statistic"),
+                **picked(column, "factor", "within"),
+                "agrees": column.factor_agrees,
             }
-            for compared in section.columns
+            for column in section.columns
         ],
         "figures": [
-            _figure_data(compared, figure)
-            for compared in section.columns
-            for figure in compared.figures
+            _figure_data(column, figure) for column in section.columns for figure in column.figures
         ],
         "remarks": [
             {
-                **picked(compared.remark, "text", "quantities", "at_least", "at_most"),
-                "least_ratio": compared.least,
-                "largest_ratio": compared.largest,
-                "agrees": compared.agrees,
+                **picked(remark.remark, "text", "quantities", "at_least", "at_most"),
+                "least_ratio": remark.least,
+                "largest_ratio": remark.largest,
+                "agrees": remark.agrees,
             }
-            for compared in section.remarks
+            for remark in section.remarks
         ],
         "errata": [
             {
@@ -584,13 +581,13 @@ def _section_data(section: Section) -> dict[str, Any]:
         ],
         "differences": [
             {
-                "design": compared.difference.design,
-                "trials": compared.comparison.trials,
-                "not_converged": compared.comparison.failed,
-                **{part.quantity: _placed_data(part) for part in compared.parts},
-                "agrees": compared.agrees,
+                "design": difference.difference.design,
+                "trials": difference.comparison.trials,
+                "not_converged": difference.comparison.failed,
+                **{part.quantity: _placed_data(part) for part in difference.parts},
+                "agrees": difference.agrees,
             }
-            for compared in section.differences
+            for difference in section.differences
         ],
         "computed_only": [
             {

@@ -101,7 +101,9 @@ class Session:
                 "saved": document.is_saved,
                 "back": len(document.back),
                 "forward": len(document.forward),
-                "messages": [] if pending else [_message_data(file) for file in judged.messages],
+                "messages": []
+                if pending
+                else [_message_data(message) for message in judged.messages],
                 "pending": pending,
                 "design": answer,
                 "off": [name for name in self._off if name not in there],

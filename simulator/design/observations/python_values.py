@@ -292,7 +292,7 @@ def _values(
     for row, uncertainty in zip(*rows_read, strict=True):
         k = index_by_names.get((row.texts[0], row.texts[1]))
         if k is None:
-            names_listed = listing(", ".join(entry) for entry in functions.names)
+            names_listed = listing(", ".join(name) for name in functions.names)
             text = f'no value "{", ".join(row.texts[:2])}"; known: {names_listed}'
             problems.add_at(row.mark, place, text)
             continue
