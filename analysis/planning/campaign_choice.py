@@ -590,9 +590,9 @@ def _budgets(problem: SelectionProblem) -> list[Budget]:
     budgets = list(dict.fromkeys([*budgets, budget]))
     return sorted(
         budgets,
-        key=lambda budget_seconds: (
-            budget_seconds.seconds or 0.0,
-            budget_seconds.readings or 0,
-            budget_seconds.positions or 0,
+        key=lambda budget: (
+            budget.seconds or 0.0,
+            budget.readings or 0,
+            budget.positions or 0,
         ),
     )

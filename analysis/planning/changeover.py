@@ -273,7 +273,9 @@ class _Task:
                         following[remaining | 1 << k] = np.minimum(known_cost, cost)
             layer = following
             if len(self.contents) > MOST_PLACES:
-                order = sorted(layer, key=lambda cost_of: (layer[cost_of].min(), cost_of))
+                order = sorted(
+                    layer, key=lambda places_left: (layer[places_left].min(), places_left)
+                )
                 layer = {remaining: layer[remaining] for remaining in order[:MOST_SETS]}
             costs = costs | layer
         return costs

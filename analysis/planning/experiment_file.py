@@ -137,7 +137,7 @@ def _content(
     of_influences: Mapping[int, dict[str, Any]],
 ) -> dict[str, Any]:
     settings: dict[str, Any] = to_list(to_python(tree))
-    positions = [entry for entry in chosen if isinstance(entry.item, Position)]
+    positions = [candidate for candidate in chosen if isinstance(candidate.item, Position)]
     placed = {position.item.artefact for position in positions}
     names = {position.name for position in positions}
     unused = (
@@ -148,14 +148,15 @@ def _content(
     # Where there is one artefact, nothing says which.
     only = next(iter(settings["artefacts"]))
     items = [
-        entry
-        for entry in settings.get("calibration", [])
-        if str(entry.get("artefact", only)) in placed or is_of_machine(str(entry.get("kind")))
+        calibration
+        for calibration in settings.get("calibration", [])
+        if str(calibration.get("artefact", only)) in placed
+        or is_of_machine(str(calibration.get("kind")))
     ]
     items += [
-        to_list(entry.settings)
-        for entry in chosen
-        if not isinstance(entry.item, Position) and entry.item.artefact in {*placed, ""}
+        to_list(candidate.settings)
+        for candidate in chosen
+        if not isinstance(candidate.item, Position) and candidate.item.artefact in {*placed, ""}
     ]
     settings["artefacts"] = {
         name: entry for name, entry in settings["artefacts"].items() if name in placed
@@ -169,7 +170,9 @@ def _content(
             entry for entry, path in zip(settings["priors"], paths, strict=True) if path not in gone
         ]
     if "influences" in settings:
-        influences_written = [_of_chosen(entry, unused, short) for entry in settings["influences"]]
+        influences_written = [
+            _of_chosen(influence, unused, short) for influence in settings["influences"]
+        ]
         settings["influences"] = [
             entry | of_influences.get(k, {}) for k, entry in enumerate(influences_written) if entry
         ]

@@ -193,14 +193,12 @@ def offer(
     return Offer(
         tuple(candidates),
         done_indices,
-        tuple(candidate[0] for candidate in must if len(candidate) == 1),
+        tuple(indices[0] for indices in must if len(indices) == 1),
         tuple(
-            AtMost(
-                tuple(m for k in candidate.members for m in replaced.get(k, (k,))), candidate.count
-            )
-            for candidate in pool.at_most
+            AtMost(tuple(m for k in limit.members for m in replaced.get(k, (k,))), limit.count)
+            for limit in pool.at_most
         ),
-        tuple(candidate for candidate in must if len(candidate) > 1),
+        tuple(indices for indices in must if len(indices) > 1),
         tuple(interrupted),
         replaced,
         pool,

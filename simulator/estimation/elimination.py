@@ -4,7 +4,7 @@ The Jacobian of all readings is block-angular (NPL Report CISE 15/98, section 3.
 one ball involve that ball and the shared parameters (poses, machine errors, offsets). The whitened
 rows of ball i are
 
-[B_i  C_i | r_i],  with  Q_i' [B_i  C_i | r_i] = [R_i  S_i | z_i; 0  T_i | w_i].
+    [B_i  C_i | r_i],  with  Q_i' [B_i  C_i | r_i] = [R_i  S_i | z_i; 0  T_i | w_i].
 
 The orthogonal Q_i leaves d rows that determine the ball (R_i, kept in `ball_root`, `ball_shared`,
 `ball_side`), and rows T_i for the shared parameters alone. All T_i go into one small triangular
@@ -146,6 +146,7 @@ def _eliminate_alike(design: Design, layout: SharedLayout, state: State, x: Arra
         total += float((by_rest[:, :, -1] ** 2).sum())
         q, r = np.linalg.qr(by_ball)
         top = q.transpose(0, 2, 1) @ by_rest
+        # (I - Q Q') C: more rows than T_i, with the same products, and no full Q.
         by_rest -= q @ top
         shared = _absorbed(shared, by_rest.reshape(-1, s + 1))
         order.append(balls)
@@ -224,14 +225,14 @@ def _eliminate_graded(
 ) -> Factor:
     """The factor where rows' weights differ much: every row keeps its own relative accuracy."""
     d, s = design.dimension, len(layout)
-    is_kept, gathered = design.tied_balls, _gathered(design, state, x)
-    place_of = _places(design, is_kept)
-    columns = d * len(is_kept)
+    balls_kept, gathered = design.tied_balls, _gathered(design, state, x)
+    place_of = _places(design, balls_kept)
+    columns = d * len(balls_kept)
     scale = np.append(layout.scale, 1.0)
-    single = np.setdiff1d(design.plate_balls, is_kept, assume_unique=True)
+    single = np.setdiff1d(design.plate_balls, balls_kept, assume_unique=True)
     balls, roots, orders, tops = [], [], [], []
     total, shared, tied = 0.0, Collected(s, 1), Collected(columns, s + 1)
-    for is_tied, chosen in ((False, single), (True, is_kept)):
+    for is_tied, chosen in ((False, single), (True, balls_kept)):
         for batch, by_ball, by_rest in _batches(design, layout, state, x, chosen, gathered.single):
             total += float((by_rest[:, :, -1] ** 2).sum())
             by_rest *= scale
@@ -271,7 +272,7 @@ def _eliminate_graded(
         ball_root=np.concatenate([np.zeros((0, d, d)), *roots]),
         ball_shared=top[:, :, :-1],
         ball_side=top[:, :, -1],
-        kept=is_kept,
+        kept=balls_kept,
         kept_root=of_kept.root,
         kept_shared=kept_top[:, :-1],
         kept_side=kept_top[:, -1],

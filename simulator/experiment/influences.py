@@ -86,7 +86,7 @@ def with_influences(design: Design, experiment: Experiment, is_pool: bool = Fals
     at = disturbed_readings(state, chosen, x)
     for i, parameter in enumerate(experiment.influences):
         text = wrong_of_shifts(
-            influences[i], parameter, at, lambda candidate: candidate.influence(parts)
+            influences[i], parameter, at, lambda own_settings: own_settings.influence(parts)
         )
         if text:
             raise _of_class(experiment, i, text)

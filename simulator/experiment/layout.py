@@ -38,7 +38,7 @@ from .influences import with_influences
 from .length_standards import standard_lengths
 from .model import Experiment, Prior
 
-# EvaluationPoints points of an experiment that names none.
+# Evaluation points of an experiment that names none.
 DEFAULT_POINTS = 200
 DEFAULT_SEED = 1
 
@@ -290,8 +290,8 @@ def _held(
     d = balls.places.shape[1]
     held_flags = np.zeros((len(position_artefact), pose_size(d)), bool)
     ball, axis, _ = (
-        np.concatenate(observation)
-        for observation in zip(*(observation.fixing() for observation in observations), strict=True)
+        np.concatenate(part)
+        for part in zip(*(observation.fixing() for observation in observations), strict=True)
     )
     for artefact in np.unique(position_artefact):
         positions = np.flatnonzero(position_artefact == artefact)

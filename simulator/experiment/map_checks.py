@@ -68,7 +68,7 @@ def map_of_tree(
             problems.add(("volume", axis), text)
     if problems.messages:
         return None
-    lower, upper = (np.array(entry) for entry in zip(*ends, strict=True))
+    lower, upper = (np.array(end) for end in zip(*ends, strict=True))
     volume = Volume(lower, upper)
     model = _model(settings, volume, source.parent, problems, trust)
     probes = _probes(settings, len(lower), problems)
@@ -114,8 +114,14 @@ def map_of_tree(
         frame=settings.frame,
         temperatures=settings.temperatures,
         left_out=tuple(
-            LeftOut(entry.name, entry.kind, entry.unit, entry.value, entry.standard_uncertainty)
-            for entry in settings.left_out
+            LeftOut(
+                left_out.name,
+                left_out.kind,
+                left_out.unit,
+                left_out.value,
+                left_out.standard_uncertainty,
+            )
+            for left_out in settings.left_out
         ),
         data=None if data is None else MapData(**data.model_dump()),
         lack_of_fit=None if lack is None else LackOfFit(**lack.model_dump()),

@@ -38,7 +38,7 @@ def head_of(fitted: FittedMap, folder: Path) -> dict[str, Any]:
             for axis, low, high in zip(AXES, lower, upper, strict=False)
         },
         "frame": fitted.frame,
-        "repeatability": [_length(value_of) for value_of in fitted.repeatability.tolist()],
+        "repeatability": [_length(component) for component in fitted.repeatability.tolist()],
         "probes": _probe_data(fitted),
         "probe": fitted.probe,
         "sigma": {
@@ -52,8 +52,8 @@ def head_of(fitted: FittedMap, folder: Path) -> dict[str, Any]:
         "data": None if fitted.data is None else to_list(_data(fitted.data)),
         "lack_of_fit": None if fitted.lack_of_fit is None else dict(vars(fitted.lack_of_fit)),
         "left_out": [
-            {key: value for key, value in vars(value_of).items() if value is not None}
-            for value_of in fitted.left_out
+            {key: value for key, value in vars(left_out).items() if value is not None}
+            for left_out in fitted.left_out
         ],
         "parameters": [
             {"name": value_of.name, "unit": value_of.unit, "value": value}

@@ -310,10 +310,10 @@ class Experiment:
         ]
         reading_count = sum(
             len(group.ball_indices)
-            for candidate in (*self.positions, *offered)
-            for group in candidate.readings
+            for position in (*self.positions, *offered)
+            for group in position.readings
         )
-        calibration_size = sum(candidate.size for candidate in self.calibration)
+        calibration_size = sum(calibration.size for calibration in self.calibration)
         balls = sum(len(layout.names) for layout in self.layouts.values())
         return (
             balls

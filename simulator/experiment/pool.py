@@ -33,9 +33,9 @@ def placed_only(experiment: Experiment) -> Experiment:
         artefacts={name: prior for name, prior in experiment.artefacts.items() if name in placed},
         layouts={name: prior for name, prior in experiment.layouts.items() if name in placed},
         calibration=tuple(
-            prior
-            for prior in experiment.calibration
-            if not prior.artefact or prior.artefact in placed
+            calibration
+            for calibration in experiment.calibration
+            if not calibration.artefact or calibration.artefact in placed
         ),
         priors=tuple(
             prior

@@ -231,10 +231,8 @@ def names(kind: str, with_registered: bool = False) -> tuple[str, ...]:
 
 def installed_functions() -> tuple[str, ...]:
     """Return functions of installed extensions."""
-    extensions = (
-        *filter(lambda extension: extension.is_installed, shipped()),
-        *registered().extensions,
-    )
+    there = (extension for extension in shipped() if extension.is_installed)
+    extensions = (*there, *registered().extensions)
     return tuple(name for extension in extensions for name in extension.functions)
 
 

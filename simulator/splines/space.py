@@ -40,18 +40,18 @@ class SplineSpace:
     knots: tuple[float, ...] = ()
 
     def __post_init__(self) -> None:
-        pieces_found = []
+        problems = []
         if self.order < 2:
-            pieces_found.append(SplineProblem("a spline's order is at least 2 (broken lines)"))
+            problems.append(SplineProblem("a spline's order is at least 2 (broken lines)"))
         if not self.lower < self.upper:
-            pieces_found.append(
+            problems.append(
                 SplineProblem(
                     "the curve ends at {0}, not above its start at {1}", (self.upper, self.lower)
                 )
             )
         outside = [knot for knot in self.knots if not self.lower < knot < self.upper]
         for knot in dict.fromkeys(outside):
-            pieces_found.append(
+            problems.append(
                 SplineProblem(
                     "the knot at {0} is not between the ends, {1} and {2}; leave it out",
                     (knot, self.lower, self.upper),
@@ -59,7 +59,7 @@ class SplineSpace:
             )
         for knot, times in Counter(self.knots).items():
             if times > self.order:
-                pieces_found.append(
+                problems.append(
                     SplineProblem(
                         f"the knot at {{0}} is given {times} times; give it {self.order}"
                         " times at most",
@@ -67,11 +67,11 @@ class SplineSpace:
                     )
                 )
         if list(self.knots) != sorted(self.knots):
-            pieces_found.append(
+            problems.append(
                 SplineProblem("the knots are out of order; give them in ascending order")
             )
-        if pieces_found:
-            raise SplineError(pieces_found)
+        if problems:
+            raise SplineError(problems)
 
     @property
     def count(self) -> int:
@@ -103,12 +103,12 @@ class SplineSpace:
         piece, in x scaled.
         """
         start = (self.breaks[:-1] - self.lower) / self.length
-        pieces_found = np.empty((len(start), self.order, self.count))
+        coefficients = np.empty((len(start), self.order, self.count))
         factorial = 1.0
         for k in range(self.order):
             factorial *= max(k, 1)
-            pieces_found[:, k] = self._spline(start, nu=k) / factorial  # type: ignore[operator]
-        return pieces_found
+            coefficients[:, k] = self._spline(start, nu=k) / factorial  # type: ignore[operator]
+        return coefficients
 
     def rows(self, x: Array, derivative: int = 0, side: Side = "above") -> Array:
         """Return the B-splines' values or derivatives at x (m,), as (m, count), per metre or

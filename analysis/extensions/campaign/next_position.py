@@ -139,7 +139,7 @@ def possible_positions(experiment: Experiment) -> dict[str, Position]:
     """All positions that may be read, by name: the file's own, then those of its pool."""
     pool = () if experiment.pool is None else experiment.pool.candidates
     candidates = (candidate.item for candidate in pool if isinstance(candidate.item, Position))
-    positions = {candidate.name: candidate for candidate in (*experiment.positions, *candidates)}
+    positions = {position.name: position for position in (*experiment.positions, *candidates)}
     if not positions:
         raise refused(experiment.source, "has no positions and no pool of them", "positions")
     return positions

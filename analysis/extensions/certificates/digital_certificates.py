@@ -366,14 +366,14 @@ def _matrix(block: Element, count: int) -> NamedMatrix | None:
     :raises ExperimentError: it is of another size, has other units, or is no covariance.
     """
     region = next(
-        (element for element in block.children if element.name.removesuffix(LIST) in REGIONS), None
+        (child for child in block.children if child.name.removesuffix(LIST) in REGIONS), None
     )
     if region is None:
         return None
     if count > MOST_NAMES:
         text = f"a covariance of {count} values; at most {MOST_NAMES} are possible"
         raise region.mark.refused(text)
-    columns = [element for element in region.walk() if element.name.removesuffix(LIST) == "column"]
+    columns = [child for child in region.walk() if child.name.removesuffix(LIST) == "column"]
     values, rounding = np.zeros((count, count)), np.zeros((count, count))
     marks, factors = [], set[float]()
     for k, column in enumerate(columns):

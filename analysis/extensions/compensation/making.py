@@ -266,9 +266,7 @@ def _compared(
     without = exact
     if not made.has_rotations:
         assert isinstance(exact, AxisTables)
-        without = exact.changed(
-            lambda correction_values: correction_values.values * (np.arange(6) < 3)
-        )
+        without = exact.changed(lambda table: table.values * (np.arange(6) < 3))
     sides = [_places(machine, exact, k, origin, probes) for k in range(d)]
     grid = grid_points(sides)
     generator = np.random.default_rng(np.random.SeedSequence(0))
@@ -280,7 +278,7 @@ def _compared(
         p = np.broadcast_to(offset, x.shape)
         true = machine.model.error(x, machine.a, p)
         ideal, corrections, rough = (
-            correction(correction_values, x, p) for correction_values in (exact, without, written)
+            correction(written_model, x, p) for written_model in (exact, without, written)
         )
         pairs = ((ideal, true), (corrections, rough), (rough, true), (corrections, ideal))
         apart = [
@@ -288,10 +286,7 @@ def _compared(
         ]
         largest = np.maximum(
             largest,
-            [
-                np.linalg.norm(correction_values - correction_values[-1], axis=1).max()
-                for correction_values in apart
-            ],
+            [np.linalg.norm(difference - difference[-1], axis=1).max() for difference in apart],
         )
     interpolation, rounding, total, left_out = largest.tolist()
     return MadeTable(written, origin, interpolation, rounding, total, left_out, len(x) - 1, probes)

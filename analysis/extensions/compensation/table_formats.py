@@ -94,7 +94,7 @@ def with_sense(table: Table, sense: Sense) -> Table:
         return table
     if isinstance(table, VolumeTable):
         return replace(table, values=-table.values)
-    return table.changed(lambda sense_name: -sense_name.values)
+    return table.changed(lambda table: -table.values)
 
 
 def stated_sense(comment: str) -> Sense | None:

@@ -275,7 +275,9 @@ def bootstrap(
     converged = [replicate for replicate in replicates if replicate.status == "converged"]
     uncertainties = sigma * functions.uncertainties()
     is_open = np.isnan(uncertainties)
-    values = np.array([item.values for item in converged]).reshape(len(converged), len(true))
+    values = np.array([replicate.values for replicate in converged]).reshape(
+        len(converged), len(true)
+    )
     return Bootstrap(
         label,
         title,
@@ -286,7 +288,7 @@ def bootstrap(
         np.where(is_open, np.nan, functions.values),
         uncertainties,
         np.where(is_open, np.nan, values - true),
-        np.array([item.sigma for item in converged]) / sigma
+        np.array([replicate.sigma for replicate in converged]) / sigma
         if sigma > 0.0
         else np.ones(len(converged)),
         sigma_is_estimated,

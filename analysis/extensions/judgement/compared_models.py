@@ -327,7 +327,7 @@ def _shown(climbed: Climb, file: LadderModel, test: Comparison) -> list[LadderMo
     polynomials = [rung for rung in climbed.every if rung.model.numbers is not None]
     models = [rung.model for rung in path(polynomials, test)]
     models += [rung.model for rung in climbed.every if rung.model.numbers is None]
-    unique = {rung.words: rung for rung in [*models, climbed.chosen.model, file]}
+    unique = {model.words: model for model in [*models, climbed.chosen.model, file]}
     return sorted(unique.values(), key=lambda rung: rung.count)
 
 

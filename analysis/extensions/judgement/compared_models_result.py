@@ -163,7 +163,7 @@ class ComparedModels(FitResult):
             "sigma": ("sigma", "{:.4g}".format),
             f"{test}: chance": (
                 _chance,
-                lambda rung: "-" if math.isnan(rung) else chance_words(rung),
+                lambda p_value: "-" if math.isnan(p_value) else chance_words(p_value),
             ),
             "AIC": (lambda rung: rung.criteria.aic - least[0], "{:.1f}".format),
             "BIC": (lambda rung: rung.criteria.bic - least[1], "{:.1f}".format),

@@ -236,7 +236,7 @@ def path(every: list[FittedSum], test: Comparison) -> list[FittedSum]:
     while True:
         assert here_now.model.numbers is not None
         n, m = here_now.model.numbers
-        fewer = [by_numbers.get(fit) for fit in ((n - 1, m), (n, m - 1))]
+        fewer = [by_numbers.get(neighbour) for neighbour in ((n - 1, m), (n, m - 1))]
         offers = [fit for fit in fewer if fit is not None]
         if not offers:
             return steps[::-1]

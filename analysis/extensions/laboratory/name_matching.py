@@ -261,11 +261,11 @@ def _pitch(places: Array) -> float:
     return float(_nearest(places, places, 2)[0].min())
 
 
-def _nearest(seen_places: Array, places: Array, position_index: int = 1) -> tuple[Array, Integers]:
+def _nearest(seen_places: Array, places: Array, rank: int = 1) -> tuple[Array, Integers]:
     """Return distances (m,) to the nearest location, or to the second nearest, and its index."""
     from scipy.spatial import cKDTree
 
-    distance, index = cKDTree(places).query(seen_places, [position_index])
+    distance, index = cKDTree(places).query(seen_places, [rank])
     return distance[:, 0], index[:, 0]
 
 
@@ -273,11 +273,11 @@ def _matched_balls(
     rows: Sequence[FileRow],
     design: Design,
     places: Callable[[Sequence[FileRow]], Array] | None,
-    known_matches: Names,
+    findings: Names,
 ) -> Sequence[FileRow]:
     """Return rows whose balls are identified by number or location, artefact by artefact."""
     positions = {name: k for k, name in enumerate(design.positions.names)}
-    if known_matches.asked or any(row.texts[0] not in positions for row in rows):
+    if findings.asked or any(row.texts[0] not in positions for row in rows):
         return rows
     artefacts = np.array([design.positions.artefact[positions[row.texts[0]]] for row in rows])
     matched = list(rows)
@@ -290,8 +290,8 @@ def _matched_balls(
         if 2 * sum(name not in names_known for name in used) <= len(used):
             continue
         turned_freely = places is None
-        names = _by_number(of_own, used, balls, design, turned_freely, known_matches) or _by_place(
-            of_own, used, balls, design, places, known_matches
+        names = _by_number(of_own, used, balls, design, turned_freely, findings) or _by_place(
+            of_own, used, balls, design, places, findings
         )
         for i, row in zip(members, _renamed(of_own, 1, names), strict=True):
             matched[i] = row
@@ -322,7 +322,7 @@ def _by_number(
     balls: Integers,
     design: Design,
     turned_freely: bool,
-    known_matches: Names,
+    findings: Names,
 ) -> dict[str, str]:
     """Match balls by number in reading order, if the readings then fit the artefact as planned or
     in another orientation.
@@ -349,8 +349,8 @@ def _by_number(
             rotations.append(rotation)
     names = {name: design.balls.names[order[k]] for name, k in numbers.items()}
     if turned_freely:
-        _doubt_numbers(design.balls.places[balls], rotations, limit, names, known_matches)
-    known_matches.told.append(f"balls matched by number in reading order: {_pairs(names)}")
+        _doubt_numbers(design.balls.places[balls], rotations, limit, names, findings)
+    findings.told.append(f"balls matched by number in reading order: {_pairs(names)}")
     return names
 
 
@@ -359,7 +359,7 @@ def _doubt_numbers(
     rotations: Sequence[Array],
     limit: float,
     names: Mapping[str, str],
-    known_matches: Names,
+    findings: Names,
 ) -> None:
     """Ask about numbers of balls at `places` that part co-ordinates, with `rotations` against the
     artefact's axes, contradict, and doubt them if these do not decide.
@@ -375,13 +375,13 @@ def _doubt_numbers(
     pairs = _pairs(names)
     for rotation in rotations:
         if any(float(np.abs(rotation - turn).max()) <= AS_PLANNED for turn in turns):
-            known_matches.asked.append(
+            findings.asked.append(
                 f"the numbers of balls ({pairs}, in reading order) and the places that they have"
                 " along the part's axes disagree, and the artefact turned onto itself looks the"
                 " same; write the names that balls have in the experiment"
             )
             return
-    known_matches.doubted.append(
+    findings.doubted.append(
         f"balls are matched by number in reading order alone ({pairs}): the artefact turned onto"
         " itself looks the same, so that part co-ordinates do not tell whether they are numbered"
         " otherwise; write the names that balls have in the experiment"
@@ -394,14 +394,14 @@ def _by_place(
     balls: Integers,
     design: Design,
     places: Callable[[Sequence[FileRow]], Array] | None,
-    known_matches: Names,
+    findings: Names,
 ) -> dict[str, str]:
     """Match balls by the nearest nominal location, if each name has a different one."""
     names_known = [design.balls.names[b] for b in balls]
     strange = listing(f'"{shorten(name)}"' for name in used if name not in names_known)
     text = f"the balls {strange} are not in the experiment, nor numbers in reading order that fit"
     if places is None or len(balls) < 2:
-        known_matches.asked.append(f"{text}; write the names that it has: {listing(names_known)}")
+        findings.asked.append(f"{text}; write the names that it has: {listing(names_known)}")
         return {}
     limit = BY_PLACE * _pitch(design.balls.places[balls])
     index = {name: k for k, name in enumerate(design.positions.names)}
@@ -413,22 +413,22 @@ def _by_place(
         for row, distance, ball in zip(rows_of_position, apart, nearest, strict=True):
             if distance > limit:
                 shown = (format_length(float(f"{amount:.3g}")) for amount in (distance, limit))
-                known_matches.asked.append(
+                findings.asked.append(
                     f'{text}; "{shorten(row.texts[1])}" in {position} is {next(shown)} from the'
                     f" nearest ball, and may be {next(shown)}; write the names that it has"
                 )
                 return {}
             if names.setdefault(row.texts[1], names_known[ball]) != names_known[ball]:
-                known_matches.asked.append(
+                findings.asked.append(
                     f'{text}; "{shorten(row.texts[1])}" is {names[row.texts[1]]} in one position'
                     f" and {names_known[ball]} in {position} by its place; write the names that it"
                     " has"
                 )
                 return {}
     if len(set(names.values())) < len(names):
-        known_matches.asked.append(f"{text}; two of them are at the same place by the plan")
+        findings.asked.append(f"{text}; two of them are at the same place by the plan")
         return {}
-    known_matches.told.append(
+    findings.told.append(
         f"balls matched by place, within {format_length(float(f'{limit:.3g}'))} of where they are"
         f" planned: {_pairs(names)}"
     )

@@ -271,7 +271,7 @@ def _functions(
 ) -> tuple[tuple[FunctionDifference, ...], str]:
     """Error functions that both maps have, or why they are not compared."""
     names = [
-        list(dict.fromkeys(p.function for p in line.model.parameters)) for line in (first, second)
+        list(dict.fromkeys(p.function for p in side.model.parameters)) for side in (first, second)
     ]
     if not all(isinstance(side.model, HasLines) for side in (first, second)):
         return (), "a model without error functions of one variable"

@@ -96,7 +96,7 @@ def largest_of_lengths(
         squares.append(apart_at(at_random) ** 2)
         p = np.broadcast_to(offset, x.shape)
         lengths = [
-            np.linalg.norm(corner[i] - corner[j], axis=1) for corner in (old(x, p), new(x, p))
+            np.linalg.norm(length[i] - length[j], axis=1) for length in (old(x, p), new(x, p))
         ]
         ends = np.concatenate([x[i], x[j]], axis=1)
         best = _best_of_parts(np.abs(lengths[1] - lengths[0]), ends > middle)

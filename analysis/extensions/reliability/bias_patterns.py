@@ -444,8 +444,8 @@ def _scales(linearised: LinearisedDesign) -> Iterator[BiasPatterns]:
     ]
     for artefact in range(len(design.artefacts.names)):
         rows_of_artefact = [
-            np.flatnonzero(design.balls.artefact[observation.balls[:, 0]] == artefact)
-            for observation in scaled
+            np.flatnonzero(design.balls.artefact[scale_observation.balls[:, 0]] == artefact)
+            for scale_observation in scaled
         ]
         of_lengths = lengths.is_known & (of_length == artefact)
         if sum(map(len, rows_of_artefact)) + len(np.unique(lengths.certificate[of_lengths])) < 2:

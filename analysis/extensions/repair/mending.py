@@ -123,9 +123,9 @@ def with_experiment(
             *extra,
         ],
         # What the pool no longer offers is left out last, so that the others keep their numbers.
-        key=lambda variant_experiment: (
-            variant_experiment.steps[0] == "pool" and len(variant_experiment.steps) < 4,
-            len(variant_experiment.steps),
+        key=lambda change: (
+            change.steps[0] == "pool" and len(change.steps) < 4,
+            len(change.steps),
         ),
     )
     new = with_text_changes(text, source, experiment.name, changes)

@@ -34,7 +34,7 @@ def offers(experiment: Experiment, is_deficient: bool = True) -> dict[ChangeKind
         makers += [(ChangeKind.CERTIFICATE, certificates), (ChangeKind.ADD_POSITION, positions)]
     makers += [(ChangeKind.ARTEFACT, more_balls), (ChangeKind.MODEL, fewer_coefficients)]
     by_kind: dict[ChangeKind, list[Change]] = {
-        kind: [] for kind, _ in sorted(makers, key=lambda change: change[0])
+        kind: [] for kind, _ in sorted(makers, key=lambda maker: maker[0])
     }
     placed = placed_only(experiment)
     for kind, maker in makers:

@@ -79,9 +79,9 @@ class PoolGap:
     def to_dict(self) -> dict[str, Any]:
         return {
             "deficiency": self.verdict.deficiency,
-            "undetermined": [str(cure) for cure in self.verdict.null],
+            "undetermined": [str(direction) for direction in self.verdict.null],
             "cures": [changes_in_words(cure) for cure in self.cures],
-            "partial_cures": [changes_in_words(cure) for cure in self.partial],
+            "partial_cures": [changes_in_words(partial_cure) for partial_cure in self.partial],
             "cures_sought": self.sought,
         }
 

@@ -88,7 +88,7 @@ class Session:
         with self._lock:
             document, answer, judged = self._document, self._answer, self._judgement
             pending = self._judge.is_busy
-            there = {file["name"] for file in answer["scene"]["positions"]} if answer else set()
+            there = {entry["name"] for entry in answer["scene"]["positions"]} if answer else set()
             return {
                 "session": self.name,
                 "revision": self.revision,

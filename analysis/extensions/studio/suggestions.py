@@ -49,7 +49,7 @@ def _repair_data(experiment: Experiment, repair: Repair) -> dict[str, Any]:
         "average": None if lengths is None else lengths.average,
         "maximum": None if lengths is None else lengths.maximum,
         "places": [place_data(after, place) for place in places],
-        "edits": [_edit_data(position) for position in (*repair.edits, *_expectation(experiment))],
+        "edits": [_edit_data(edit) for edit in (*repair.edits, *_expectation(experiment))],
     }
 
 

@@ -53,7 +53,7 @@ class ReindexingSettings(InfluenceSettings):
             ("position", "probe"),
             turned,
             or_unknown(self.standard_uncertainty),
-            lambda position: f"re-indexing of {position['probe']} in {position['position']}",
+            lambda labels: f"re-indexing of {labels['probe']} in {labels['labels']}",
             "re-indexing",
             of_tips=True,
         )

@@ -281,8 +281,8 @@ class TemperaturesSettings(InfluenceSettings):
         ]
         assert self.scale_temperature is not None
         return any(
-            isinstance(position_temperatures, tuple)
-            for position_temperatures in (self.scale_temperature.value, *scales_stated)
+            isinstance(temperature, tuple)
+            for temperature in (self.scale_temperature.value, *scales_stated)
         )
 
     def _at_positions(

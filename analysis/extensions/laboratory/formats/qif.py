@@ -172,14 +172,16 @@ def read(content: bytes, file: str, unit: Fraction | None) -> Report:
         problem = f"<{shorten(root.name)}> is no document of QIF 2 or 3"
         raise refused(file, problem, line=root.mark.line, column=root.mark.column)
     problems = ReportProblems(file)
-    by_id = {result.attributes["id"]: result for result in root.walk() if "id" in result.attributes}
+    by_id = {
+        element.attributes["id"]: element for element in root.walk() if "id" in element.attributes
+    }
     document = _Document(root, problems, by_id, _units(root, problems, unit))
     sets = [*root.all("Results"), *root.all("MeasurementsResults")]
     results = [
-        result
+        element
         for set_element in sets
-        for result in set_element.walk()
-        if result.name == "MeasurementResults"
+        for element in set_element.walk()
+        if element.name == "MeasurementResults"
     ]
     features = tuple(feature for result in results for feature in _features(document, result))
     if not results:
