@@ -124,15 +124,6 @@ def sweep_report(
     <BLANKLINE>
     ## Standard uncertainties
     """
-    from contextlib import closing
-
-    from ballplate.presentation import FORMATS
-
-    from .report.results import read_results
-    from .report.sweep_page import sweep_page
-    from .report.tables import report_tables
-    from .store import open_store
-
     ensure_path("store", store)
     ensure_whole(1, sweep=sweep)
     ensure_one_of(FORMS, form=form)
@@ -143,8 +134,19 @@ def sweep_report(
     ensure_type(bool, "True or False", run_modules=run_modules)
     ensure_report(report)
     if form == "html":
+        # Tables need neither pages nor their libraries.
+        from .report.sweep_page import sweep_page
+
         reference = None if compare is None else Path(compare)
         return sweep_page(Path(store), sweep, run_modules, reference, report)
+    from contextlib import closing
+
+    from ballplate.presentation import FORMATS
+
+    from .report.results import read_results
+    from .report.tables import report_tables
+    from .store import open_store
+
     with closing(open_store(Path(store))) as opened:
         results = read_results(opened, sweep)
         return FORMATS[form](results.title, report_tables(results))

@@ -332,3 +332,10 @@ def test_python_writes_the_page_of_a_sweep(
     assert beside.sentences[1:] == (wording.ALL_AVERAGES_ARE_THE_SAME,)
     with pytest.raises(ValueError, match=wording.COMPARE_APPLIES_TO_PAGES):
         bp.sweep_report(plate_sizes, form="text", compare=plate_sizes)
+
+
+def test_tables_need_no_page(plate_sizes: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "ballplate.extensions.sweeps.report.sweep_page", None)
+    assert bp.sweep_report(plate_sizes, form="markdown").startswith("# ")
+    with pytest.raises(ImportError):
+        bp.sweep_report(plate_sizes)
