@@ -53,7 +53,7 @@ class ReindexingSettings(InfluenceSettings):
             ("position", "probe"),
             turned,
             or_unknown(self.standard_uncertainty),
-            lambda labels: f"re-indexing of {labels['probe']} in {labels['labels']}",
+            lambda labels: f"re-indexing of {labels['probe']} in {labels['position']}",
             "re-indexing",
             of_tips=True,
         )
