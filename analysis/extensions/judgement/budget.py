@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from itertools import chain
 from typing import Any
 
 import numpy as np
@@ -21,7 +22,7 @@ from ballplate.simulator.estimation import (
 )
 from ballplate.simulator.experiment import Experiment, lay_out
 from ballplate.simulator.machines import Array, Integers
-from ballplate.uncertainty import evaluation_points, expansion, task_distances
+from ballplate.uncertainty import QUANTITIES, expansion, functions_of
 
 from .source_sums import SourceSums, source_sums, sources_of
 
@@ -227,20 +228,33 @@ def _largest_first(
 def _figures(
     linearisation: Linearisation, sums: SourceSums, sigma: float
 ) -> Iterator[BudgetFigure]:
-    design, places = linearisation.design, evaluation_points(linearisation.design)
-    every = [linear_functions(linearisation, Coordinates(places))]
-    words = "error function at the evaluation points, root mean square of its co-ordinates"
-    yield _mean_square("U4", words, linearisation, sums, every, sigma)
-    count = len(places.points)
-    some = np.unique(np.linspace(0, count - 1, min(count, MOST_PLACES)).round().astype(int))
-    if len(some) > 1:
-        chosen = MeasuredPoints(places.points[some], places.probes[some])
-        words = "distances between corrected points, root mean square"
-        if len(some) < count:
-            words += f"; between {len(some)} of the {count} evaluation points"
-        yield _mean_square(
-            "U6", words, linearisation, sums, _distances(linearisation, chosen), sigma
-        )
+    """Yield the diagonals and all quantities of points of the volume.
+
+    Uncertainties of balls and of single parameters are not split by source.
+    """
+    design = linearisation.design
+    for symbol, kind in QUANTITIES.items():
+        groups = functions_of(symbol, design, linearisation.layout)
+        functions = [group for group in groups if isinstance(group, Coordinates | Distances)]
+        places = functions[0].places if functions else None
+        if not isinstance(places, MeasuredPoints):
+            continue
+        if isinstance(functions[0], Coordinates):
+            of_points: Iterable[LinearFunctions] = [linear_functions(linearisation, functions[0])]
+            words = f"{kind.description}, root mean square of its co-ordinates"
+        elif functions[0].names:
+            prefix = "" if symbol == "tasks" else f"{symbol} "
+            words = f"{kind.description}:"
+            yield from _each(prefix, words, linearisation, sums, functions[0], sigma)
+            continue
+        else:
+            of_points = chain.from_iterable(
+                _distances(linearisation, _some(group.places)) for group in functions
+            )
+            words = f"{kind.description}, root mean square"
+            if len(places.points) > MOST_PLACES:
+                words += f"; between {MOST_PLACES} of the {len(places.points)} evaluation points"
+        yield _mean_square(symbol, words, linearisation, sums, of_points, sigma)
     starts, ends = design.machine.volume.diagonals
     names = tuple(f"diagonal {k + 1}" for k in range(len(starts)))
     points = np.stack([starts, ends], axis=1).reshape(-1, design.dimension)
@@ -248,17 +262,14 @@ def _figures(
     pairs = np.arange(len(points)).reshape(-1, 2)
     diagonals = Distances(MeasuredPoints(points, probes), pairs, names)
     words = "length of the body diagonal" if design.dimension == 3 else "length of the diagonal"
-    tasks = [(task_distances(design), "length of the measuring task")] if design.tasks.names else []
-    for distances, description in [(diagonals, words), *tasks]:
-        descriptions = [f"{description} {_ends(distances, k)}" for k in range(len(distances.names))]
-        yield from _each(
-            distances.names,
-            descriptions,
-            linearisation,
-            sums,
-            linear_functions(linearisation, distances),
-            sigma,
-        )
+    yield from _each("", words, linearisation, sums, diagonals, sigma)
+
+
+def _some(places: Any) -> MeasuredPoints:
+    """Return evenly chosen places, at most `MOST_PLACES`."""
+    count = len(places.points)
+    chosen = np.unique(np.linspace(0, count - 1, min(count, MOST_PLACES)).round().astype(int))
+    return MeasuredPoints(places.points[chosen], places.probes[chosen])
 
 
 def _ends(distances: Distances, k: int) -> str:
@@ -325,19 +336,21 @@ def _mean_square(
 
 
 def _each(
-    names: Sequence[str],
-    descriptions: Sequence[str],
+    prefix: str,
+    words: str,
     linearisation: Linearisation,
     sums: SourceSums,
-    functions: LinearFunctions,
+    distances: Distances,
     sigma: float,
 ) -> Iterator[BudgetFigure]:
-    """Return the uncertainties of single functions."""
+    """Yield the uncertainties of single distances."""
+    functions = linear_functions(linearisation, distances)
     values = linearisation.uncertainty(functions)
     shares = sums.variances(functions.shared @ linearisation.shared)
     shares[:, np.isnan(values)] = np.nan
     contributions = sigma * np.sqrt(np.maximum(shares, 0.0)).T
-    for name, words, value, parts in zip(
-        names, descriptions, (sigma * values).tolist(), contributions.tolist(), strict=True
+    for k, (value, parts) in enumerate(
+        zip((sigma * values).tolist(), contributions.tolist(), strict=True)
     ):
-        yield BudgetFigure(name, words, value, tuple(parts), 1, int(np.isnan(value)))
+        name, description = prefix + distances.names[k], f"{words} {_ends(distances, k)}"
+        yield BudgetFigure(name, description, value, tuple(parts), 1, int(np.isnan(value)))

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import csv
 import io
+import re
 import shutil
 from pathlib import Path
 from typing import Any
@@ -63,7 +64,7 @@ print(json.dumps({
     "chosen": chosen.read_text(),
     "run chosen": json_of("run", chosen),
     "compare": said("compare", laser, "--trials", "2"),
-    "budget": said("run", laser, "--budget"),
+    "budget": json_of("run", laser, "--budget"),
     "reliability": said("run", laser, "--reliability"),
     "trials": bp.run(laser, trials=512).to_dict()["monte_carlo"]["quantities"],
     "schema": json.loads(said("schema")[1]),
@@ -158,9 +159,25 @@ def test_a_plan_chooses_a_laser_length_and_writes_it(told: dict[str, Any]) -> No
 def test_other_commands_name_it(told: dict[str, Any]) -> None:
     assert told["check"][0] == 0 and "certificates of the machine" in told["check"][1]
     assert told["compare"][0] == 0
-    assert "laser of the machine" in told["budget"][1], told["budget"]
     assert told["reliability"][0] == 0 and "laser length" in told["reliability"][1]
     assert told["studio"] == ["our_laboratory"] and told["section"] == ["cellar", 8.0]
+
+
+def test_the_budget_has_its_source_and_its_quantity(told: dict[str, Any]) -> None:
+    figures = {figure.pop("figure"): figure for figure in told["budget"]["figures"]}
+    sources = {part["source"] for part in figures["U6"]["contributions"]}
+    assert any("laser of the machine" in source for source in sources), sources
+    # The quantity and the budget itself take the same corners, in another order.
+    parts: dict[frozenset[str], list[list[float]]] = {}
+    for name, figure in figures.items():
+        if "diagonal" in name:
+            ends = frozenset(re.findall(r"\(.*?\)", figure["description"]))
+            shares = [part["standard_uncertainty"] for part in figure["contributions"]]
+            parts.setdefault(ends, []).append(shares)
+    assert len(parts) == 4
+    for of_quantity, of_budget in parts.values():
+        assert len(of_quantity) > 1
+        assert of_quantity == pytest.approx(of_budget, rel=1e-9, abs=1e-15)
 
 
 def test_the_schema_has_kinds_and_keys(told: dict[str, Any]) -> None:
