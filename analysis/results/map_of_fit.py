@@ -115,7 +115,7 @@ def map_of(fit: MappedFit, date: str | None = None) -> FittedMap:
         degrees_of_freedom=fit.degrees_of_freedom,
         repeatability=design.machine.repeatability,
         coverage_factor=COVERAGE_FACTOR if factor is None else experiment.coverage_factor,
-        frame=FRAMES[experiment.error_model.kind],
+        frame=FRAMES.get(experiment.error_model.kind, ""),
         temperatures=_temperatures(fit.observed, experiment),
         left_out=tuple(
             _left_out(estimate) for estimate in fit.estimates if estimate.kind == "influence"

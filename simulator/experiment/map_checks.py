@@ -32,6 +32,7 @@ from .machine_file import load_machine
 from .map_content import AXES, checksum_of, corner_corrections
 from .map_sections import MapSettings
 from .model_files import absolute, fingerprints
+from .own_sections import check_installed
 
 # Eigenvalues of a matrix of correlations that are no less than this times their number below zero
 # are so by rounding.
@@ -58,6 +59,11 @@ def map_of_tree(
         problems.add((), text)
         return None
     problems.add_empty()
+    # Before the kind of the error model, which is unknown without its extension.
+    stated = root.items.get("extensions")
+    check_installed(() if stated is None else to_python(stated), problems)
+    if problems.messages:
+        return None
     settings = validated(MapSettings, root, problems)
     if settings is None:
         return None

@@ -12,8 +12,10 @@ import numpy as np
 
 from ..design.objects import Volume
 from ..geometry.grids import even_grid
+from ..inputs.extensions import provider
 from ..inputs.yamltree import to_list
 from ..machines.protocol import Array, ErrorModel
+from ..machines.settings import KINDS
 from ..maps.fitted_map import FittedMap, MapData
 from .model_files import fingerprints, relative
 
@@ -31,6 +33,7 @@ def head_of(fitted: FittedMap, folder: Path) -> dict[str, Any]:
         "experiment": fitted.experiment,
         "date": fitted.date,
         "program": fitted.program,
+        "extensions": _needed(fitted.settings["kind"]),
         "error_model": to_list(relative(fitted.settings, folder)),
         "files": fingerprints(fitted.settings),
         "volume": {
@@ -64,6 +67,12 @@ def head_of(fitted: FittedMap, folder: Path) -> dict[str, Any]:
     head = {key: value for key, value in head.items() if value not in (None, {}, [], "")}
     head["checksum"] = checksum_of(head, fitted.covariance, fitted.undetermined)
     return head
+
+
+def _needed(kind: str) -> list[str]:
+    """Return the extension that has a kind of error model, unless the kernel has it."""
+    extension = None if kind in KINDS else provider("error_models", kind)
+    return [] if extension is None else [extension.name]
 
 
 def _data(map_data: MapData) -> dict[str, Any]:

@@ -103,6 +103,9 @@ class MapSettings(Settings):
     experiment: str = Field("", description="name of the experiment's file and variant")
     date: Day | None = Field(None, description="day of the campaign, such as 2026-11-22")
     program: str = Field("", description="program that wrote the file")
+    extensions: tuple[Text, ...] = Field(
+        (), description="names of extensions that the error model needs besides those shipped"
+    )
     error_model: ErrorModelSettings = Field(  # type: ignore[valid-type]
         description="error model, as in an experiment file"
     )

@@ -6,6 +6,7 @@ from typing import Any
 
 from ..design.lookup import References
 from ..inputs.extensions import is_installed, module_with, owner, registered
+from ..inputs.problems import Problems
 from .structure import KEYS, Sections
 
 
@@ -13,12 +14,7 @@ def resolve_own_sections(sections: Sections, references: References) -> dict[str
     """Return the entries under keys that extensions provide, converted by their `read` if they
     have one; faults go to the problems.
     """
-    for i, name in enumerate(sections.get("extensions") or ()):
-        if not is_installed(name):
-            text = f'the extension "{name}", which this file needs, is not installed; install it'
-            # One that is installed and cannot be loaded has no name.
-            text = "; ".join((text, *registered().complaints))
-            references.problems.add(("extensions", i), text)
+    check_installed(sections.get("extensions"), references.problems)
     resolved = {}
     for steps, settings in sections.values.items():
         key = str(steps[0])
@@ -26,6 +22,15 @@ def resolve_own_sections(sections: Sections, references: References) -> dict[str
             reader = getattr(module_with("sections", key), "read", None)
             resolved[key] = settings if reader is None else reader(settings, (key,), references)
     return resolved
+
+
+def check_installed(names: Any, problems: Problems) -> None:
+    """Add a problem for each of the extensions under the key `extensions` that is missing."""
+    for i, name in enumerate(names or ()):
+        if not is_installed(name):
+            text = f'the extension "{name}", which this file needs, is not installed; install it'
+            # One that is installed and cannot be loaded has no name.
+            problems.add(("extensions", i), "; ".join((text, *registered().complaints)))
 
 
 def needed_extensions(sections: Sections) -> tuple[str, ...]:

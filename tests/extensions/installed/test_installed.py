@@ -35,6 +35,7 @@ OFFERED = {
 PLACES = {"planes": ["z"], "levels": ["400 mm"], "corners": {"x": ["50 mm"], "y": ["50 mm"]}}
 
 SCRIPT = """
+import yaml
 from ballplate.extensions.studio.document import experiment_of, opened
 
 laser, gauge, pool = folder / "laser.yaml", folder / "step-gauge.yaml", folder / "pool.yaml"
@@ -51,6 +52,9 @@ wide = bp.load(laser).with_(true_machine={
     "kind": "coefficients", "error_model": {"kind": "stretched"}, "values": {"scale": "50 ppm"},
 })
 exact, drawn = bp.simulate(wide, exact=True), folder / "drawn.csv"
+sides = yaml.safe_load(laser.read_text())["calibration"][:1]
+stretched = wide.with_(error_model={"kind": "stretched"}, calibration=sides)
+bp.write_map(bp.fit(stretched, exact).to_map(), folder / "stretched-map.yaml")
 experiment = bp.load(laser)
 print(json.dumps({
     "check": said("check", laser),
@@ -104,7 +108,13 @@ def files(folder: Path) -> Path:
 def told(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
     """What commands say where the extension is installed."""
     installed = install(tmp_path_factory.mktemp("installed"))
-    return said_with(installed, SCRIPT, files(tmp_path_factory.mktemp("work")))
+    folder = files(tmp_path_factory.mktemp("work"))
+    without = """print(json.dumps({"map": said("map", folder / "stretched-map.yaml")}))"""
+    return {
+        **said_with(installed, SCRIPT, folder),
+        "map": yaml.safe_load((folder / "stretched-map.yaml").read_text(encoding="utf-8")),
+        "map without": said_with(None, without, folder)["map"],
+    }
 
 
 def test_laser_lengths_count_as_in_a_dense_computation(told: dict[str, Any]) -> None:
@@ -178,6 +188,14 @@ def test_the_budget_has_its_source_and_its_quantity(told: dict[str, Any]) -> Non
     for of_quantity, of_budget in parts.values():
         assert len(of_quantity) > 1
         assert of_quantity == pytest.approx(of_budget, rel=1e-9, abs=1e-15)
+
+
+def test_a_map_names_the_extension_that_its_error_model_needs(told: dict[str, Any]) -> None:
+    assert told["map"]["extensions"] == ["our_laboratory"]
+    assert told["map"]["parameters"][0]["value"] == pytest.approx(50e-6, rel=1e-9)
+    status, _, err = told["map without"]
+    assert status == 3 and "extensions[0]" in err and "our_laboratory" in err, err
+    assert "stretched" not in err, err
 
 
 def test_the_schema_has_kinds_and_keys(told: dict[str, Any]) -> None:
