@@ -472,8 +472,8 @@ if TYPE_CHECKING:
     from .excerpts import print_errors
     from .notes import complain, note, warn
     from .outputs import (
-        PAGE,
         PARQUET,
+        PICTURE,
         Needed,
         Output,
         OutputAction,

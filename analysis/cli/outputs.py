@@ -78,7 +78,6 @@ class Needed:
 
 
 PICTURE = Needed("pictures need", ("matplotlib",), "report")
-PAGE = Needed("a page needs", ("jinja2", "matplotlib"), "report")
 PARQUET = Needed("Parquet needs", ("pyarrow",), "parquet")
 
 
@@ -327,7 +326,7 @@ def _cannot(error: BaseException | None) -> str:
     """That a file cannot be written, why, and what to do."""
     if isinstance(error, ImportError):
         missing = (error.name or "").partition(".")[0]
-        for needed in (PICTURE, PAGE, PARQUET):
+        for needed in (PICTURE, PARQUET):
             if missing in needed.modules:
                 return needed.told
         raise error

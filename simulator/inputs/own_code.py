@@ -20,7 +20,7 @@ from .unusable import UnusableError
 
 # Packages that the program uses, by their folders.
 LIBRARIES = frozenset(
-    ("distributed", "filelock", "jinja2", "joblib", "matplotlib", "numpy", "pandas", "pyarrow")
+    ("distributed", "filelock", "joblib", "matplotlib", "numpy", "pandas", "pyarrow")
     + ("pydantic", "pydantic_core", "scipy", "threadpoolctl", "tqdm", "yaml", "dask", "tornado")
 )
 # The real exit, restored after user code has run.

@@ -64,7 +64,6 @@ def test_without_extras_a_command_works_or_its_page_names_the_extra(
 ) -> None:
     for package in (
         "distributed",
-        "jinja2",
         "matplotlib",
         "pyarrow",
         "shtab",

@@ -10,7 +10,7 @@ from typing import Any
 from ballplate.simulator.estimation import Linearisation
 
 from .design_views import ball_views, motion_view, point_view, volume_view
-from .document import Page, PageSection, facts_list, origin, written
+from .document import Page, PageSection, facts_list, introduction, shipped, written
 from .elements import Html, element, folded, joined, note, sentence, table
 from .length_sections import lengths_section
 from .motions import Motion
@@ -85,8 +85,8 @@ def design_page(contents: DesignContents) -> str:
         PageSection("sheet", "Run sheet", _sheet(quoted["sheet"])),
     ]
     verdict = _verdict(run, contents.target, quoted["lengths"])
-    made = origin(contents.file)
-    return written(Page(contents.title, made, verdict, _is_good(run), sections, FOOT))
+    top = introduction(verdict, _is_good(run), contents.file)
+    return written(Page(contents.title, top, sections, FOOT, shipped("view.js")))
 
 
 def _experiment(contents: DesignContents) -> Html:

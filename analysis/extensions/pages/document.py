@@ -11,7 +11,7 @@ from functools import cache
 from importlib import resources
 from importlib.metadata import version
 
-from .elements import Html, element, joined
+from .elements import Html, element, joined, note
 
 
 @dataclass(frozen=True)
@@ -25,16 +25,13 @@ class PageSection:
 
 @dataclass(frozen=True)
 class Page:
-    """A page: its title, its source and date, the verdict in few words, a flag for a good one, and
-    sections.
-    """
+    """A page: its title, the introduction below it, sections, foot, and script, if any."""
 
     title: str
-    origin: Html
-    verdict: Html
-    is_good: bool
+    introduction: Html
     sections: Sequence[PageSection]
     foot: str
+    script: str = ""
 
 
 @cache
@@ -43,23 +40,16 @@ def shipped(name: str) -> str:
     return resources.files(__package__).joinpath(name).read_text(encoding="utf-8")
 
 
-def style() -> Html:
-    """The style of pages."""
-    return Html(f"<style>\n{shipped('marks.css')}{shipped('page.css')}</style>")
-
-
 def written(page: Page) -> str:
     """The page as a file that needs no other and asks no network for anything."""
     sections = [section for section in page.sections if section.body]
     links = joined(
         element("li", element("a", section.title, href=f"#{section.name}")) for section in sections
     )
-    kind = "verdict" if page.is_good else "verdict bad"
     top = element(
         "header",
         element("h1", page.title),
-        element("p", *page.origin, class_="note"),
-        element("div", page.verdict, class_=kind),
+        page.introduction,
         element("nav", element("ul", links), aria_label="Sections"),
     )
     body = joined(
@@ -71,26 +61,26 @@ def written(page: Page) -> str:
         )
         for section in sections
     )
-    script = shipped("view.js")
     parts = [
         element("a", "Skip to the results", class_="skip", href="#main"),
         top,
         element("main", body, id="main"),
         element("footer", element("p", page.foot)),
         # A script that a person wrote would have another sum, and is not run.
-        Html(f"<script>{script}</script>"),
+        Html(f"<script>{page.script}</script>" if page.script else ""),
     ]
     return (
-        f'<!DOCTYPE html>\n<html lang="en">\n{head(page.title, script)}\n'
+        f'<!DOCTYPE html>\n<html lang="en">\n{head(page.title, page.script)}\n'
         f"{element('body', *parts)}\n</html>\n"
     )
 
 
 def head(title: str, script: str) -> Html:
-    """The head of a page that runs this script, and no other."""
-    digest = base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
-    policy = "default-src 'none'; style-src 'unsafe-inline'; img-src data:;"
-    policy += f" script-src 'sha256-{digest}'"
+    """The head of a page that runs this script, if any, and no other."""
+    policy = "default-src 'none'; style-src 'unsafe-inline'; img-src data:"
+    if script:
+        digest = base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
+        policy += f"; script-src 'sha256-{digest}'"
     return element(
         "head",
         element("meta", charset="utf-8"),
@@ -98,14 +88,16 @@ def head(title: str, script: str) -> Html:
         Html(f'<meta http-equiv="Content-Security-Policy" content="{policy}">'),
         element("link", rel="icon", href="data:,"),
         element("title", title),
-        style(),
+        Html(f"<style>\n{shipped('marks.css')}{shipped('page.css')}</style>"),
     )
 
 
-def origin(*files: str) -> Html:
-    """Return source, date and version of a page."""
+def introduction(verdict: Html, is_good: bool, *files: str) -> Html:
+    """Return source files, date and version of a page, and its verdict."""
     moment = f"{datetime.now(UTC):%Y-%m-%d %H:%M} UTC"
-    return joined([*filter(None, files), moment, f"ballplate {version('ballplate')}"], " · ")
+    origin = joined([*filter(None, files), moment, f"ballplate {version('ballplate')}"], " · ")
+    kind = "verdict" if is_good else "verdict bad"
+    return joined([note(origin), element("div", verdict, class_=kind)])
 
 
 def facts_list(facts: Sequence[tuple[str, str]]) -> Html:

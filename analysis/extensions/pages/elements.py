@@ -92,17 +92,17 @@ def table(
         )
         for row in rows
     )
-    inner = element(
-        "table",
-        element("caption", caption, id=f"table-{name}"),
-        element("thead", element("tr", head), class_="tall"),
-        element("tbody", body),
-        class_="tight",
-    )
     kind = "scroll high" if is_long else "scroll"
-    return element(
-        "div", inner, class_=kind, role="region", tabindex="0", aria_labelledby=f"table-{name}"
-    )
+    parts = element("thead", element("tr", head), class_="tall"), element("tbody", body)
+    return scrolling(f"table-{name}", caption, *parts, kind=kind, class_="tight")
+
+
+def scrolling(
+    name: str, caption: str, *parts: str, kind: str = "scroll", class_: str | None = None
+) -> Html:
+    """Return a table that scrolls where it is wide; `name` is the id of its caption."""
+    inner = element("table", element("caption", caption, id=name), *parts, class_=class_)
+    return element("div", inner, class_=kind, role="region", tabindex="0", aria_labelledby=name)
 
 
 def _width(content: str) -> str:
@@ -111,6 +111,7 @@ def _width(content: str) -> str:
     return "long" if shown > 40 else "some" if shown > 16 else ""
 
 
-def folded(summary: str, *content: str, is_open: bool = False) -> Html:
-    """Return content shown on demand, and in print."""
-    return element("details", element("summary", summary), *content, open=is_open)
+def folded(summary: str, *content: str, is_open: bool = False, is_lengthy: bool = False) -> Html:
+    """Return content shown on demand and, unless it `is_lengthy`, in print."""
+    kind = "lengthy" if is_lengthy else None
+    return element("details", element("summary", summary), *content, open=is_open, class_=kind)

@@ -10,7 +10,7 @@ import numpy as np
 from ballplate.simulator.machines import Array, Integers
 
 from .curve_sections import curves_section
-from .document import Page, PageSection, facts_list, origin, written
+from .document import Page, PageSection, facts_list, introduction, shipped, written
 from .elements import Html, element, joined, note, sentence, table
 from .quoted import QuotedData
 from .residual_sections import (
@@ -84,8 +84,8 @@ def fit_page(contents: FitContents) -> str:
     if has_result:
         sections = [*_results(fit, contents), *sections]
     is_good = has_result and _is_good(contents.data)
-    made = origin(*contents.files)
-    return written(Page(contents.title, made, _verdict(fit, contents), is_good, sections, FOOT))
+    top = introduction(_verdict(fit, contents), is_good, *contents.files)
+    return written(Page(contents.title, top, sections, FOOT, shipped("view.js")))
 
 
 def _results(fit: QuotedData, contents: FitContents) -> list[PageSection]:

@@ -8,7 +8,7 @@ from contextlib import closing
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ballplate.cli import PAGE, UsageError, add_force, add_output, complain, write
+from ballplate.cli import PICTURE, UsageError, add_force, add_output, complain, write
 
 from .export_command import add_store, warn_of_damage, warn_of_other_methods
 from .interface import FORMS
@@ -80,8 +80,8 @@ def run(options: Namespace) -> int:
         endings = ", ".join(SUFFIXES)
         raise UsageError(f"{output} should end in one of {endings}; or state --format")
     form = options.format or SUFFIXES.get(suffix, "html")
-    if form == "html" and PAGE.is_missing:
-        complain(f"ballplate sweep --report: {PAGE.told}")
+    if form == "html" and PICTURE.is_missing:
+        complain(f"ballplate sweep --report: {PICTURE.told}")
         return BAD_FILE
     if options.compare is not None and form != "html":
         raise UsageError("--compare is for the page; leave it out, or name a page with -o")

@@ -262,6 +262,12 @@ def test_commands_write_pages(tmp_path: Path, capsys: pytest.CaptureFixture[str]
         main(["run", path, "--report", "a.pdf"])
 
 
+def test_names_of_files_are_escaped_once(tmp_path: Path) -> None:
+    path = tmp_path / "a&b.yaml"
+    path.write_bytes(Path("designs/certified/two-dimensions.yaml").read_bytes())
+    assert '<p class="note">a&amp;b.yaml · ' in bp.page(path)
+
+
 def test_what_has_no_page_is_refused(tmp_path: Path) -> None:
     prediction = bp.run(small())
     with pytest.raises(ValueError, match="predict it anew"):

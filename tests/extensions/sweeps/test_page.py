@@ -310,7 +310,7 @@ def test_missing_packages_are_named(
     capsys: pytest.CaptureFixture[str],
     tmp_path: Path,
 ) -> None:
-    monkeypatch.setitem(sys.modules, "jinja2", None)
+    monkeypatch.setitem(sys.modules, "matplotlib", None)
     assert main(["sweep", "--report", str(plate_sizes), "-o", str(tmp_path / "a.html")]) == 3
     assert "python -m pip install 'ballplate[report]'" in capsys.readouterr().err
     assert main(["sweep", "--report", str(plate_sizes), "--format", "markdown"]) == 0

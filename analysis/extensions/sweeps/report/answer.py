@@ -34,7 +34,7 @@ class SweepAnswer:
 
     symbol: str
     sentences: tuple[str, ...]
-    settings: Table | None
+    settings: Table
     worth: tuple[AxisWorth, ...]
     is_good: bool
 

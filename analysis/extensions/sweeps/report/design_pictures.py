@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import io
 import re
-from html import escape
 from typing import TYPE_CHECKING
 
 import numpy as np
+from ballplate.extensions.pages.elements import Html, element
 from ballplate.presentation import (
     INK,
     MUTED,
@@ -45,7 +45,7 @@ LIGHT = ("#f6f9fc", "#79a4cb")
 DARK = "#101010"
 
 
-def as_svg(figure: Figure, name: str, words: str) -> str:
+def as_svg(figure: Figure, name: str, words: str) -> Html:
     """Return the figure as an element of a page, with `name` before its ids, and an accessible
     text.
     """
@@ -60,7 +60,7 @@ def as_svg(figure: Figure, name: str, words: str) -> str:
     body = body[body.index("<svg") :]
     size = re.search(r'viewBox="0 0 ([\d.]+) ([\d.]+)"', body)
     assert size is not None
-    inner = body[body.index(">") + 1 :]
+    inner = body[body.index(">") + 1 : body.rindex("</svg>")]
     inner = re.sub(r"<metadata>.*?</metadata>", "", inner, flags=re.DOTALL)
     inner = re.sub(r"<!--.*?-->\s*", "", inner, flags=re.DOTALL)
     # A style inside would apply to the whole page.
@@ -76,20 +76,17 @@ def as_svg(figure: Figure, name: str, words: str) -> str:
         inner = inner.replace(colour, f"var({variable})")
     inner = re.sub(r"font: ([\d.]+)px [^;\"]*", r"font: \1px sans-serif", inner)
     inner = re.sub(r"\n\s*", "\n", inner)
-    start = (
-        f'<svg viewBox="0 0 {size[1]} {size[2]}" role="img"'
-        f' aria-label="{escape(words, quote=True)}">'
-    )
-    return start + inner.strip()
+    box = f"0 0 {size[1]} {size[2]}"
+    return element("svg", Html(inner.strip()), viewBox=box, role="img", aria_label=words)
 
 
-def scene_svg(drawn: Scene, name: str, words: str) -> str:
+def scene_svg(drawn: Scene, name: str, words: str) -> Html:
     """Return the volume with its positions."""
     with scene_figure(drawn) as figure:
         return as_svg(figure, name, words)
 
 
-def probes_svg(drawn: Scene, name: str, words: str) -> str:
+def probes_svg(drawn: Scene, name: str, words: str) -> Html:
     """Return the tips about the reference point, enlarged."""
     with drawing(200.0) as figure:
         axes = blank_axes(figure)
@@ -125,7 +122,7 @@ def probes_svg(drawn: Scene, name: str, words: str) -> str:
         return as_svg(figure, name, words)
 
 
-def slice_svg(drawn: ErrorMap, drawn_slice: Slice, name: str, words: str) -> str:
+def slice_svg(drawn: ErrorMap, drawn_slice: Slice, name: str, words: str) -> Html:
     """Return a level of the error map: shades with common limits in all levels, and contour
     lines.
     """

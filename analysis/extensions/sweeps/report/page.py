@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-import re
 from collections import Counter
-from dataclasses import dataclass
-from importlib import resources
 from itertools import groupby
 from pathlib import PurePosixPath
-from typing import Any
 
 import numpy as np
-from ballplate.extensions.pages.document import style
+from ballplate.extensions.pages.charts import figure, figures
+from ballplate.extensions.pages.document import Page, PageSection, facts_list, written
+from ballplate.extensions.pages.elements import Html, element, folded, joined, note, sentence
 from ballplate.presentation import (
     MOST_BALLS,
     Block,
@@ -27,7 +25,7 @@ from ballplate.presentation import (
 )
 from ballplate.simulator.computing import Report, counted, unreported
 from ballplate.simulator.experiment import Experiment, lay_out
-from ballplate.simulator.inputs import in_one_line, listing
+from ballplate.simulator.inputs import listing
 from ballplate.uncertainty import DESCRIPTIONS
 
 from ..error_map_uncertainty import error_map
@@ -37,46 +35,25 @@ from .answer import answer
 from .cells import NoExperimentError, experiments
 from .design_pictures import probes_svg, scene_svg, slice_svg, slice_words
 from .heatmaps import heat_maps
+from .page_elements import groups_element, heat_element, table_element
 from .plots import plot_svg
 from .results import ReportedSweep, best_and_worst, cell_list, criterion
-from .series import Plot, plots
+from .series import plots
 from .store_comparison import StoreComparison
 from .tables import report_tables
 from .verdicts import failures, flags, ranks, weak
 
-# Values of an axis in the list of facts.
-LISTED = 12
+# Limits: values of an axis in the list of facts, positions that are shown unfolded.
+LISTED, MOST_POSITIONS = 12, 8
 
 # Temporary sweep file of the studio.
 MADE_IN_STUDIO = ".ballplate-sweep.yaml"
 
-
-@dataclass(frozen=True)
-class Drawing:
-    """A picture with its caption."""
-
-    svg: str
-    caption: str
-
-
-@dataclass(frozen=True)
-class DrawnDesign:
-    """A cell's design: the picture, its probes, and the positions as a table."""
-
-    cell: int
-    heading: str
-    scene: str
-    probes: str
-    caption: str
-    positions: Table
-
-
-@dataclass(frozen=True)
-class DrawnMap:
-    """The error map's uncertainty in slices."""
-
-    words: str
-    figures: tuple[Drawing, ...]
+FOOT = (
+    "Lengths in micrometres and angles in microradians, standard uncertainties throughout. The"
+    " places of the tables have the figures at full precision, in metres and radians, as"
+    " data-value; ballplate sweep --export writes all of them."
+)
 
 
 def page(
@@ -90,54 +67,67 @@ def page(
 
     Experiments with code in Python are drawn only with `run_modules`; `report` receives progress.
 
-    :raises ImportError: jinja2 or matplotlib is not installed.
+    :raises ImportError: matplotlib is not installed.
     """
-    from jinja2 import Environment, StrictUndefined
-
-    environment = Environment(
-        autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
-    )
-    environment.filters.update(micro=micro, full=repr)
-    package = resources.files(__package__)
-    template = environment.from_string(
-        package.joinpath("template.html").read_text(encoding="utf-8")
-    )
-    drawn = plots(results)
-    context: dict[str, Any] = {
-        "title": in_one_line(results.title),
-        "summary": _summary(results),
-        "style": style(),
-        "facts": _facts(results),
-        "answer": answer(results),
-        "comparison": comparison,
-        "failures": failures(results),
-        "tables": report_tables(results),
-        "plots": _plots(drawn, (criterion(results) or ("", ""))[1], report),
-        "has_trials": any(len(line.actual) for plot in drawn for line in plot.panels[0].lines),
-        "heats": heat_maps(results),
-        "ranks": ranks(results),
-        "weak": weak(results),
-        "flags": flags(results),
-        **_designs(store, results, run_modules, report),
-    }
-    context["sections"] = _sections(context)
-    return re.sub(r"\n{2,}", "\n", template.render(context)).lstrip() + "\n"
-
-
-def _sections(context: dict[str, Any]) -> list[tuple[str, str]]:
+    along_axes = _plots(results, report)
+    designs, drawn_map = _designs(store, results, run_modules, report)
+    heats = [heat_element(heat, k) for k, heat in enumerate(heat_maps(results), start=1)]
+    tables = [folded(table.caption, table_element(table)) for table in report_tables(results)]
     sections = [
-        ("answer", "Answer", context["answer"]),
-        ("comparison", "Compared with another sweep", context["comparison"]),
-        ("swept", "What was swept", True),
-        ("plots", "Along the axes", context["plots"]),
-        ("heat", "Over two axes", context["heats"]),
-        ("uncertainties", "Uncertainties", context["tables"]),
-        ("failed", "Failed cells", context["failures"].shown),
-        ("rank", "What the readings determine", context["ranks"].shown),
-        ("designs", "Designs", context["designs"] or context["no_designs"]),
-        ("error-map", "The error map's uncertainty", context["error_map"]),
+        PageSection("answer", "Answer", _answer(results)),
+        PageSection("comparison", "Compared with another sweep", _comparison(comparison)),
+        PageSection("swept", "What was swept", facts_list(_facts(results))),
+        PageSection("plots", "Along the axes", along_axes),
+        PageSection("heat", "Over two axes", joined(heats)),
+        PageSection("uncertainties", "Uncertainties", joined(tables)),
+        PageSection("failed", "Failed cells", groups_element(failures(results))),
+        PageSection("rank", "What the readings determine", _ranks(results)),
+        PageSection("designs", "Designs", designs),
+        PageSection("error-map", "The error map's uncertainty", drawn_map),
     ]
-    return [(name, words) for name, words, is_there in sections if is_there]
+    return written(Page(results.title, sentence(_summary(results)), sections, FOOT))
+
+
+def _answer(results: ReportedSweep) -> Html:
+    found = answer(results)
+    if found is None:
+        return Html()
+    kind = "verdict" if found.is_good else "verdict bad"
+    parts = [element("p", found.sentences[0], class_=kind), *map(sentence, found.sentences[1:])]
+    if found.worth:
+        effects = [element("li", micro(str(worth))) for worth in found.worth]
+        parts += [
+            element("h3", "Effect of each axis"),
+            sentence(f"The average of {found.symbol}, while all other axes stay:"),
+            element("ul", *effects),
+        ]
+    return joined([*parts, table_element(found.settings)])
+
+
+def _comparison(comparison: StoreComparison | None) -> Html:
+    if comparison is None:
+        return Html()
+    settings = table_element(comparison.settings) if comparison.settings else ""
+    return joined([*map(sentence, comparison.sentences), settings])
+
+
+def _ranks(results: ReportedSweep) -> Html:
+    """Return cells by rank and, below them, weak directions and differences of Monte Carlo."""
+    of_rank, of_weak, of_trials = (
+        groups_element(groups(results)) for groups in (ranks, weak, flags)
+    )
+    if not of_rank:
+        return Html()
+    parts = [element("h3", "Rank"), of_rank]
+    if of_weak:
+        parts += [element("h3", "Weakly determined"), of_weak]
+    if of_trials:
+        words = (
+            "Differences from linear theory of more than four standard errors, and cells without"
+            " Monte Carlo."
+        )
+        parts += [element("h3", "Monte Carlo"), note(words), of_trials]
+    return joined(parts)
 
 
 def _summary(results: ReportedSweep) -> str:
@@ -158,7 +148,7 @@ def _source(path: str) -> tuple[str, str]:
     # Readers cannot look up a temporary file.
     if PurePosixPath(path).name == MADE_IN_STUDIO:
         return "Sweep", "made in the studio"
-    return "Sweep file", in_one_line(path)
+    return "Sweep file", path
 
 
 def _facts(results: ReportedSweep) -> list[tuple[str, str]]:
@@ -166,7 +156,7 @@ def _facts(results: ReportedSweep) -> list[tuple[str, str]]:
     base = stored["experiment"].get("title", "") if isinstance(stored["experiment"], dict) else ""
     facts = [
         _source(stored["source"]),
-        ("Experiment", in_one_line(stored["base"]) + (f": {in_one_line(base)}" if base else "")),
+        ("Experiment", f"{stored['base']}: {base}" if base else stored["base"]),
     ]
     for axis in results.axes:
         labels = list(axis.labels)
@@ -177,7 +167,7 @@ def _facts(results: ReportedSweep) -> list[tuple[str, str]]:
     cells += f"{results.count('failed')} failed, {results.left} left"
     if results.found.damaged:
         damaged = sorted(results.found.damaged)
-        reason = in_one_line(results.found.damaged[damaged[0]])
+        reason = results.found.damaged[damaged[0]]
         cells += f", {len(damaged)} unreadable: {cell_list(damaged)} ({reason})"
     facts += [
         ("Cells", cells),
@@ -199,38 +189,46 @@ def _facts(results: ReportedSweep) -> list[tuple[str, str]]:
     return facts
 
 
-def _plots(
-    drawn: list[Plot], judged: str, report: Report
-) -> list[tuple[str, list[Drawing], list[Drawing]]]:
-    """Return plots against each axis: of the quantity that cells are judged by, and of others."""
-    plots_by_axis = []
+def _plots(results: ReportedSweep, report: Report) -> Html:
+    """Return plots against each axis, folded unless of the quantity that cells are judged by."""
+    drawn = plots(results)
+    judged = (criterion(results) or ("", ""))[1]
     count = 0
+    parts = []
     for axis, axis_plots in groupby(
         counted(drawn, "plots", len(drawn), report), lambda plot: plot.axis.name
     ):
-        figures: tuple[list[Drawing], list[Drawing]] = [], []
+        of_judged: list[Html] = []
+        of_others: list[Html] = []
         for plot in axis_plots:
             count += 1
-            caption = f"{plot.symbol}, {DESCRIPTIONS[plot.symbol]}, against {plot.axis.name}."
-            picture = plot_svg(plot, f"plot{count}")
-            of_others = symbol_column(plot.symbol) != judged
-            figures[of_others].append(Drawing(picture, f"{caption} {plot.note}".strip()))
-        plots_by_axis.append((axis, *figures))
-    return plots_by_axis
+            caption = f"{plot.symbol}, {DESCRIPTIONS[plot.symbol]}, against {axis}. {plot.note}"
+            pictures = of_judged if symbol_column(plot.symbol) == judged else of_others
+            pictures.append(figure(caption.rstrip(), plot_svg(plot, f"plot{count}")))
+        parts += [element("h3", f"Against {axis}"), figures(*of_judged)]
+        if of_others:
+            summary = f"Other quantities against {axis}"
+            parts.append(folded(summary, figures(*of_others), is_lengthy=len(of_others) > 4))
+    if any(len(line.actual) for plot in drawn for line in plot.panels[0].lines):
+        words = (
+            "Bars of Monte Carlo: average times ratio of actual to linearised errors, ± one"
+            " standard error."
+        )
+        parts.append(note(words))
+    return joined(parts)
 
 
 def _designs(
     store: Store, results: ReportedSweep, run_modules: bool, report: Report
-) -> dict[str, Any]:
+) -> tuple[Html, Html]:
     """Return the best and the worst cell's design, and the best one's error map."""
-    empty: dict[str, Any] = {"designs": [], "no_designs": "", "error_map": None}
     cells, judged = best_and_worst(results), criterion(results)
     if not cells or judged is None:
-        return empty
+        return Html(), Html()
     try:
         built = experiments(store, results, cells, run_modules)
     except NoExperimentError as error:
-        return {**empty, "no_designs": str(error)}
+        return sentence(f"The designs cannot be drawn: {error}."), Html()
     symbol = judged[1].replace("_", " ")
     designs = []
     for k, (cell, experiment) in enumerate(
@@ -243,11 +241,12 @@ def _designs(
         text = f", {number(1e6 * value, 3)} µm" if not np.isnan(value) else ""
         text += f", {open_:.0f} undetermined" if open_ else ""
         heading = f"{which} average of {symbol}{text}: cell {cell}, {results.label(cell)}"
-        designs.append(_drawn_design(experiment, cell, heading, k))
-    return {**empty, "designs": designs, "error_map": _drawn_map(built[0], results, cells[0])}
+        designs += [element("h3", heading), _drawn_design(experiment, cell, k)]
+    return joined(designs), _drawn_map(built[0], results, cells[0])
 
 
-def _drawn_design(experiment: Experiment, cell: int, heading: str, k: int) -> DrawnDesign:
+def _drawn_design(experiment: Experiment, cell: int, k: int) -> Html:
+    """Return the picture of a cell's design, its probes, and the positions as a table."""
     design = lay_out(experiment)
     drawn = scene(design)
     sizes = " x ".join(f"{1000 * size:.6g}" for size in design.machine.volume.size)
@@ -260,20 +259,14 @@ def _drawn_design(experiment: Experiment, cell: int, heading: str, k: int) -> Dr
         caption += " Positions are numbered as in the table."
     if any(place.read > MOST_BALLS for place in drawn.places):
         caption += " Only some of the balls are drawn."
-    has_offsets = any(tip.any() for _, tip in drawn.tips)
-    probes = (
-        probes_svg(drawn, f"probes{k}", f"Tips of the probes {listing(experiment.probes)}")
-        if has_offsets
-        else ""
-    )
-    return DrawnDesign(
-        cell,
-        heading,
-        scene_svg(drawn, f"scene{k}", words),
-        probes,
-        caption,
-        _positions(drawn, cell),
-    )
+    pictures = [figure(caption, scene_svg(drawn, f"scene{k}", words))]
+    if any(tip.any() for _, tip in drawn.tips):
+        words = f"Tips of the probes {listing(experiment.probes)}"
+        caption = "The probes' tips (circles) about the reference point (square), enlarged."
+        pictures.append(figure(caption, probes_svg(drawn, f"probes{k}", words)))
+    positions = table_element(_positions(drawn, cell))
+    is_open = len(drawn.places) <= MOST_POSITIONS
+    return joined([figures(*pictures), folded("List of positions", positions, is_open=is_open)])
 
 
 def _positions(drawn: Scene, cell: int) -> Table:
@@ -289,7 +282,8 @@ def _positions(drawn: Scene, cell: int) -> Table:
     return Table(f"positions-{cell}", caption, headings, ("balls read",), (Block("", tuple(rows)),))
 
 
-def _drawn_map(experiment: Experiment, results: ReportedSweep, cell: int) -> DrawnMap:
+def _drawn_map(experiment: Experiment, results: ReportedSweep, cell: int) -> Html:
+    """Return the error map's uncertainty in slices."""
     drawn = error_map(experiment)
     words = (
         f"Standard uncertainty of the error function of cell {cell} ({results.label(cell)}), as the"
@@ -304,16 +298,10 @@ def _drawn_map(experiment: Experiment, results: ReportedSweep, cell: int) -> Dra
             " to within the target uncertainty, by the"
             f" {uncertainty_words(experiment.coverage_factor)}."
         )
-    figures = []
+    pictures = []
     for k, level_slice in enumerate(drawn.slices):
         slice_text = slice_words(level_slice)
         caption = slice_text[0].upper() + slice_text[1:] + "."
-        figures.append(
-            Drawing(
-                slice_svg(
-                    drawn, level_slice, f"slice{k}", f"Map of standard uncertainties, {slice_text}"
-                ),
-                caption,
-            )
-        )
-    return DrawnMap(words, tuple(figures))
+        label = f"Map of standard uncertainties, {slice_text}"
+        pictures.append(figure(caption, slice_svg(drawn, level_slice, f"slice{k}", label)))
+    return joined([sentence(words), figures(*pictures)])

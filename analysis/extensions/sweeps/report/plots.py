@@ -6,6 +6,7 @@ import textwrap
 from typing import TYPE_CHECKING
 
 import numpy as np
+from ballplate.extensions.pages.elements import Html
 from ballplate.presentation import (
     DASHES,
     INK,
@@ -43,7 +44,7 @@ LEGEND = 54
 PANEL, ABOVE, LEFT, RIGHT, BELOW, LINE = 118.0, 22.0, 50.0, 16.0, 40.0, 15.0
 
 
-def plot_svg(plot: Plot, name: str) -> str:
+def plot_svg(plot: Plot, name: str) -> Html:
     """Return a plot: average above, maximum below, over the same axis."""
     lines = plot.panels[0].lines
     has_legend = len(lines) > 1 or len(lines[0].actual) > 0
