@@ -85,7 +85,7 @@ IS_A_BRYAN_GAUGE_AND_HAS = (
 IS_A_PLATE_BUT_LENGTH_EQUATIONS = (
     "artefacts.bar: is a plate, but length-equations needs length standards"
 )
-IS_MM_FROM_WHERE_IT_SHOULD = "is 10 mm from where it should be"
+IS_MM_FROM_WHERE_IT_SHOULD = "is 10 mm from its expected location"
 IS_NOT_DEFINED_FOR_THIS_ARTEFACT = '"braced" is not defined for this artefact'
 IS_TURNED_BY_DEGREES = '"turned" is turned by 89.992480 degrees, clockwise, from "first"'
 LEAVES_OUT_WHAT_IS_NOT_READ = "omits balls that are not read in both positions: r2c2, r3c1"

@@ -157,8 +157,8 @@ class _Reader:
         if len(messages) > MOST_MESSAGES:
             messages = [*messages[:MOST_MESSAGES], replace(messages[-1], text=MORE_ERRORS)]
         if not messages and not form.rows and form.empty:
-            text = f"nothing is filled in: {listing(self.words.axes)} are empty in all rows; write"
-            text += " in what was read, and remove the lines of what was not"
+            text = f"{listing(self.words.axes)} are empty in all rows; enter values,"
+            text += " and remove rows without any"
             raise self.error(text, form.empty[0])
         if not messages and not form.rows:
             raise self.error("no rows below the names of the columns; add at least one")
@@ -218,8 +218,8 @@ class _Reader:
             return ()
         names = listing(f'"{shorten(cell)}"' for cell in headings.unused)
         text = (
-            f'"{shorten(position)}", the name of the file, was taken for the position; not used:'
-            f" {names}; if one of these is the position, give --columns"
+            f'position "{shorten(position)}" is the name of the file; unused columns: {names}; if'
+            " one of these holds the position, give --columns"
             f" position={shorten(headings.unused[0])}"
         )
         return (Message(str(self.source), max(self.form.header, 1), 1, "", text),)

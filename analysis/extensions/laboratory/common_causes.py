@@ -151,10 +151,13 @@ def mistaken_positions(design: Design, readings: Readings, seen_places: Array) -
 def words_of_mistaken(design: Design, mistaken: Mapping[int, int]) -> str:
     """That positions are where others were planned, and what to do."""
     names = design.positions.names
-    pairs = listing(f"{names[k]} where {names[j]}" for k, j in mistaken.items())
+    pairs = listing(f"{names[k]} at that of {names[j]}" for k, j in mistaken.items())
     is_exchange = set(mistaken) == set(mistaken.values())
     advice = "exchange the names of positions" if is_exchange else "correct the names of positions"
-    return f"readings are where other positions were planned, {pairs}: {advice}, or what is planned"
+    return (
+        f"readings are at the planned location of another position, {pairs}: {advice}, or the"
+        " planned poses"
+    )
 
 
 def doubts_about_poses(design: Design, x: Array) -> tuple[str, ...]:

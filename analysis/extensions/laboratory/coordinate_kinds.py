@@ -47,7 +47,7 @@ def as_scale_readings(
     correction = settings.compensation
     is_taken_off = isinstance(correction, CompensationSettings)
     if design.positions.across is not None and (settings.coordinates == "part" or is_taken_off):
-        text = "part co-ordinates, and a correction to be taken off, need all co-ordinates of balls"
+        text = "part co-ordinates and subtracting a correction need all co-ordinates of balls"
         raise refused(file, f"{text}; give scale readings")
     if settings.coordinates == "part":
         x = _in_machine(design, readings, x, file)
@@ -59,7 +59,7 @@ def as_scale_readings(
         try:
             x = scale_readings(machine.model, x + offsets, machine.a, offsets)
         except NoReadingError:
-            text = f"the correction of {correction.file} is too large to be taken off"
+            text = f"the correction of {correction.file} is too large to be subtracted"
             raise refused(file, text) from None
     return x
 
@@ -87,7 +87,7 @@ def doubts_about_copies(design: Design, readings: Readings, x: Array) -> tuple[s
             doubts.append(
                 f'positions "{names[first]}" and "{names[second]}" have the same readings to the'
                 " last"
-                " digit; if one is a copy of the other, give what was read there"
+                " digit; if one is a copy of the other, replace it by its own readings"
             )
     return tuple(doubts)
 
@@ -106,8 +106,8 @@ def _in_machine(design: Design, readings: Readings, x: Array, file: object) -> A
         placed[rows] = x[rows] @ rotation.T + origin
     if poor:
         text = (
-            f"too few balls were read in {listing(poor)} to place part co-ordinates; give these in"
-            " the machine's co-ordinates"
+            f"too few balls were read in {listing(poor)} to locate part co-ordinates; give machine"
+            " co-ordinates"
         )
         raise refused(file, text)
     return placed

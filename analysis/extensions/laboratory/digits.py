@@ -61,8 +61,8 @@ def doubts_about_digits(design: Design, x: Array, uncertainty: Array | None) -> 
     ]
     return (
         f"the readings have no digit below {shown[0]}; such rounding has a standard uncertainty of"
-        f" {shown[1]}, beside the {shown[2]} that are stated of readings: give more digits, or"
-        " increase what is stated",
+        f" {shown[1]}, and {shown[2]} is stated for readings: give more digits, or increase the"
+        " stated uncertainty",
     )
 
 
@@ -80,6 +80,6 @@ def doubts_about_units(design: Design, uncertainty: Array) -> tuple[str, ...]:
         format_length(float(f"{amount:.3g}")) for amount in (stated_uncertainty, repeatability)
     ]
     return (
-        f"the table states a standard uncertainty of {shown[0]} of its readings, beside a"
-        f" repeatability of {shown[1]}: check the unit of its column",
+        f"the table states a standard uncertainty of {shown[0]} for its readings, but the"
+        f" repeatability is {shown[1]}: check the unit of its column",
     )

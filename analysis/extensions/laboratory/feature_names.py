@@ -237,9 +237,8 @@ def position_of_file(stem: str, design: Design | None, file: str) -> str:
     if len(names) != 1:
         names_text = "none" if not names else " and ".join(names)
         text = (
-            f"neither names of features nor the file's name tell the position ({names_text}); put"
-            " it into"
-            " the file's name, or state the rule with --name"
+            "neither the names of features nor the file's name identify the position"
+            f" ({names_text}); add it to the file's name, or state the rule with --name"
         )
         raise refused(file, text)
     return names[0]

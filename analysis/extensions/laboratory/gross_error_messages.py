@@ -50,7 +50,7 @@ def refuse_gross_errors(
         if cause:
             text = (
                 f"the readings of most positions do not fit; all do {cause}: correct the columns,"
-                " the unit or the readings section; otherwise the names of balls are wrong"
+                " the unit or the readings section; otherwise correct the names of balls"
             )
             raise marks[0].refused(text)
     messages = [_of_position(design, wrong, marks) for wrong in positions]
@@ -180,7 +180,7 @@ def _of_reading(design: Design, wrong: WrongReading, marks: Sequence[Mark]) -> M
     if wrong.undecided:
         elsewhere = design.positions.names[readings.position[wrong.partner]]
         text = (
-            f"ball {ball} in position {position} is {far} from where it is in position"
+            f"ball {ball} in position {position} is {far} from its location in position"
             f" {elsewhere}, line {marks[wrong.partner].line}; correct or remove one of the two"
             " lines"
         )
@@ -211,7 +211,7 @@ def _of_reading(design: Design, wrong: WrongReading, marks: Sequence[Mark]) -> M
             if abs(part) > 0.01 * np.abs(wrong.misfit).max()
         )
         text = (
-            f"ball {ball} in position {position} is {far} from where it should be ({along});"
+            f"ball {ball} in position {position} is {far} from its expected location ({along});"
             " correct or remove it"
         )
     return marks[i].message("", text)

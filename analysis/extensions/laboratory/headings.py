@@ -202,7 +202,7 @@ def _uncertainty(cells: Sequence[str], columns_taken: set[int]) -> dict[str, Hea
         )
     if len(factors) + (uncertainty_kind.factor is not None) > 1:
         raise HeadingError(
-            f'the coverage factor of "{named}" is stated more than once; remove all but one'
+            f'the coverage factor of "{named}" is stated more than once; keep only one'
         )
     if not factors and uncertainty_kind.factor is None:
         raise HeadingError(
@@ -224,7 +224,7 @@ def _refuse_expanded(column: HeadedColumn, cells: Sequence[str]) -> None:
     if uncertainty_kind is not None and uncertainty_kind.kind == "expanded":
         raise HeadingError(
             f'"{shorten(cell)}" is an expanded uncertainty, and readings: columns: u names standard'
-            " uncertainties; leave u out there: the heading says what it is"
+            " uncertainties; remove u there: the heading suffices"
         )
 
 
@@ -354,7 +354,7 @@ def _found_groups(cells: Sequence[str], words: Vocabulary) -> tuple[Group, ...] 
     if "" in groups and len(groups) > 1:
         names = listing(beside for beside in groups if beside)
         raise HeadingError(
-            f"there are co-ordinates by themselves and of {names}; name those that are meant under"
+            f"there are plain co-ordinates and those of {names}; name the columns to use under"
             " readings: columns"
         )
     if "" not in groups and len(groups) < len(columns_by_group):

@@ -11,7 +11,7 @@ from ballplate.cli import add_force, add_output, complain, note, rule, text_writ
 DESCRIPTION = (
     "Read the centres of spheres out of reports that measuring programs write (DMIS output,"
     " PC-DMIS, Calypso, QIF), and write them as a table for fit. Positions, balls and probes are"
-    " found in the names of features. What is taken and what is left is told."
+    " found in the names of features. Lists features imported and skipped."
 )
 FORMATS = ("dmis", "pcdmis", "calypso", "qif")
 UNITS = ("mm", "cm", "m", "in")
@@ -59,7 +59,9 @@ def add_options(parser: ArgumentParser) -> None:
         help="format of the reports; default: recognised",
     )
     parser.add_argument(
-        "--unit", choices=UNITS, help="unit of reports that state none; one that is stated counts"
+        "--unit",
+        choices=UNITS,
+        help="unit of reports without a unit; a stated unit takes precedence",
     )
     parser.add_argument(
         "--circles", action="store_true", help="take centres of circles, too, as of a hole plate"
@@ -68,8 +70,8 @@ def add_options(parser: ArgumentParser) -> None:
         "--uncertainty",
         action="store_true",
         help=(
-            "write the standard uncertainty of centres that are of points on the surface, which fit"
-            " then uses in place of the machine's repeatability"
+            "write the standard uncertainty of centres computed from points on the surface, which"
+            " fit then uses instead of the machine's repeatability"
         ),
     )
     add_force(parser)

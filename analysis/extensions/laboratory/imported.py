@@ -156,7 +156,7 @@ class _Taken:
         fit = closest_sphere(feature.points)
         if fit is None:
             few = len(feature.points) < FEWEST_POINTS
-            why = f"has {len(feature.points)} points, of which a sphere needs {FEWEST_POINTS}"
+            why = f"has {len(feature.points)} points; a sphere needs {FEWEST_POINTS}"
             self.leave([feature], why if few else "has points about in a plane")
             return None
         x, y, z = fit.centre.tolist()
@@ -203,7 +203,7 @@ def report_readings(
     systems = {feature.system for taken in taken_reports for feature, _, _ in taken.features}
     if {"machine", "part"} <= systems:
         remarks.append(
-            "warning: centres in the machine's and in a part's system; import each apart"
+            "warning: centres in the machine's and in a part's system; import them separately"
         )
     coordinates: Coordinate = "part" if systems == {"part"} else "ball centres"
     dimension = 3 if settings.design is None else settings.design.dimension
@@ -259,7 +259,7 @@ def _taken(report: Report, path: Path | GivenText, settings: ImportSettings) -> 
         taken_report.features.append((feature, {"position": position, "probe": "", **parts}, fit))
     source = f'; position "{position}" by the name of the file' if is_of_file else ""
     if names.strange:
-        source += "; they are not the experiment's, and fit matches them by number and place"
+        source += "; they are not the experiment's, and fit matches them by number and location"
     for place in names.numbered:
         source += f"; {place}s by their numbers, from 1 in the experiment's order"
     taken_report.remarks.append(f"{report.file}: names{whose} are read as {names.rule}{source}")

@@ -108,7 +108,7 @@ def _alike(
         matched[name] = options.pop()
     if len(set(matched.values())) < len(matched):
         return {}
-    names.told.append(f"{noun} matched by name but for case and signs: {_pairs(matched)}")
+    names.told.append(f"{noun} matched by name, ignoring case and signs: {_pairs(matched)}")
     return matched
 
 
@@ -164,18 +164,17 @@ def _matched_positions(
     if places is None and len(by_number) == len(names_known):
         names.told.append(f"positions matched by number alone: {_pairs(by_number, 8)}")
         return _renamed(rows, 0, by_number)
-    doubt = "part co-ordinates do not tell where they are"
+    doubt = "part co-ordinates do not give their locations"
     if places is not None:
         by_place, doubt = _positions_by_place(rows, used, design, places, by_number)
         if by_place:
-            how = "by number, and by place" if by_number else "by place"
+            how = "by number and location" if by_number else "by location"
             names.told.append(f"positions matched {how}: {_pairs(by_place, 8)}")
             return _renamed(rows, 0, by_place)
     names_listed = listing(f'"{shorten(name)}"' for name in strange)
     names.asked.append(
-        f"the positions {names_listed} are not in the experiment, and their places do not tell"
-        " which they"
-        f" are ({doubt}); write the names that it has: {listing(names_known)}"
+        f"the positions {names_listed} are not in the experiment, and their locations do not"
+        f" identify them ({doubt}); write names of the experiment: {listing(names_known)}"
     )
     return rows
 
@@ -198,7 +197,7 @@ def _others_by_place(
     by_place, _ = _positions_by_place(rows, strange, design, places, {})
     if not by_place or not set(by_place.values()).isdisjoint(used):
         return rows
-    names.told.append(f"positions matched by place among those left: {_pairs(by_place, 8)}")
+    names.told.append(f"positions matched by location among those left: {_pairs(by_place, 8)}")
     return _renamed(rows, 0, by_place)
 
 
@@ -250,7 +249,7 @@ def _positions_by_place(
             return {}, f'"{shorten(name)}" could be {known_name} or {second[2]}'
         matched[name] = known_name
     if len(set(matched.values())) < len(matched):
-        return {}, "two of them would be the same"
+        return {}, "two would match the same position"
     return matched, ""
 
 
@@ -376,15 +375,15 @@ def _doubt_numbers(
     for rotation in rotations:
         if any(float(np.abs(rotation - turn).max()) <= AS_PLANNED for turn in turns):
             findings.asked.append(
-                f"the numbers of balls ({pairs}, in reading order) and the places that they have"
-                " along the part's axes disagree, and the artefact turned onto itself looks the"
+                f"the numbers of balls ({pairs}, in reading order) and their locations along the"
+                " part's axes disagree, and the artefact turned onto itself looks the"
                 " same; write the names that balls have in the experiment"
             )
             return
     findings.doubted.append(
         f"balls are matched by number in reading order alone ({pairs}): the artefact turned onto"
-        " itself looks the same, so that part co-ordinates do not tell whether they are numbered"
-        " otherwise; write the names that balls have in the experiment"
+        " itself looks the same, so that part co-ordinates cannot confirm the numbering; write the"
+        " names that balls have in the experiment"
     )
 
 
@@ -421,15 +420,15 @@ def _by_place(
             if names.setdefault(row.texts[1], names_known[ball]) != names_known[ball]:
                 findings.asked.append(
                     f'{text}; "{shorten(row.texts[1])}" is {names[row.texts[1]]} in one position'
-                    f" and {names_known[ball]} in {position} by its place; write the names that it"
-                    " has"
+                    f" and {names_known[ball]} in {position} by its location; write names of the"
+                    " experiment"
                 )
                 return {}
     if len(set(names.values())) < len(names):
-        findings.asked.append(f"{text}; two of them are at the same place by the plan")
+        findings.asked.append(f"{text}; two have the same planned location")
         return {}
     findings.told.append(
-        f"balls matched by place, within {format_length(float(f'{limit:.3g}'))} of where they are"
-        f" planned: {_pairs(names)}"
+        f"balls matched by location, within {format_length(float(f'{limit:.3g}'))} of the planned"
+        f" one: {_pairs(names)}"
     )
     return names

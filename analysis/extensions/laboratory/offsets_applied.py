@@ -185,9 +185,7 @@ def doubt_about_offsets(
     if verdict.right == "ball centres" and is_read.all():
         poses = poses_found(design, readings, x) or {}
         if any(angle > TURNED for angle, _ in poses.values()):
-            text += (
-                "; or write part instead, since the artefact stands turned against the plan in them"
-            )
+            text += "; or write part instead, since the artefact is turned against the plan in them"
     if coordinates_taken == HYPOTHESES[0].name and is_read.all():
         mistakes = wrong_offsets(design, readings, x)
         text += "".join(f"; or {mistake.words(design)}" for mistake in mistakes)
@@ -201,16 +199,16 @@ def said_of(settings: ReadingsSettings) -> tuple[str, ...]:
     sentences = []
     if settings.coordinates == "part":
         sentences.append(
-            "part co-ordinates were placed by the nominal poses: errors are estimated where the"
-            " artefact was planned to stand"
+            "part co-ordinates were placed by the nominal poses: errors are estimated at the"
+            " artefact's planned locations"
         )
     if settings.compensation == "on":
         sentences.append(
-            "the machine's own correction was on: what is estimated are the errors that it leaves"
+            "the machine's own correction was on: the estimates are the errors that it leaves"
         )
     if isinstance(settings.compensation, CompensationSettings):
         sentences.append(
-            f"the correction of {settings.compensation.file} was taken off: what is estimated are"
-            " all errors of the machine"
+            f"the correction of {settings.compensation.file} was subtracted: the estimates are all"
+            " errors of the machine"
         )
     return tuple(sentences)

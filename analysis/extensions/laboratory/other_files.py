@@ -34,7 +34,7 @@ def what_it_is(source: GivenText) -> str:
         return ""
     if is_program(form, source.text):
         return (
-            "this is a DMIS program, not what was measured with it; run it on the machine, then"
+            "this is a DMIS program, not a report; run it on the machine, then"
             " ballplate import on its output"
         )
     return (

@@ -76,7 +76,7 @@ def with_coordinates(
     if settings.coordinates == "scale readings":
         text = (
             "the centres in a report have the offsets of probes applied, and scale readings are"
-            " stated; state ball centres, with offsets_in_controller where these are others"
+            " stated; state ball centres, with offsets_in_controller if the applied offsets differ"
         )
         raise refused(reports[0], text)
     if settings.coordinates is not None:
@@ -88,7 +88,7 @@ def with_coordinates(
         text = (
             f"centres in a part's co-ordinate system, and others ({others_listed}) in the"
             " machine's; state"
-            " coordinates if they are all of one kind, or fit each apart"
+            " coordinates if all are of one type, or fit each separately"
         )
         raise refused(part_reports[0], text)
     if len(reports) < len(coordinates):
@@ -101,4 +101,4 @@ def with_coordinates(
     kind = kinds.pop()
     chosen = settings.model_copy(update={"coordinates": kind})
     words = "part co-ordinates" if kind == "part" else "ball centres"
-    return chosen, (f"co-ordinates are taken for {words}, as reports have them",)
+    return chosen, (f"co-ordinates are interpreted as {words}, as in reports",)

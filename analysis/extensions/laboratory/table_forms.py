@@ -233,7 +233,7 @@ def _form(
         rows.append((line_number, cells))
     # In between they may say what is true of the rows below only.
     last = rows[-1][0] if rows else 0
-    text = "a line without co-ordinates among the rows; remove it, or say in a column what it says"
+    text = "a line without co-ordinates among the rows; remove it, or move its text to a column"
     wrong += [(line_number, text) for line_number in remarks if line_number < last]
     empty = sorted((*empty, *(line_number for line_number in remarks if line_number > last)))
     above = tuple(text for _, text in lines[: max(header, 0)])

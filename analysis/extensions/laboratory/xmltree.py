@@ -31,12 +31,12 @@ _SEPARATOR = " "
 _REMEDIES = {
     "no element found": "the file ends before its first element; it is empty or was cut off",
     "unclosed token": "the file ends within a tag; it was cut off, take a whole copy",
-    "mismatched tag": "this tag closes another element than the one that is open",
+    "mismatched tag": "this closing tag does not match the open element",
     "not well-formed (invalid token)": "a character that XML does not allow here",
-    "junk after document element": "the file goes on after its last element; remove what follows",
+    "junk after document element": "the file continues after its last element; remove what follows",
     "undefined entity": "an entity that XML does not know; write the character itself",
     "XML or text declaration not at start of entity": (
-        "the line <?xml …?> must be the very first; remove what is before it"
+        "the line <?xml …?> must be the very first; remove everything before it"
     ),
 }
 
@@ -161,7 +161,7 @@ class _Builder:
     def _start(self, name: str, attributes: dict[str, str]) -> None:
         self.count += 1
         if self.count > MOST_ELEMENTS:
-            raise self._refuse(f"more than {MOST_ELEMENTS} elements; leave some of them out")
+            raise self._refuse(f"more than {MOST_ELEMENTS} elements; leave some out")
         if len(self.open) >= DEEPEST:
             raise self._refuse(f"elements within each other more than {DEEPEST} deep")
         namespace, _, local = name.rpartition(_SEPARATOR)

@@ -277,7 +277,7 @@ def test_a_correction_is_taken_off(
     found = bp.fit(experiment, corrected)
     machine, balls = worst(found, plain)
     assert machine < 1e-4 and balls < 1e-11
-    assert any("was taken off" in text for text in found.remarks)
+    assert any("was subtracted" in text for text in found.remarks)
     # With the correction on, what is left is estimated, and that is said.
     on = bp.fit(
         bp.load(DESIGN).with_(readings={"coordinates": kind, "compensation": "on"}), corrected

@@ -146,7 +146,8 @@ def test_exchanged_names_of_positions_are_told_as_such(
     with pytest.raises(ExperimentError) as refused:
         bp.fit(experiment, exchanged(readings, first, second))
     text = str(refused.value)
-    assert f"other positions were planned, {first} where {second}, {second} where {first}" in text
+    pairs = f"{first} at that of {second}, {second} at that of {first}"
+    assert f"at the planned location of another position, {pairs}" in text
     assert wording.EXCHANGE_THE_NAMES_OF_POSITIONS in text and "turned" not in text
 
 

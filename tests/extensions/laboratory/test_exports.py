@@ -220,7 +220,7 @@ EXPORTS: dict[str, tuple[Callable[[Rows], bytes], str]] = {
     "aligned": (aligned, "read as: two or more blanks"),
     "side by side": (side_by_side, "co-ordinates of down, right, left, back, front side by side"),
     "numbered": (numbered, "balls matched by number in reading order: 1 = r1c1, 2 = r1c2"),
-    "elsewhere": (elsewhere, "positions matched by place: Aufbau wol z = z low"),
+    "elsewhere": (elsewhere, "positions matched by location: Aufbau wol z = z low"),
 }
 
 
@@ -256,8 +256,8 @@ def test_two_positions_of_other_names_are_those_that_are_left(
     renamed = [row | {"position": other.get(row["position"], row["position"])} for row in readings]
     path.write_text(plain(renamed), encoding="utf-8")
     found, err = fitted([path], capsys)
-    told = f"positions matched by place among those left: Lage 1 = {first}, Lage 2 = {second}"
-    swapped = f"positions matched by place among those left: Lage 2 = {second}, Lage 1 = {first}"
+    told = f"positions matched by location among those left: Lage 1 = {first}, Lage 2 = {second}"
+    swapped = f"positions matched by location among those left: Lage 2 = {second}, Lage 1 = {first}"
     assert told in err or swapped in err
     same(found, estimates, 1e-9)
     # A slip within a position that is known stays one, even where its place is clear.

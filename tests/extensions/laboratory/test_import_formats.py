@@ -200,7 +200,7 @@ def test_points_of_a_program_are_no_measurements(tmp_path: Path) -> None:
 def test_four_points_are_too_few_and_a_plane_of_points_is_no_sphere(tmp_path: Path) -> None:
     sphere = "F(P_1)=FEAT/SPHERE,OUTER,CART,100,200,300,22\n"
     told = refusal(tmp_path, DMIS.format(units="MM", lines=sphere + lines_of_points(4)))
-    assert "1 sphere (has 4 points, of which a sphere needs 5)" in told
+    assert "1 sphere (has 4 points; a sphere needs 5)" in told
     sphere = sphere.replace("P_1", "P_1r")
     flat = "\n".join(f"FA(P_1r_{k})=FEAT/POINT,CART,{k},{k * k},7,0,0,1" for k in range(6))
     told = refusal(tmp_path, DMIS.format(units="MM", lines=sphere + flat))

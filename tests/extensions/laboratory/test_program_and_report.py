@@ -27,7 +27,7 @@ def test_a_program_is_no_report(program: Path) -> None:
     for experiment in (None, QUICKSTART):
         with pytest.raises(ExperimentError) as caught:
             bp.read_report(program, experiment)
-        told = "spheres (PTMEAS of a program are where to probe, not what was measured)"
+        told = "spheres (PTMEAS of a program are points to probe, not measured points)"
         assert told in str(caught.value)
 
 

@@ -87,9 +87,9 @@ def test_no_document_type_is_read(text: str) -> None:
     [
         (b"", "f:1:1: not well-formed XML: the file ends before its first element; it is empty or was cut off"),
         (b"<a>\n <b>", "f:2:5: the file ends within <b>; it was cut off, take a whole copy"),
-        (b"<a>\n <b></a>", "f:2:7: not well-formed XML: this tag closes another element than the one that is open"),
+        (b"<a>\n <b></a>", "f:2:7: not well-formed XML: this closing tag does not match the open element"),
         (b"<a>&x;</a>", "f:1:4: not well-formed XML: an entity that XML does not know; write the character itself"),
-        (b"<a/><b/>", "f:1:5: not well-formed XML: the file goes on after its last element; remove what follows"),
+        (b"<a/><b/>", "f:1:5: not well-formed XML: the file continues after its last element; remove what follows"),
         (b"<a>\x00</a>", "f:1:4: not well-formed XML: a character that XML does not allow here"),
         (b'<?xml version="1.0" encoding="klingon"?><a/>', "f:1:1: the encoding cannot be read (unknown encoding: klingon); save the file with the encoding UTF-8"),
         (b'<?xml version="1.0" encoding="shift_jis"?><a/>', "f:1:1: the encoding cannot be read (multi-byte encodings are not supported); save the file with the encoding UTF-8"),

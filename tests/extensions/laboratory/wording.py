@@ -22,7 +22,7 @@ COLUMNS_INSTEAD_OF = "9 columns instead of 6"
 CORRECT_THE_NAMES_OF_THE_BALLS = "correct the names of the balls"
 CORRECT_THE_SIGNS_OF_THE_OFFSETS = "correct the signs of the offsets"
 COULD_ALL_BE = "could all be x; say which"
-CO_ORDINATES_ARE_TAKEN_FOR_BALL = "co-ordinates are taken for ball centres, as reports have them"
+CO_ORDINATES_ARE_TAKEN_FOR_BALL = "co-ordinates are interpreted as ball centres, as in reports"
 CO_ORDINATES_WHICH_IS_NO_MULTIPLE = "19 co-ordinates, which is no multiple of 3"
 DATES_WITHOUT_A = "dates without a zone, and others are times of a day"
 DIMENSION_FLATNESS_OF_PLANE = "left: 1 dimension (flatness of plane), 1 sphere (no row Z)"
@@ -46,8 +46,8 @@ LENGTHS_ARE_IN = "lengths are in in, the experiment file mm"
 LOW_THE_READINGS_FIT_THE_PLATE = "z low: the readings fit the plate turned by 180"
 MAY_HAVE_BEEN_CUT_OFF = "may have been cut off"
 MM_IN_THE_MIDDLE = "22 mm in the middle"
-MORE_THAN_ELEMENTS = "f:1:12: more than 3 elements; leave some of them out"
-NOTHING_IS_FILLED = "nothing is filled in: x, y, z are empty"
+MORE_THAN_ELEMENTS = "f:1:12: more than 3 elements; leave some out"
+NOTHING_IS_FILLED = "x, y, z are empty in all"
 NOT_RECOGNISED_AS_QIF_RESULTS = (
     "report: not recognised as QIF results, DMIS output, PC-DMIS report, Calypso table; "
     "state its format with --from (qif, dmis, pcdmis, calypso)"
@@ -67,21 +67,21 @@ NO_TIME_AND_OTHER_ROWS_HAVE = "no time, and other rows have one"
 NO_UNITS_OF_THIS_DIMENSION = "no UNITS= of this dimension"
 NO_UNIT_IS_STATED = 'no unit is stated for the columns "x", "y", "z"'
 NO_WRITE_A = "lab.csv:6:1: no x; write a number, or remove the line"
-OTHERWISE_THE_NAMES_OF_BALLS = "otherwise the names of balls are wrong"
-PART_CO_ORDINATES_DO_NOT_TELL = "part co-ordinates do not tell whether they are"
+OTHERWISE_THE_NAMES_OF_BALLS = "otherwise correct the names of balls"
+PART_CO_ORDINATES_DO_NOT_TELL = "part co-ordinates cannot confirm the numbering"
 PLACED_BY_THE_NOMINAL_POSES = "placed by the nominal poses"
 PLANNED_BUT_NOT_READ = "planned but not read (3)"
 PLANNED_BUT_NOT_READ_2 = "planned but not read"
 POSITIONS_AND_HAVE_THE_SAME_READINGS = (
     'positions "z low" and "z high" have the same readings to the last digit'
 )
-POSITIONS_MATCHED_BY_NAME_BUT = "positions matched by name but for case and signs: "
-POSITIONS_MATCHED_BY_NUMBER = "positions matched by number, and by place"
+POSITIONS_MATCHED_BY_NAME_BUT = "positions matched by name, ignoring case and signs: "
+POSITIONS_MATCHED_BY_NUMBER = "positions matched by number and location"
 POSITION_ABOVE_THE_HEADINGS = 'position "z low" above the headings'
 POSITION_BY_THE_NAME = 'position "Z_HIGH" by the name of the file'
 POSITION_BY_THE_NAME_OF_THE_FILE = 'position "z low" by the name of the file'
-PTMEAS_OF_A_PROGRAM_ARE_WHERE = "PTMEAS of a program are where to probe, not what was measured"
-PUT_IT_INTO_THE_FILES_NAME = "put it into the file's name"
+PTMEAS_OF_A_PROGRAM_ARE_WHERE = "PTMEAS of a program are points to probe, not measured points"
+PUT_IT_INTO_THE_FILES_NAME = "add it to the file's name"
 QIFDOCUMENT_IS_NO_DOCUMENT_OF_QIF = "<QIFDocument> is no document of QIF 2 or 3"
 RUN_BALLPLATE_IMPORT_FIRST = "run ballplate import first"
 SCALE_READINGS_ARE_STATED = "scale readings are stated; state ball centres"
@@ -111,9 +111,9 @@ THE_NAMES_OF_BALLS = (
     "the names of balls r2c2 and r2c1 in position P3 were swapped (lines 54 and 55)"
 )
 THE_NAME_CAN_BE_PARTED = 'the name "z_low_r1c1" can be parted as {position}_{ball} in several ways'
-THE_NAME_OF_THE_FILE = 't.csv:1:1: "t", the name of the file, was taken for the position'
+THE_NAME_OF_THE_FILE = 't.csv:1:1: position "t" is the name of the file'
 THIS_IS_A = "report: this is a table, which needs no import; ballplate fit reads it"
-THIS_IS_A_DMIS = "this is a DMIS program, not what was measured"
+THIS_IS_A_DMIS = "this is a DMIS program, not a report"
 THIS_IS_A_REPORT = "this is a report of a measuring program (DMIS output), and no table"
 TOO_FEW_BALLS_WERE_READ = "too few balls were read in z high"
 TO_THE_LAST_DIGIT = "to the last digit"

@@ -276,7 +276,7 @@ def _of_points(reader: _Reader) -> Iterator[Feature]:
         points = reader.probed.get(name, [])
         lacks = "nominal only, not measured"
         if points and reader.is_program:
-            points, lacks = [], "PTMEAS of a program are where to probe, not what was measured"
+            points, lacks = [], "PTMEAS of a program are points to probe, not measured points"
         for part in reader.made_of.get(name, ()):
             points += [point.centre for point in reader.actual.get(part, ()) if point.centre]
         points_array = np.array(points) if points else None
