@@ -99,8 +99,8 @@ def draw_campaign(selection: Selection, path: str | Path | None = None) -> Figur
 def words(selection: Selection) -> str:
     """The picture for those who do not see it."""
     caption = [
-        f"{selection.criterion}, no more than {selection.budget}:"
-        f" chosen {_value_text(selection, selection.value)}"
+        f"{selection.criterion}, at most {selection.budget}: chosen"
+        f" {_value_text(selection, selection.value)}"
     ]
     if not math.isnan(selection.bound):
         caption.append(f"bound of any choice {_value_text(selection, selection.bound)}")

@@ -142,12 +142,12 @@ def _order_table(size: DriftSize, effects: Sequence[DriftEffect], campaign: Camp
     table = table_lines(columns, effects)
     places = (step.candidate for step in campaign.sheet.steps)
     if not is_of_plates(campaign.experiment, places):
-        why = "no figures of drift: that of length standards is not followed"
+        why = "no effects of drift: they are computed for plates only"
         return [*table, why]
     return [
         *table,
-        "an unmodelled drift changes a distance between corrected points by at"
-        " most, and the mean uncertainty of these distances; µm",
+        "largest change of a distance between corrected points by an unmodelled drift, and mean"
+        " uncertainty of such distances; µm",
         *_chosen_without_drift(campaign),
     ]
 

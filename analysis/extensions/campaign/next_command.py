@@ -28,10 +28,10 @@ if TYPE_CHECKING:
     from .next_result import NextStep
 
 DESCRIPTION = (
-    "Judge the readings taken so far: the scatter that the residuals show, suspected gross errors,"
-    " the uncertainty U6 reached, and either that the target is met or the position that is best"
-    " read next, of the file or its pool, with what it will achieve. A position that was read again"
-    " counts as it was read last. The exit status is 0 if the target is met, otherwise 1."
+    "Judge the readings taken so far: standard deviation from the residuals, flagged gross errors"
+    " and the uncertainty U6 reached. Report whether the target is met and which position of the"
+    " file or its pool to read next, with its expected effect. If a position was read again, its"
+    " last readings count. The exit status is 0 if the target is met, otherwise 1."
 )
 
 

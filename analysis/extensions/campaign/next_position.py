@@ -141,7 +141,7 @@ def possible_positions(experiment: Experiment) -> dict[str, Position]:
     candidates = (candidate.item for candidate in pool if isinstance(candidate.item, Position))
     positions = {position.name: position for position in (*experiment.positions, *candidates)}
     if not positions:
-        raise refused(experiment.source, "has no positions and no pool of them", "positions")
+        raise refused(experiment.source, "has neither positions nor a pool", "positions")
     return positions
 
 

@@ -101,7 +101,7 @@ class NextStep(Result):
 
     def _sigma_lines(self) -> list[str]:
         if self.fit is None or self.now is None:
-            return [f"nothing can be estimated yet ({self.why})"]
+            return [f"no estimate is possible yet ({self.why})"]
         freedom = self.fit.sum_freedom
         if freedom <= 0:
             sigma_text = "sigma unknown: no redundant readings"

@@ -21,9 +21,9 @@ SHEETS, DMIS, POINTS = (".html", ".md", ".csv", ".txt"), (".dmi", ".dmis"), (".c
 
 DESCRIPTION = (
     "Write what goes to the laboratory with a design: a run sheet to print and tick off, a CSV"
-    " file of the readings in order with empty cells, which fit reads when they are filled in, and"
-    " the nominal centres of the balls in order, as a table or as a DMIS program. By default the"
-    " run sheet is printed."
+    " template of the readings in order, which fit reads when it is filled in, and the nominal"
+    " centres of the balls in order, as a table or as a DMIS program. By default the run sheet is"
+    " printed."
 )
 
 
@@ -38,7 +38,10 @@ def add_options(parser: ArgumentParser) -> None:
         help="write the run sheet: .html to print, .md, .csv or .txt",
     )
     add_output(
-        parser, "--readings", metavar="CSV", help="write the readings in order with empty cells"
+        parser,
+        "--readings",
+        metavar="CSV",
+        help="write the readings in order as a CSV template to fill in",
     )
     add_output(
         parser,

@@ -224,7 +224,7 @@ def _pictures(sheet: RunSheet, experiment: Experiment) -> str:
 def _numbered(layout: BallLayout) -> str:
     """Return the remark on numbers in place of long ball names."""
     is_long = max(map(len, layout.names)) > LONGEST_NAME
-    return "; numbers are places in the artefact's list of balls" if is_long else ""
+    return "; numbers follow the artefact's list of balls" if is_long else ""
 
 
 def _step(number: int, step: Step, sheet: RunSheet, experiment: Experiment) -> str:

@@ -25,12 +25,12 @@ if TYPE_CHECKING:
 FORMATS = ("csv", "isg", "heidenhain")
 
 DESCRIPTION = (
-    "Write the errors of a machine file, or of a map that fit left behind, as a compensation"
-    " table: CSV with ISO 230-1 columns, the ISG CSV format of volumetric compensation (ISG"
-    " kernel, Beckhoff TwinCAT CNC), or HEIDENHAIN .COM and .CMA tables. What linear"
-    " interpolation and rounding change is computed and told. With --read the files of a table"
-    " are read, and -o writes a machine file. A table states corrections, to be added to scale"
-    " readings, or errors of indication, which have the opposite sign."
+    "Write the errors of a machine file or map file as a compensation table: CSV with ISO 230-1"
+    " columns, the ISG CSV format of volumetric compensation (ISG kernel, Beckhoff TwinCAT CNC),"
+    " or HEIDENHAIN .COM and .CMA tables. Prints the largest error of linear interpolation and"
+    " rounding. With --read the files of a table are read, and -o writes a machine file. A table"
+    " states corrections, to be added to scale readings, or errors of indication, which have the"
+    " opposite sign."
 )
 
 
@@ -72,7 +72,7 @@ def add_options(parser: ArgumentParser) -> None:
     parser.add_argument(
         "--volumetric",
         action="store_true",
-        help="errors of the whole machine on a grid instead of those of single axes, with isg",
+        help="with isg, errors of the whole machine on a grid instead of errors of single axes",
     )
     parser.add_argument(
         "--without-rotations",
@@ -98,8 +98,8 @@ def add_options(parser: ArgumentParser) -> None:
         "--output",
         metavar="FILE",
         help=(
-            "write the table; csv and heidenhain write a file for each axis beside it, such as"
-            " NAME-x.csv. With --read, write a machine file (YAML) and its tables"
+            "write the table; csv and heidenhain also write one file per axis, such as NAME-x.csv."
+            " With --read, write a machine file (YAML) and its tables"
         ),
     )
     add_force(parser)

@@ -201,8 +201,8 @@ class MadeCompensation(CompensationTable):
             *([self.verdict] if self.verdict else []),
             *self.table_lines(),
             "",
-            f"errors are zero at {zero}; largest differences from the machine elsewhere in the"
-            f" volume, of {made.places} places with probe offsets {tips}:",
+            f"errors are zero at {zero}; largest differences from the machine in the volume, at"
+            f" {made.places} points with probe offsets {tips}:",
             *aligned(rows, [False, True]),
             NOT_LOADED,
         ]

@@ -75,7 +75,9 @@ def _read(paths: Sequence[Path]) -> StatedTable:
     """
     path = paths[0]
     if len(paths) > 1 or path.suffix.lower() != ".cma":
-        text = "is not a .CMA file alone; name that, which says of which axis each .COM file is"
+        text = (
+            "is not a single .CMA file; name the .CMA file, which assigns each .COM file to an axis"
+        )
         raise refused(path, text)
     active = [line for line in _lines(path) if line.cells.get(ACTIVE) == "*"]
     if len(active) != 1:
@@ -172,7 +174,7 @@ def _cells(line: str, heads: Sequence[tuple[int, str]], mark: Mark) -> Iterator[
     for start, cell in cells:
         name = [name for place, name in heads if place <= start][-1:] or [""]
         if name[0] in names_seen or not name[0]:
-            text = f'"{shorten(cell)}" stands under no column of its own; align the columns'
+            text = f'"{shorten(cell)}" is under no column of its own; align the columns'
             raise mark.refused(text)
         names_seen.add(name[0])
         yield name[0], cell

@@ -143,8 +143,8 @@ def _read(paths: Sequence[Path]) -> StatedTable:
     if grids and len(blocks) > 1:
         raise refused(
             paths[0],
-            "has tables of several axes at once beside others; those of single axes, or one for"
-            " all axes, are read",
+            "mixes a table of several axes with other tables; give tables of single axes, or one"
+            " of all axes",
         )
     if grids:
         return StatedTable((), _grid(grids[0]), sense, arrangement, (0.0, 0.0, 0.0))
@@ -204,16 +204,13 @@ def _wrong_names(names: Sequence[str], mark: Mark) -> list[Message]:
         f" {hint(name, names_known)}"
         for name in wrong
     ]
-    texts += [
-        f"a second column {name}; remove one of them"
-        for name in set(names)
-        if names.count(name) > 1
-    ]
+    texts += [f"a second column {name}; remove one" for name in set(names) if names.count(name) > 1]
     arguments = [name for name in names if name in AXES_LETTERS]
     single = [name for name in names if name in AXIS_ERRORS]
     if len(arguments) == 1 and not wrong:
         texts += [
-            f"{name} depends on {arguments[0]}; only errors of {arguments[0]} are read beside it"
+            f"{name} depends on {arguments[0]}; a table by {arguments[0]} has errors of"
+            f" {arguments[0]} only"
             for name in single
             if name[2] != arguments[0]
         ]
@@ -246,7 +243,7 @@ def _axes(blocks: Sequence[_Block], path: Path) -> tuple[AxisTable, ...]:
             ]
         )
         if axis in axes:
-            text = f"a second table of {AXES[axis]}; put the columns of both into one"
+            text = f"a second table of {AXES[axis]}; join the columns of both"
             raise block.mark.refused(text)
         axes[axis] = AxisTable(axis, positions, values)
     if sorted(axes) not in ([0, 1], [0, 1, 2]):
@@ -297,7 +294,7 @@ def _grid(block: _Block) -> VolumeTable:
     is_seen = np.zeros(counts, bool)
     is_seen[places] = True
     if not is_seen.all():
-        raise block.mark.refused("a point of the grid stands twice; leave one out")
+        raise block.mark.refused("a point of the grid occurs twice; remove one")
     for name in single:
         error = AXIS_ERRORS[name]
         values[..., error.component + 3 * error.is_rotation][places] += block.column(name)

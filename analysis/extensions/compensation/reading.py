@@ -76,11 +76,11 @@ def read_table_files(
             tables = in_arrangement(tables, arrangement)
         except NotOfAxesError as error:
             raise refused(
-                paths[0], f"cannot be told in that arrangement: {error}; name another"
+                paths[0], f"cannot be expressed in that arrangement: {error}; name another"
             ) from None
     notes = statements.notes
     if not made.has_rotations:
-        notes = (*notes, f"{made.name} tables have no rotations: there are none in what is read")
+        notes = (*notes, f"{made.name} tables have no rotations: the errors read have none")
     return ReadTable(with_sense(tables, meant), meant, notes)
 
 
@@ -88,8 +88,8 @@ def _sense(statements: StatedTable, sense: Sense | None, path: Path) -> Sense:
     if statements.sense is None and sense is None:
         raise refused(
             path,
-            f"does not state whether values are {' or '.join(SENSES)}; say so, since the other"
-            " sign would double the machine's errors",
+            f"does not state whether values are {' or '.join(SENSES)}; state the sense, since the"
+            " other sign would double the machine's errors",
         )
     if None not in (statements.sense, sense) and statements.sense != sense:
         raise refused(path, f"states {statements.sense}, not {sense}; leave the sense to the file")
@@ -109,8 +109,7 @@ def _arrangement(
     else:
         raise refused(
             path,
-            "does not state which axis carries which; name the machine's arrangement, such as"
-            " MB2 or FB1",
+            "does not state the machine's arrangement of axes; name it, such as MB2 or FB1",
         )
     return own_arrangement
 

@@ -18,8 +18,8 @@ from .volume_tables import VolumeTable
 Sense = Literal["corrections", "errors of indication"]
 SENSES: tuple[Sense, ...] = get_args(Sense)
 MEANING: Mapping[Sense, str] = {
-    "corrections": "to be added to scale readings: where the tip is less where the scales say",
-    "errors of indication": "what the scales say less where the tip is",
+    "corrections": "to be added to scale readings: position of the tip minus scale reading",
+    "errors of indication": "scale reading minus position of the tip",
 }
 
 

@@ -136,10 +136,10 @@ class Bootstrap(Result):
             named = ", ".join(f"{k} ({words})" for k, words in self.failed[:MOST_NAMED])
             named += ", …" if len(self.failed) > MOST_NAMED else ""
             lines.append(
-                f"{len(self.failed)} did not converge and are left out of all figures: {named}"
+                f"{len(self.failed)} did not converge and are left out of all results: {named}"
             )
         if len(self.deviations) < 2:
-            return [*lines, "too few converged to tell anything"]
+            return [*lines, "too few converged for a result"]
         shown = [
             row
             for row in self.rows()
@@ -150,7 +150,7 @@ class Bootstrap(Result):
         if open_:
             lines.append(f"{open_} estimates are undetermined, and are left out")
         if DIFFERS * self.ratio_error > TOO_FEW:
-            return [*lines, "so few data sets tell nothing of standard deviations; try a hundred"]
+            return [*lines, "too few data sets for standard deviations; use 100 or more"]
         differing = self.differing
         comparison = f"within {100 * DIFFERS * self.ratio_error:.2g} % of the linear ones"
         if not differing:

@@ -70,7 +70,7 @@ class UncertaintyBudget(Result):
     def headline(self) -> str:
         chosen = _ranking(self.figures)
         if chosen is None:
-            return f"{len(self.sources)} sources, nothing is determined"
+            return f"{len(self.sources)} sources, no quantity is determined"
         return f"{self.sources[0]} {_share(chosen, 0)} of the variance of {chosen.name}"
 
     def lines(self) -> list[str]:

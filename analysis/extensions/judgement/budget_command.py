@@ -51,7 +51,7 @@ def run(options: Namespace) -> int:
     with_fit = [name for name in ("certificate", "sigma", *KEYS) if getattr(options, name)]
     if with_fit and not options.readings:
         name = {"names": "name"}.get(with_fit[0], with_fit[0]).replace("_", "-")
-        raise UsageError(f"--{name} goes with readings; name a table, or leave it out")
+        raise UsageError(f"--{name} applies to readings; name a table, or leave it out")
     if not options.readings:
         show(options, budget(single(options), None, options.by))
         return 0

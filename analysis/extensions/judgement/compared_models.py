@@ -53,8 +53,7 @@ from .rungs import (
 )
 
 NO_RICHER = (
-    "this design determines no richer model than the one recommended: nothing shows that it is rich"
-    " enough"
+    "this design determines no model larger than the recommended one: its sufficiency is untested"
 )
 
 # Chance below which residuals do not come from the scatter of the readings.
@@ -105,13 +104,13 @@ class Climb:
         reached = limits_reached(model, self.grid, self.every)
         if not reached:
             return "", False
-        reason = "the readings call for as many coefficients as "
+        reason = "the readings need as many coefficients as "
         ended = any("empirical" in words for words in self.beyond)
         if ended if reached == (0,) else self.most not in reached:
-            return f"{reason}this design determines: nothing shows that these are enough", True
+            return f"{reason}this design determines: their sufficiency is untested", True
         return (
-            f"{reason}were tried, and would for more, as where an error repeats over short"
-            " distances",
+            f"{reason}were tried, and may need more, for example for an error that repeats over"
+            " short distances",
             False,
         )
 
@@ -389,12 +388,12 @@ def _faults(fit: RungFit, x: Array, repeats: PureError, is_given: bool) -> tuple
     chance = _lack_of_fit(fitted, repeats)
     if chance < MISFIT:
         faults.append(
-            f"lack of fit: the residuals are larger than the scatter of repeated readings explains"
-            f" (chance {chance_words(chance)})"
+            "lack of fit: the residuals are larger than the noise of repeated readings explains"
+            f" (p-value {chance_words(chance)})"
         )
     square, freedom = fitted.sum_of_squares, fitted.degrees_of_freedom
     if is_given and chance_of(square, freedom, 0.0, 0, True) < MISFIT:
-        faults.append(f"S^2 is {square / freedom:.3g} times what the stated uncertainties explain")
+        faults.append(f"S^2 is {square / freedom:.3g} times its value for the stated uncertainties")
     if not too_many_entries(design):
         unexplained = diagnosis_of_all(fit.at, x, freedom, not is_given).unexplained
         if unexplained is not None and (unexplained.words or unexplained.too_large):

@@ -101,7 +101,7 @@ class ComparedModels(FitResult):
     def verdict(self) -> list[str]:
         """Recommendation, as text."""
         if self.is_mistake:
-            return [f"none of these before the file is corrected: {'; '.join(self.faults)}"]
+            return [f"no recommendation until the file is corrected: {'; '.join(self.faults)}"]
         if self.is_none:
             return [
                 (f"none of these: {'; '.join(self.faults)}"),
@@ -113,15 +113,15 @@ class ComparedModels(FitResult):
             ]
         if self.beaten.count:
             count, least = self.beaten.count, chance_words(self.beaten.least)
-            some, does = ("the one richer model", "does not explain")
+            some, does = ("the one larger model", "does not explain")
             if count > 1:
-                some, does = f"none of {count} richer models", "explains"
+                some, does = f"the {count} larger models", "do not explain"
             why = (
-                f"{some} that this design determines {does} significantly more; least chance"
+                f"{some} that this design determines {does} significantly more; smallest p-value"
                 f" {least}, of {self.beaten.by}"
             )
         else:
-            why = "it is the richest that this design determines"
+            why = "it is the largest that this design determines"
         lines = [f"recommended: {self.recommended}; {why}"]
         file = next((rung for rung in self.rungs if rung.is_of_file), None)
         if file is not None and not file.is_recommended:
@@ -134,9 +134,9 @@ class ComparedModels(FitResult):
             sentence = "is not determined by this design"
         elif file.beaten.chance < FALSE_STEP and file.beaten.count:
             chance = chance_words(file.beaten.chance)
-            sentence = f"is too poor: {file.beaten.by} explains more (chance {chance})"
+            sentence = f"is too small: {file.beaten.by} explains more (p-value {chance})"
         elif file.parameters > chosen.parameters:
-            sentence = "has more parameters than the readings call for"
+            sentence = "has more parameters than the readings need"
         else:
             apart = file.criteria.bic - chosen.criteria.bic
             word = (
@@ -146,7 +146,7 @@ class ComparedModels(FitResult):
                 if apart < 0
                 else "the worse"
             )
-            sentence = f"is no poorer or richer form of these; by BIC it is {word}"
+            sentence = f"is not nested with these; by BIC it is {word}"
         sentence = f"the file's error model, {file.model.removeprefix(FILE)}, {sentence}"
         if self.lengths.undetermined:
             return sentence
@@ -161,7 +161,7 @@ class ComparedModels(FitResult):
             "parameters": "parameters",
             "freedom": "degrees_of_freedom",
             "sigma": ("sigma", "{:.4g}".format),
-            f"{test}: chance": (
+            f"{test}: p-value": (
                 _chance,
                 lambda p_value: "-" if math.isnan(p_value) else chance_words(p_value),
             ),
@@ -174,8 +174,8 @@ class ComparedModels(FitResult):
         lines = [
             self.heading,
             (
-                f"error models on the same readings, sigma {how}; chance: that a richer model"
-                f" explains so much more by chance, all richer ones together; AIC and BIC above the"
+                f"error models on the same readings, sigma {how}; p-value: of the largest"
+                " improvement by a larger model, adjusted for their number; AIC and BIC above the"
                 f" least; changes of lengths from {self.recommended}"
             ),
             "",
@@ -206,10 +206,10 @@ class ComparedModels(FitResult):
     def _of_lengths(self) -> str:
         k = self.coverage_factor
         if self.lengths.undetermined:
-            return "lengths are undetermined by this design, whatever the model"
+            return "lengths are undetermined by this design with every model"
         largest, average = 1e6 * k * self.lengths.maximum, 1e6 * k * self.lengths.average
         return (
-            f"beside it U (k = {k:g}) of these lengths: {number(largest, 3)} µm at most,"
+            f"for comparison, U (k = {k:g}) of corrected lengths: {number(largest, 3)} µm at most,"
             f" {number(average, 3)} µm on average"
         )
 
@@ -217,13 +217,13 @@ class ComparedModels(FitResult):
         if not self.repeats.degrees_of_freedom:
             return ["no reading is repeated: lack of fit cannot be tested against repeats"]
         sentence = (
-            f"repeated readings scatter {self.repeats.sigma:.3g} times as stated, with"
-            f" {freedom_words(self.repeats.degrees_of_freedom)}"
+            f"standard deviation of repeated readings: {self.repeats.sigma:.3g} times the stated"
+            f" one, with {freedom_words(self.repeats.degrees_of_freedom)}"
         )
         if math.isnan(self.lack_of_fit):
-            return [f"{sentence}; nothing else is left to test lack of fit"]
+            return [f"{sentence}; no other degrees of freedom are left to test lack of fit"]
         return [
-            f"{sentence}; lack of fit of {self.recommended}: chance"
+            f"{sentence}; lack of fit of {self.recommended}: p-value"
             f" {chance_words(self.lack_of_fit)}"
         ]
 
@@ -267,8 +267,8 @@ class ComparedModels(FitResult):
     @property
     def complaint(self) -> str:
         if self.is_mistake:
-            return "a mistake in the file explains the readings, and no error model does"
-        return "none of the error models explains the readings" if self.is_none else ""
+            return "an error in the file explains the readings, and no error model does"
+        return "no error model explains the readings" if self.is_none else ""
 
 
 def _chance(rung: Rung) -> float:

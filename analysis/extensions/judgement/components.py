@@ -176,7 +176,7 @@ def _told_apart(sums: GroupSums, names: Sequence[str]) -> tuple[Integers, tuple[
         common = information[worst] / np.sqrt(np.diagonal(information))
         common[worst] = -np.inf
         confounded = names[free[int(np.argmax(np.round(common, 6)))]]
-        reasons[free[worst]] = f"cannot be told from {confounded}"
+        reasons[free[worst]] = f"confounded with {confounded}"
         del free[worst]
     return np.array(free, np.int64), tuple(reasons)
 

@@ -94,19 +94,21 @@ class Validation(FitResult):
             f"without {group.kind} {group.name} the estimate does not converge" for group in lost
         ]
         if not any(group.predicted for group in self.left_out):
-            reasons.append("nothing was tested: the rest predicts nothing that can be left out")
+            reasons.append(
+                "no test is possible: no group that can be left out is predicted by the others"
+            )
         return "; ".join(reasons)
 
     def headline(self) -> str:
         tested = sum(group.predicted > 0 for group in self.left_out)
         if not tested:
-            return "nothing that can be left out is predicted by the rest"
+            return "no group that can be left out is predicted by the others"
         return f"{tested} left out in turn, {len(self.failed)} predicted wrongly"
 
     def lines(self) -> list[str]:
         test = "chi-squared" if self.sigma_is_given else "F"
         k = self.coverage_factor
-        heads = ["left out", "", "predicted", "rms error / u", f"{test}: chance", "worst reading"]
+        heads = ["left out", "", "predicted", "rms error / u", f"{test}: p-value", "worst reading"]
         rows = [[*heads, "error / u", "length, µm", f"U (k = {k:g})", ""]]
         failed = self.failed
         for group in self.left_out:
@@ -118,8 +120,8 @@ class Validation(FitResult):
             (
                 "each left out in turn and predicted from all others; its pose, and balls read"
                 " nowhere else, come from its own readings; uncertainties of prediction errors"
-                " include the scatter of the reading; length: largest change of a corrected length,"
-                " beside the U of this change"
+                " include the noise of the reading; length: largest change of a corrected length,"
+                " with U of this change"
             ),
             "",
             *aligned(rows, [False, False, True, True, True, False, True, True, True, False]),
@@ -129,14 +131,17 @@ class Validation(FitResult):
             return [*lines, self.headline()]
         if not failed:
             least = min(group.chance for group in self.left_out if group.predicted > 0)
-            summary = f"no prediction fails: the least of {tested} chances is {chance_words(least)}"
+            summary = (
+                f"no prediction fails: the smallest of {tested} p-values is {chance_words(least)}"
+            )
             return [*lines, summary]
         names = ", ".join(f"{group.kind} {group.name}" for group in failed)
         return [
             *lines,
             (
-                f"predicted wrongly: {names}; the error model is too poor there, or the readings or"
-                " certificates contradict one another: see ballplate models and what fit suspects"
+                f"predicted wrongly: {names}; the error model is too small there, or the readings"
+                " or certificates contradict one another: see ballplate models and the readings"
+                " that fit flags"
             ),
         ]
 

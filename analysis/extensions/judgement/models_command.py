@@ -7,10 +7,10 @@ from argparse import ArgumentParser, ArgumentTypeError, Namespace
 from ballplate.cli import add_json, add_readings, observed_readings, warn_of, whole
 
 DESCRIPTION = (
-    "Fit error models from the poorest to the richest that the design determines, kinematic ones"
-    " with more and more coefficients and empirical ones, and recommend the poorest that no richer"
-    " one beats; tell what each changes in corrected lengths. The exit status is 0 if one is"
-    " recommended, otherwise 1."
+    "Fit error models from the smallest to the largest that the design determines, kinematic ones"
+    " with more and more coefficients and empirical ones. Recommend the smallest that no larger"
+    " one improves significantly; print the changes of corrected lengths. The exit status is 0 if"
+    " one is recommended, otherwise 1."
 )
 
 # Numbers of coefficients of polynomials.

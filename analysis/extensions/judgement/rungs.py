@@ -79,8 +79,8 @@ def refuse_priors(experiment: Experiment, design: Design) -> None:
     """
     if design.of(Priors).of_model.any():
         text = (
-            "models cannot be compared with what is known of one model's parameters; remove the"
-            " priors of the machine's errors"
+            "models cannot be compared with priors of one model's parameters; remove the priors of"
+            " the machine's errors"
         )
         raise refused(experiment.source, text, "priors")
 

@@ -218,7 +218,7 @@ class _Reader:
             return ()
         names = listing(f'"{shorten(cell)}"' for cell in headings.unused)
         text = (
-            f'position "{shorten(position)}" is the name of the file; unused columns: {names}; if'
+            f'position "{shorten(position)}" is the name of the file; not used: {names}; if'
             " one of these holds the position, give --columns"
             f" position={shorten(headings.unused[0])}"
         )

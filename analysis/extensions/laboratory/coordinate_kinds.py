@@ -86,8 +86,7 @@ def doubts_about_copies(design: Design, readings: Readings, x: Array) -> tuple[s
             names = design.positions.names
             doubts.append(
                 f'positions "{names[first]}" and "{names[second]}" have the same readings to the'
-                " last"
-                " digit; if one is a copy of the other, replace it by its own readings"
+                " last digit; if one is a copy of the other, replace it by its own readings"
             )
     return tuple(doubts)
 

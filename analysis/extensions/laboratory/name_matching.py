@@ -376,8 +376,8 @@ def _doubt_numbers(
         if any(float(np.abs(rotation - turn).max()) <= AS_PLANNED for turn in turns):
             findings.asked.append(
                 f"the numbers of balls ({pairs}, in reading order) and their locations along the"
-                " part's axes disagree, and the artefact turned onto itself looks the"
-                " same; write the names that balls have in the experiment"
+                " part's axes disagree, and the artefact turned onto itself looks the same; write"
+                " the names that balls have in the experiment"
             )
             return
     findings.doubted.append(

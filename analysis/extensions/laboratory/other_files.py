@@ -34,8 +34,8 @@ def what_it_is(source: GivenText) -> str:
         return ""
     if is_program(form, source.text):
         return (
-            "this is a DMIS program, not a report; run it on the machine, then"
-            " ballplate import on its output"
+            "this is a DMIS program, not a report; run it on the machine, then ballplate import on"
+            " its output"
         )
     return (
         f"this is a report of a measuring program ({form.title}), and no table of readings; run"

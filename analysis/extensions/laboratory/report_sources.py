@@ -87,8 +87,7 @@ def with_coordinates(
         others_listed = listing(name for name in reports if name not in part_reports)
         text = (
             f"centres in a part's co-ordinate system, and others ({others_listed}) in the"
-            " machine's; state"
-            " coordinates if all are of one type, or fit each separately"
+            " machine's; state coordinates if all are of one type, or fit each separately"
         )
         raise refused(part_reports[0], text)
     if len(reports) < len(coordinates):

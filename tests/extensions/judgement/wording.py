@@ -1,14 +1,14 @@
 """The wording that the tests of judgement expect: a rewording is entered here alone."""
 
 CANNOT_BE_ESTIMATED = "cannot be estimated: too little redundancy"
-CANNOT_BE_TOLD_FROM_READINGS = "cannot be told from readings"
+CANNOT_BE_TOLD_FROM_READINGS = "confounded with readings"
 DID_NOT_CONVERGE = "2 did not converge"
 GO_WITH_TRIALS_ONLY = "go with trials only"
 GROUPS_OF_OBSERVATIONS_OF_PARAMETERS = "4 groups of observations of 90 parameters"
 IS_NOT_DETERMINED_BY_THIS_DESIGN = "is not determined by this design"
 LARGER_THAN_STATED = "larger than stated: readings along z"
-NOTHING_SHOWS_THAT_IT_IS_RICH = "nothing shows that it is rich enough"
-SIGMA_GOES_WITH_READINGS = "--sigma goes with readings"
+NOTHING_SHOWS_THAT_IT_IS_RICH = "its sufficiency is untested"
+SIGMA_GOES_WITH_READINGS = "--sigma applies to readings"
 SIGMA_TIMES_THE_STATED_UNCERTAINTIES = (
     "sigma = 1 times the stated uncertainties (those of groups as estimated below)"
 )

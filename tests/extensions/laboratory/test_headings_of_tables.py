@@ -64,7 +64,7 @@ def test_columns_that_are_not_used_are_told_where_the_name_of_the_file_is_no_pos
     heads = ["Ort", "Kugel", "Taster", "X [mm]", "Y [mm]", "Z [mm]"]
     text = refusal(table, heads, tmp_path / "t.csv")
     assert wording.THE_NAME_OF_THE_FILE in text
-    assert 'unused columns: "Ort"' in text and "--columns position=Ort" in text
+    assert 'not used: "Ort"' in text and "--columns position=Ort" in text
 
 
 def test_a_file_named_as_a_position_has_that_position(
@@ -80,7 +80,7 @@ def test_a_file_named_as_a_position_has_that_position(
         paths[-1].write_text(heads + other.to_csv(index=False, header=False))
     found = read_readings(paths, lay_out(experiment), settings=experiment.readings)
     assert len(found.x) == len(readings) and not found.missing
-    assert all('unused columns: "Ort"' in told for told in found.table_notes)
+    assert all('not used: "Ort"' in told for told in found.table_notes)
 
 
 @pytest.mark.parametrize("heads", ["X-Istwert,X-Istwert,Z-Istwert", "X,Y,X", "Z,Y,Z", "X,Z,Z"])
