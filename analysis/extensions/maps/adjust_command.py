@@ -27,9 +27,9 @@ if TYPE_CHECKING:
 DESCRIPTION = (
     "Apply stated changes of scales and turns of guideways to a fitted machine: of a map file, or"
     " of an experiment with its readings. Predict the remaining scale errors, angles between the"
-    " axes and errors along the diagonals of the volume, with U, and compare with what a second"
-    " campaign finds, as diff does. The exit status is 1 if that shows a change, or nothing can be"
-    " compared, or a fit is not as expected, otherwise 0."
+    " axes and errors along the diagonals of the volume, with U, and compare them with a second"
+    " campaign, as diff does. The exit status is 1 if the comparison shows a change or is"
+    " impossible, or a fit is not as expected, otherwise 0."
 )
 
 
@@ -120,7 +120,7 @@ def _second(options: Namespace) -> tuple[FittedMap | None, bool]:
         return _fitted(options, options.after[0], options.after[1:])
     if _is_map(options.files[0]):
         raise UsageError(
-            f"{options.after[0]} is no map file; readings need the experiment file in the place of"
+            f"{options.after[0]} is no map file; for readings, name the experiment file instead of"
             f" {options.files[0]}, or fit them first with fit -o"
         )
     return _fitted(options, options.files[0], options.after)

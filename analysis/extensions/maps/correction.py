@@ -124,7 +124,7 @@ class Correction(Result):
         count = number_of(len(self.points), "point")
         if np.isnan(u).all():
             return f"{count}, undetermined"
-        missing = f", {open_} of them undetermined" if open_ else ""
+        missing = f", {open_} undetermined" if open_ else ""
         largest = float(np.nanmax(u))
         u_text = f"U = {self.coverage_factor:g} u = {number(1e6 * largest)} µm at most"
         return f"{count}{missing}; {u_text}"
@@ -137,8 +137,8 @@ class Correction(Result):
         if len(outside):
             words = listing((self.given.name(int(i)) for i in outside), 3)
             cautions.append(
-                f"{len(outside)} of {len(self.points)} points lie outside the volume of the map,"
-                f" where it is extrapolated and its uncertainty need not hold: {words}"
+                f"{len(outside)} of {len(self.points)} points lie outside the volume of the map;"
+                f" corrections are extrapolated and U need not hold: {words}"
             )
         if fitted.without_scatter:
             cautions.append(
@@ -163,10 +163,10 @@ class Correction(Result):
         lines = [
             f"{fitted.title}: {self.headline()}",
             f"map{dated}: sigma {fitted.sigma:.4g} ({how}),"
-            f" {freedom_words(fitted.degrees_of_freedom)}; U = {k:g} u, {scatter} the scatter of"
-            " the readings that are corrected",
+            f" {freedom_words(fitted.degrees_of_freedom)}; U = {k:g} u, {scatter} the noise of the"
+            " corrected readings",
             verdict_line(fitted.lack_of_fit),
-            "a correction is added to what the scales say with the stated offset of the probe; the"
+            "a correction is added to the scale readings with the stated offset of the probe; the"
             " error of indication has the opposite sign",
             *self._temperature_lines(),
             "",

@@ -21,10 +21,10 @@ from .lengths_command import coverage_factor
 
 DESCRIPTION = (
     "Compare two campaigns, or a campaign with an expected map: lengths, errors at points of the"
-    " volume after the free motion between the frames is taken out, error functions, and balls"
-    " where both are experiments with readings. A normalised error E_n is a difference over its"
-    " expanded uncertainty. The exit status is 0; with --fail it is 1 if the joint test of the map"
-    " shows a change."
+    " volume after the free motion between the frames is taken out, error functions, and balls if"
+    " both are experiments with readings. A normalised error E_n is a difference over its expanded"
+    " uncertainty. The exit status is 0; with --fail it is 1 if the joint test of the map shows a"
+    " change."
 )
 
 # Points along each axis: all pairs of points are lengths.

@@ -62,7 +62,7 @@ class ErrorCurves(Result):
 
     def lines(self) -> list[str]:
         functions, lines = self.functions, head_lines(self.label, self.fitted)
-        lines[-1] += ", at each position by itself"
+        lines[-1] += ", at each position separately"
         if functions.curves:
             lines += ["", *_curve_table(functions.curves, self.k)]
         if functions.squareness:

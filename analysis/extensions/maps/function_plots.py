@@ -78,7 +78,7 @@ def draw_functions(
                 axes.set_ylabel(SHOWN[curves[0].unit])
         heads = [
             (title, 11.5),
-            (f"band: expanded uncertainty U, k = {k:g}, at each position by itself", 9.0),
+            (f"band: expanded uncertainty U, k = {k:g}, at each position separately", 9.0),
             (CONVENTION, 9.0),
         ]
         if any(curve.line for curve in functions.curves):

@@ -100,7 +100,7 @@ def draw_lengths(lengths: GroupedLengths, path: str | Path | None = None) -> Fig
             f"target {target_words(lengths.settings.target)}: u within it for {shares[0]} of"
             " the lengths, "
         )
-        return save(figure, path, f"{words}{k} u for {shares[1]} of them")
+        return save(figure, path, f"{words}{k} u for {shares[1]}")
 
 
 def marks(ratios: Array) -> tuple[NDArray[np.bool_], str]:

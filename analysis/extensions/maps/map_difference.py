@@ -42,9 +42,8 @@ SAME_READINGS = (
 )
 
 SOME_READINGS = (
-    "both rest on some of the same readings: U here, which takes campaigns to be independent, is"
-    " too large, so that a change may be shown, but never that there is none; compare a map of"
-    " new readings alone"
+    "both rest on some of the same readings: U here, which assumes independent campaigns, is too"
+    " large; a change may be shown, its absence never; compare a map of new readings alone"
 )
 
 
@@ -191,8 +190,9 @@ class MapDifference(Result):
         if self.shared is None:
             return INDEPENDENT
         return (
-            f"{self.shared} certified values are the same in both campaigns: their errors cancel,"
-            " as far as both estimates follow them; everything else is taken to be independent"
+            f"{self.shared} certified values are the same in both campaigns: their errors cancel"
+            " to the extent that both estimates follow them; everything else is assumed"
+            " independent"
         )
 
     def _motion_table(self) -> list[str]:
@@ -252,8 +252,8 @@ class MapDifference(Result):
                 f" {self._verdict(test)}"
             )
         lines.append(
-            "a single |E_n| > 1 among many figures shows nothing, since about as many as stated by"
-            f" chance exceed 1; joint tests count, and each errs once in {round(1 / LEVEL)}"
+            "a single |E_n| > 1 among many values shows no change: about the stated number exceeds"
+            f" 1 without one; joint tests count, each at the significance level {LEVEL:g}"
         )
         return [*lines, ""]
 

@@ -59,7 +59,7 @@ def map_errors(
         choices["tasks"] = tasks or None
         stated_choices = [name for name, value in choices.items() if value is not None]
         if stated_choices:
-            raise ValueError(f"{stated_choices[0]} and error do not go together; give one of them")
+            raise ValueError(f"{stated_choices[0]} and error do not go together; give only one")
     if isinstance(source, Path) and not is_map_file(source):
         if probe is not None:
             raise ValueError("a machine file states its own probe; leave the probe out")

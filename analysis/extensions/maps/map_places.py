@@ -24,7 +24,7 @@ GRID, POINTS = (5, 5, 5), 21
 PlaceKind = Literal["grid", "plane", "line", "points"]
 
 Line = Mapping[str, float] | Sequence[Sequence[float]]
-"""The places in metres of the fixed axes, by their names, or two points."""
+"""Co-ordinates in metres of the fixed axes, by their names, or two points."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,7 +77,7 @@ def parse_places(text: str) -> Line:
     in_plane = start.count(",") == end.count(",") == 1
     ends = (_two(start), _two(end)) if in_plane else (parse_point(start), parse_point(end))
     if ends[0] == ends[1]:
-        raise ValueError("a line ends where it begins; give two points")
+        raise ValueError("both ends of a line coincide; give two points")
     return ends
 
 
@@ -116,7 +116,7 @@ def map_places(
     }
     several = [name for name, value in choices.items() if value is not None]
     if len(several) > 1:
-        raise ValueError(f"{' and '.join(several)} do not go together; give one of them")
+        raise ValueError(f"{' and '.join(several)} do not go together; give only one")
     if asked.points is not None and asked.line is None:
         raise ValueError("points need a line; leave them out")
     d, ends = len(volume.lower), volume.diagonals

@@ -51,7 +51,7 @@ def mapped_lengths(
         apart = places[first] - places[second]
         values[some] = np.linalg.norm(apart, axis=1)
         if not values[some].all():
-            raise ValueError("both points of a length are at the same place")
+            raise ValueError("both points of a length coincide")
         unit = apart / values[some][:, None]
         tip = tips(fitted, x, ends)
         readings[some] = np.linalg.norm(tip[first] - tip[second], axis=1)

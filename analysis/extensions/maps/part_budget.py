@@ -20,7 +20,7 @@ from .fitted_errors import ErrorRows, length_ends, length_rows, rows_of_errors
 from .map_places import MapPlaces
 from .volumetric_errors import Volumetric, length_errors
 
-REST = "together", "what the parts do together beyond the sum of each alone"
+REST = "together", "joint effect of the parts beyond the sum of their single effects"
 OFFSETS = "offsets", "estimated offsets of probes, which rotations turn"
 PROBING = "probing", "what probing adds to each co-ordinate"
 

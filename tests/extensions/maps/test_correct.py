@@ -235,7 +235,7 @@ SLIPS = {
     "unit": (POINTS.replace("_mm", "_m"), [], 3, ":2:1: x is 100 m, far outside the volume"),
     "no number": (POINTS.replace("400", "4OO"), [], 3, ':3:3: "4OO" is not a number'),
     "no axis": ("x_mm,y_mm\n1,2\n", [], 3, "no column for z"),
-    "same place": (POINTS + "D,1,2,3\nE,1,2,3\n", ["--length", "D", "E"], 2, "same place"),
+    "same place": (POINTS + "D,1,2,3\nE,1,2,3\n", ["--length", "D", "E"], 2, "coincide"),
 }
 
 

@@ -258,7 +258,7 @@ def test_magnification_is_round() -> None:
         (("--line", "y = 600"), 'y: "600" has no unit'),
         (
             ("--line", "1 m, 1 m, 1 m to 1 m, 1 m, 1 m"),
-            "a line ends where it begins; give two points",
+            "both ends of a line coincide; give two points",
         ),
         (("--line", "1 m, 1 m to 1 m, 1 m, 1 m"), "has 2 co-ordinates; give three"),
         (
