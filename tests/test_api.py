@@ -209,7 +209,7 @@ def test_a_sweep_goes_on_where_it_ended(tmp_path: Path, capsys: pytest.CaptureFi
     assert (
         found.summary.done == 2
         and found.summary.before == 0
-        and repr(found).endswith("2 cells, 2 done, 0 failed>")
+        and repr(found).endswith("2 cases, 2 done, 0 failed>")
     )
     assert len(found.to_frame()) == 2 and found.to_dict()["store"] == str(store)
     again = bp.sweep(file)
@@ -218,7 +218,7 @@ def test_a_sweep_goes_on_where_it_ended(tmp_path: Path, capsys: pytest.CaptureFi
         connection.execute("UPDATE result SET figures = '{}' WHERE rowid = 1")
     damaged = bp.stored(store)
     assert damaged.summary.done == 1 and damaged.summary.left == 1
-    assert "1 unreadable cell" in damaged.remarks[0]
+    assert "1 unreadable case" in damaged.remarks[0]
     mended = bp.sweep(file)
     assert mended.summary.before == 1 and mended.summary.done == 2
     assert "replaced in this run" in mended.remarks[0] and mended.remarks[0] in str(mended)

@@ -37,7 +37,7 @@ CANNOT_BE_WRITTEN = (
     "permissions and its room, and whether another program has the file open"
 )
 CANNOT_FOLLOW_AN_UNKNOWN_LENGTH = "cannot follow an unknown length (bar: length)"
-CELLS_DONE_FAILED_OF_THEM_BEFORE = "6 cells, 4 done, 2 failed (2 of them before)"
+CELLS_DONE_FAILED_OF_THEM_BEFORE = "6 cases, 4 done, 2 failed (2 of them before)"
 CHOOSE_ONE_WITH_VARIANT = "choose one with --variant: A, B, C, D"
 CORRECT_OR_REMOVE = "correct or remove it"
 CORRECT_THE_NAMES_OF_THE_BALLS = "correct the names of the balls"
@@ -63,7 +63,7 @@ EVERY_BAR_LIES_PARALLEL_TO_THE_XY = (
 )
 EXX_POSITIONING_ERROR = "EXX (positioning error of X, quadratic)"
 FAR_OUTSIDE_THE_VOLUME = "far outside the volume; check the unit"
-FINISHED_CELLS_ARE_IN_NEW_SQLITE = "finished cells are in new.sqlite"
+FINISHED_CELLS_ARE_IN_NEW_SQLITE = "finished cases are in new.sqlite"
 FITS_THE_PROBE_LEFT = "fits the probe left, not right; correct the name of the probe"
 FROM_DEGREES_OF_FREEDOM_IS_ITSELF = "from 6 degrees of freedom is itself uncertain by 29 %; "
 GAMMA_DIFFERENCE_OF_THE_SCALES = "gamma (difference of the scales of x and y)"
@@ -77,7 +77,7 @@ HAS_NO_UNIT = (
     '6:37: artefacts.unit.radius: "300" has no unit; write for example "300 mm" or "300 um"'
 )
 HAS_NO_UNIT_2 = 'machine.repeatability: "0.2" has no unit; '
-INTERRUPTED_FINISHED_CELLS = "interrupted; finished cells are in"
+INTERRUPTED_FINISHED_CELLS = "interrupted; finished cases are in"
 IN_POSITION_TURNED = "in position turned, line 9; correct or"
 IS_A_BRYAN_GAUGE_AND_HAS = (
     '21:12: calibration[0].kind: "over" is a Bryan gauge and has a radius only; use kind: radius'

@@ -77,7 +77,7 @@ LIMITS = {
     "`fit --components` |": (components.MOST_ENTRIES,),
     "`compare`, `fit --estimator` |": (estimators.MOST_DERIVATIVES,),
     "`compare --points`": (estimators.MOST_POINTS,),
-    "`sweep` | cells": (load.MOST_CELLS,),
+    "`sweep` | cases": (load.MOST_CELLS,),
     "`sweep` | values": (axes.MOST_VALUES,),
     "`reach`": (search.MOST_POINTS,),
     "`compensation` |": (table_formats.MOST_NODES, table_formats.MOST_GRID_NODES),

@@ -50,7 +50,7 @@ def bundle_of(sweep: Sweep) -> Bundle:
     try:
         names = names_of(paths)
     except ValueError:
-        text = f"{sweep.base} is on another drive than the sweep file; move one of them"
+        text = f"{sweep.base} is on another drive than the sweep file; move one"
         raise refused(sweep.source, text, "base") from None
     try:
         size = sum(path.stat().st_size for path in paths)

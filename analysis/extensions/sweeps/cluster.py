@@ -38,7 +38,7 @@ PATIENCE = 30.0
 LOGGERS = ("distributed", "tornado", "asyncio")
 
 REMEDY = "install the same ballplate on every worker"
-RESTART = "finished cells are stored, and the same command continues from there"
+RESTART = "finished cases are stored, and the same command continues from there"
 
 
 class ClusterError(UnusableError):

@@ -46,7 +46,7 @@ class Summary:
         notes = [f"{self.blocks} blocks of data sets"] if self.blocks else []
         notes += [f"{self.failed} failed"] if self.failed else []
         return ProgressStep(
-            "cells", self.done + self.failed, self.cells, ", ".join(notes), self.before
+            "cases", self.done + self.failed, self.cells, ", ".join(notes), self.before
         )
 
 

@@ -19,13 +19,13 @@ if TYPE_CHECKING:
 
 BAD_FILE = 3
 
-REPLACE = "run ballplate sweep again to replace unreadable cells"
+REPLACE = "run ballplate sweep again to replace unreadable cases"
 
 
 DESCRIPTION = (
-    "Write one row per cell of a store and one column per value, in metres and radians,"
-    " with the unit in the column's name. From a damaged store, write the readable cells."
-    " Exit status: 3 if the store is damaged."
+    "Write one row per case of a store and one column per value, in metres and radians, with the"
+    " unit in the column's name. From a damaged store, write the readable cases. Exit status: 3 if"
+    " the store is damaged."
 )
 
 

@@ -50,7 +50,7 @@ def sweep(
     >>> import tempfile
     >>> with tempfile.TemporaryDirectory() as folder:
     ...     sweep("designs/sweeps/plate-size.yaml", f"{folder}/plates.sqlite")
-    <SweepResult of plate-size: 12 cells, 12 done, 0 failed>
+    <SweepResult of plate-size: 12 cases, 12 done, 0 failed>
     """
     from contextlib import nullcontext
 

@@ -83,7 +83,7 @@ def load_sweep(
     cells = tuple(_selected_cells(settings, axes))
     if not cells:
         problems.add(
-            ("skip",) if settings.skip else ("only",), "leaves no cell; relax the conditions"
+            ("skip",) if settings.skip else ("only",), "leaves no case; relax the conditions"
         )
         raise ExperimentError(problems.messages)
     sweep = Sweep(

@@ -30,10 +30,9 @@ SUFFIXES = {
 
 
 DESCRIPTION = (
-    "Write the results of a sweep as one HTML page that needs no network: tables,"
-    " plots, rank, the best and the worst design; with --format text, markdown, csv or"
-    " latex, only the tables. From a damaged store, report the readable cells. Exit"
-    " status: 3 if the store is damaged."
+    "Write the results of a sweep as one HTML page that needs no network: tables, plots, rank, the"
+    " best and the worst design; with --format text, markdown, csv or latex, only the tables. From"
+    " a damaged store, report the readable cases. Exit status: 3 if the store is damaged."
 )
 
 
@@ -104,7 +103,7 @@ def run(options: Namespace) -> int:
 
             text = FORMATS[form](results.title, report_tables(results))
         if not results.count("done") and not is_damaged:
-            text_of_count = f"0 of {len(results.cells)} cells done"
+            text_of_count = f"0 of {len(results.cells)} cases done"
             complain(f"{store.path}: {text_of_count}; to continue, run ballplate sweep again")
     if output is None:
         sys.stdout.write(text)

@@ -90,7 +90,7 @@ class SweepResult(Result):
     def headline(self) -> str:
         summary = self.summary
         remaining = f", {summary.left} left" if summary.left else ""
-        return f"{summary.cells} cells, {summary.done} done, {summary.failed} failed{remaining}"
+        return f"{summary.cells} cases, {summary.done} done, {summary.failed} failed{remaining}"
 
     def lines(self) -> list[str]:
         names = list(self.table.columns)
@@ -207,7 +207,7 @@ def shortcomings(path: Path, rows: Sequence[StoredRow]) -> tuple[str, ...]:
             reasons.setdefault(row.reason, []).append(row.number)
     for reason, failed in list(reasons.items())[:MOST_REASONS]:
         more = f" and {len(failed) - 1} more" if len(failed) > 1 else ""
-        notes.append(f"cell {failed[0]}{more} failed: {reason}")
+        notes.append(f"case {failed[0]}{more} failed: {reason}")
     if len(reasons) > MOST_REASONS:
         more_reasons = len(reasons) - MOST_REASONS
         notes.append(f"and {more_reasons} reasons more; see ballplate sweep --export")

@@ -317,6 +317,6 @@ def damaged_cells(path: Path, results: StoredResults, consequence: str) -> str:
         return ""
     cells = sorted(results.damaged)
     more = f" and {len(cells) - 10} more" if len(cells) > 10 else ""
-    counted = number_of(len(cells), "unreadable cell")
+    counted = number_of(len(cells), "unreadable case")
     text = f"{', '.join(map(str, cells[:10]))}{more} ({results.damaged[cells[0]]})"
     return in_one_line(f"{path}: {counted}: {text}; {consequence}")

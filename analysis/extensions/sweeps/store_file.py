@@ -41,8 +41,8 @@ CREATE TABLE result (
 
 # Remedies by the beginning of the names of SQLite's result codes.
 WORDS = {
-    "SQLITE_FULL": "cannot be written ({}); make room and restart: finished cells are stored",
-    "SQLITE_IOERR": "cannot be written ({}); make room and restart: finished cells are stored",
+    "SQLITE_FULL": "cannot be written ({}); make room and restart: finished cases are stored",
+    "SQLITE_IOERR": "cannot be written ({}); make room and restart: finished cases are stored",
     "SQLITE_BUSY": "another process is writing to it; wait for it, or end it",
     "SQLITE_READONLY": "cannot be written ({}); check its permissions and those of its folder",
     "SQLITE_CANTOPEN": "cannot be opened ({}); check its permissions and those of its folder",
@@ -193,7 +193,7 @@ def _prepare(path: Path, connection: sqlite3.Connection) -> None:
         if fault:
             raise StoreError(
                 f"{path}: is damaged ({fault}); ballplate sweep --export and --report read the"
-                f" undamaged cells; {RECOMPUTE}"
+                f" undamaged cases; {RECOMPUTE}"
             )
     connection.execute("PRAGMA journal_mode = WAL")
     # Rows are on disk when a call returns.

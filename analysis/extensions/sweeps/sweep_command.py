@@ -23,10 +23,9 @@ BAD_FILE = 3
 
 
 DESCRIPTION = (
-    "Compute every cell of a sweep file: rank, U1 to U6 and, if the file sets trials,"
-    " Monte Carlo. Each finished cell is stored on disk; after an interruption, the same"
-    " command computes the remaining cells. Exit status: 0 if all cells are done, 1 if"
-    " some have failed."
+    "Compute every case of a sweep file: rank, U1 to U6 and, if the file sets trials, Monte Carlo."
+    " Each finished case is stored on disk; after an interruption, the same command computes the"
+    " remaining cases. Exit status: 0 if all cases are done, 1 if some have failed."
 )
 
 
@@ -39,7 +38,7 @@ def add_options(parser: ArgumentParser) -> None:
         help="store; default: the sweep file's name with .sqlite",
     )
     parser.add_argument(
-        "--dry-run", action="store_true", help="only list the cells and estimate the time"
+        "--dry-run", action="store_true", help="only list the cases and estimate the time"
     )
     add_workers(parser)
     parser.add_argument(
@@ -47,8 +46,8 @@ def add_options(parser: ArgumentParser) -> None:
         metavar="ADDRESS",
         help="compute on the dask.distributed cluster of this scheduler instead",
     )
-    parser.add_argument("--retry-failed", action="store_true", help="compute failed cells again")
-    parser.add_argument("--fail-fast", action="store_true", help="stop when a cell fails")
+    parser.add_argument("--retry-failed", action="store_true", help="compute failed cases again")
+    parser.add_argument("--fail-fast", action="store_true", help="stop when a case fails")
     parser.add_argument(
         "--beside",
         action="store_true",
@@ -103,7 +102,7 @@ def _run(sweep: Sweep, bundle: Bundle, store: Store, options: Namespace) -> int:
     for remark in entered.remarks:
         complain(remark)
     options.interruption.kept = lambda: (
-        f"finished cells are in {store.path}, and the same command continues from there"
+        f"finished cases are in {store.path}, and the same command continues from there"
     )
     try:
         with progress(options) as shown:
@@ -120,7 +119,7 @@ def _run(sweep: Sweep, bundle: Bundle, store: Store, options: Namespace) -> int:
             options.interruption.answer()
     except ChangedError:
         text = (
-            "files of the sweep have changed while it ran; start it again: finished cells are"
+            "files of the sweep have changed while it ran; start it again: finished cases are"
             " stored"
         )
         complain(f"{options.file}: {text}")
@@ -150,7 +149,7 @@ def _report(store: Store, which: str, number: int, summary: Summary) -> None:
 
     before = f" ({summary.before} of them before)" if summary.before else ""
     remaining = f", {summary.left} left" if summary.left else ""
-    counted = f"{number_of(summary.cells, 'cell')}{which}"
+    counted = f"{number_of(summary.cells, 'case')}{which}"
     counts = f"{summary.done} done, {summary.failed} failed{before}{remaining}"
     print(in_one_line(f"{store.path}: {counted}, {counts}"))
     for text in shortcomings(store.path, results(store, number, summary.cells).rows):
@@ -169,9 +168,9 @@ def _dry_run(sweep: Sweep, options: Namespace) -> int:
     workers = options.workers or processors()
     seconds, rows = seconds_of(sweep)
     words = f"with {number_of(workers, 'worker')}, estimated from {len(rows)}"
-    cells = number_of(len(sweep.cells), "cell")
+    cells = number_of(len(sweep.cells), "case")
     print(f"{cells}, about {duration(seconds / workers)} {words}", file=sys.stderr)
     failed = [row for row in rows if row.status == "failed"]
     for row in failed:
-        print(f"cell {row.number} fails: {row.reason}", file=sys.stderr)
+        print(f"case {row.number} fails: {row.reason}", file=sys.stderr)
     return 1 if failed else 0

@@ -98,22 +98,22 @@ class SweepSettings(Settings):
         None, description="variant of the base file; needed if it has several"
     )
     axes: Annotated[dict[Name, AxisSettings], Field(min_length=1)] = Field(
-        description="name: what varies; every combination of the axes' values is a cell"
+        description="name: what varies; every combination of the axes' values is a case"
     )
     skip: tuple[Annotated[dict[Name, Condition], Field(min_length=1)], ...] = Field(
         (),
         description=(
-            "cells left out: axis: value, list of values or {above: …, below: …}, all of an entry"
+            "cases left out: axis: value, list of values or {above: …, below: …}, all of an entry"
             " at once"
         ),
     )
     only: tuple[Annotated[dict[Name, Condition], Field(min_length=1)], ...] = Field(
-        (), description="cells kept, in the same form; default: all"
+        (), description="cases kept, in the same form; default: all"
     )
     trials: Annotated[int, Field(ge=2, le=MOST_TRIALS)] | None = Field(
-        None, description="synthetic data sets of each cell; default: none"
+        None, description="synthetic data sets of each case; default: none"
     )
-    seed: Seed = Field(1, description="of the data sets; each cell derives its own")
+    seed: Seed = Field(1, description="of the data sets; each case derives its own")
     record: NonEmpty[Quantity] = Field(
         RECORDED, description=f"quantities that are kept, {KEPT} and {MORE}; default: all of {KEPT}"
     )

@@ -222,7 +222,7 @@ def test_a_sweep_over_two_axes_is_stopped_and_its_page_opened(design: Path) -> N
             page.click("#ok")
 
         sweep("; ".join(f"{k} nm" for k in range(100, 600)))
-        page.wait_for_selector("#jobs li[data-state=running] >> text=of 1000 cells")
+        page.wait_for_selector("#jobs li[data-state=running] >> text=of 1000 cases")
         page.click("#jobs button >> text=stop")
         until(page, "!document.querySelector('#jobs li')")
         sweep("0.1 um; 0.2 um; 0.4 um")
@@ -237,7 +237,7 @@ def test_a_sweep_over_two_axes_is_stopped_and_its_page_opened(design: Path) -> N
         swept.on("console", lambda said: failures.append(said.text))
         swept.on("pageerror", lambda error: failures.append(str(error)))
         swept.reload()
-        assert "6 of 6 cells done" in swept.inner_text("body")
+        assert "6 of 6 cases done" in swept.inner_text("body")
         assert failures == [] and page.errors == []
 
 

@@ -42,7 +42,7 @@ def test_every_combination_is_what_run_says_of_it(document, tmp_path, monkeypatc
     before = sorted(one.name for one in tmp_path.iterdir())
     found = swept(document, axes, steps.append)
     assert sorted(one.name for one in tmp_path.iterdir()) == before
-    assert found["headline"].startswith("4 cells, 4 done") and str(steps[-1]).startswith("4 of 4")
+    assert found["headline"].startswith("4 cases, 4 done") and str(steps[-1]).startswith("4 of 4")
     saved = tmp_path / "saved.yaml"
     saved.write_text(document.text)
     experiment = bp.load(saved)

@@ -63,7 +63,7 @@ def sweep(
 def test_settings_within_the_target_are_counted_and_the_cheapest_named(tmp_path: Path) -> None:
     found = answer(sweep(tmp_path))
     meeting = [one for one in itertools.product(SIZES, BALLS, MODELS) if average(*one) <= 0.5e-6]
-    assert found.sentences[0].startswith(f"{len(meeting)} of 12 settings meet")
+    assert found.sentences[0].startswith(f"{len(meeting)} of 12 cases meet")
     # Of the fewest balls the smallest average.
     size, balls, model = min(meeting, key=lambda one: (one[1], average(*one)))
     assert f"size {size:.0f} mm, balls {balls:.0f}, model {model}: 400 obs" in found.sentences[1]
@@ -188,10 +188,10 @@ def test_values_that_differ_in_late_digits_are_settings_of_their_own(tmp_path: P
     for count in (3, 2, 1):
         there = store(f"b{count}.sqlite", list(lengths)[: -count - 1 : -1], 2.0)
         found = compared(here, there, "b")
-        are = "1 setting is" if count == 1 else f"{count} settings are"
+        cases, are = ("1 case", "is") if count == 1 else (f"{count} cases", "are")
         assert found.sentences == (
-            f"{are} done in both; {3 - count} in this store alone, 0 in b alone.",
-            f"The average of U6 is smaller than in b in {count} of them, by a factor of 0.500.",
+            f"{cases} {are} done in both; {3 - count} in this store alone, 0 in b alone.",
+            f"The average of U6 is smaller than in b in {cases}, by a factor of 0.500.",
         )
         assert len(found.settings.blocks[0].rows) == count
     alone = compared(there, there, "b")
@@ -272,7 +272,7 @@ def _assert_counts(
     text: str, table: list[dict[str, str]], finished: list[dict[str, str]], every: int
 ) -> None:
     deficient = sum(float(row["rank_deficiency"]) > 0 for row in finished)
-    found = re.search(r"(\d+) of (\d+) settings? leaves? something undetermined", text)
+    found = re.search(r"(\d+) of (\d+) cases? leaves? something undetermined", text)
     assert (deficient > 0) == (found is not None)
     if found:
         assert [int(one) for one in found.groups()] == [deficient, len(finished)]
@@ -297,12 +297,12 @@ def _assert_first(
     if symbol == "U4":
         assert text.startswith(wording.IS_NOT_RECORDED)
     elif not shares:
-        assert text.startswith("No setting has a target")
+        assert text.startswith("No case has a target")
     elif not meeting:
         assert text.startswith(("None of the", wording.THE_ONLY_SETTING_DOES_NOT_MEET))
         assert wording.OF_THE_LENGTHS in text
     else:
-        assert re.match(rf"{len(meeting)} of {len(shares)} settings? meets? the target", text)
+        assert re.match(rf"{len(meeting)} of {len(shares)} cases? meets? the target", text)
         fewest = min(float(row["observations"]) for row in meeting)
         cheapest = [row for row in meeting if float(row["observations"]) == fewest]
         best = min(float(row[average]) for row in cheapest)
@@ -311,7 +311,7 @@ def _assert_first(
                 f": {fewest:.0f} observations" in text and wording.THE_ONE_WITH_THE_FEWEST in text
             )
         else:
-            assert f"observations are {fewest:.0f}, in {len(cheapest)} of these settings" in text
+            assert f"observations are {fewest:.0f}, in {len(cheapest)} of these cases" in text
             tied = sum(float(row[average]) == best for row in cheapest) - 1
             assert f"{1e6 * best:.2f} µm" in text and (f"{tied} more." in text) == (tied > 0)
         chosen = [row for row in cheapest if float(row[average]) == best]
@@ -325,7 +325,7 @@ def _assert_first(
         assert f"{symbol}, {1e6 * best:.2f} µm" in text and ("the same." in text) == (tied > 0)
         assert first in [_labels(row) for row in known if float(row[average]) == best]
     else:
-        assert f"In every setting some of {symbol} is undetermined" in text
+        assert f"Every case leaves some of {symbol} undetermined" in text
 
 
 def _labels(row: dict[str, str]) -> tuple[str, ...]:

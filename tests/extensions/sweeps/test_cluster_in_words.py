@@ -147,7 +147,7 @@ def test_a_scheduler_that_ends(
         out, err = sweep.communicate(timeout=100)
     last = err.splitlines()[-1]
     assert sweep.returncode == 3 and "Traceback" not in err and out == "", err
-    assert last.startswith(f"the scheduler at {address} has ended; finished cells are stored"), err
+    assert last.startswith(f"the scheduler at {address} has ended; finished cases are stored"), err
     assert 2 <= stored(store) < 200
 
 

@@ -136,7 +136,7 @@ def test_what_can_be_read_of_a_damaged_store_is_right(
         # But for SQLite's header, which says how it writes.
         assert store.read_bytes()[100:] == damaged[100:]
     else:
-        assert status == 1 and "4 cells" in out and "2 done, 2 failed" in out
+        assert status == 1 and "4 cases" in out and "2 done, 2 failed" in out
         assert "Traceback" not in err
         assert_same(rows(store), right)
 
@@ -232,7 +232,7 @@ def test_all_but_the_rows_of_the_damaged_pages_survive(
         path.write_bytes(content[: len(content) - size])
     assert main(["sweep", "--export", str(path), "-o", str(tmp_path / "t.csv")]) == 3
     err = capsys.readouterr().err
-    told = re.search(r"(\d+) unreadable cells?", err)
+    told = re.search(r"(\d+) unreadable cases?", err)
     # `sweep` refuses such a file.
     assert f"; restore a copy, or {wording.NAME_A_NEW_FILE}" in err
     table = read_table(tmp_path / "t.csv")
@@ -485,7 +485,7 @@ def test_a_report_reads_no_file_outside_the_store(where: str, target: str, store
             "~/x.csv: there is no such file",
         ),
         "axis": (
-            "the stored files make other cells than those stored",
+            "the stored files make other cases than those stored",
             "outside the folders of the sweep",
         ),
         # What nothing names is not read.

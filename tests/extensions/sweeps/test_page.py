@@ -132,9 +132,9 @@ def test_variants_with_deficient_designs(tmp_path: Path) -> None:
     assert_of_store(found, store)
     assert found.texts["h1"] == ["<b>kinds</b> & $more$"]
     summaries = [" ".join(one.split()) for one in found.texts["summary"]]
-    assert "rank deficiency 2, as expected: cell 1 (design B)" in summaries
+    assert "rank deficiency 2, as expected: case 1 (design B)" in summaries
     assert any(wording.EYY_POSITIONING_ERROR in line for line in found.texts["li"])
-    assert "full rank, as expected: 2 cells, 0, 2 (design A or C)" in [
+    assert "full rank, as expected: 2 cases, 0, 2 (design A or C)" in [
         " ".join(one.split()) for one in found.texts["p"]
     ]
 
@@ -145,7 +145,7 @@ def test_failed_cells_and_two_dimensions(tmp_path: Path) -> None:
     store = sweep(tmp_path, f"title: flat\nbase: {base}\nvariant: with scale\naxes:\n{axes}")
     found = assert_accessible(report(store))
     assert_of_store(found, store)
-    assert "2 of 3 cells done, 1 failed." in found.texts["p"]
+    assert "2 of 3 cases done, 1 failed." in found.texts["p"]
     assert "failed" in found.texts["td"]
     # One level only, and one point of the machine, so that there are no tips to draw.
     assert (
@@ -171,7 +171,7 @@ def test_a_store_without_results(tmp_path: Path) -> None:
         tmp_path / "none.sqlite", "nothing", [axis("k", ["1", "2"], [1.0, 2.0], "1")], []
     )
     found = assert_accessible(page(store, read_results(store, 1)))
-    assert "0 of 2 cells done, 2 left." in found.texts["p"]
+    assert "0 of 2 cases done, 2 left." in found.texts["p"]
     store = made_up(
         tmp_path / "bad.sqlite",
         "bad",

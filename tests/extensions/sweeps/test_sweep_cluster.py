@@ -120,7 +120,7 @@ def test_a_cluster_gives_the_same_rows_even_if_a_worker_dies(
         if process.poll() is None:
             os.kill(worker_processes(workers.pid)[0], signal.SIGKILL)
         out, err = process.communicate(timeout=180)
-    assert process.returncode == 1 and "16 cells, 12 done, 4 failed" in out, err
+    assert process.returncode == 1 and "16 cases, 12 done, 4 failed" in out, err
     assert "Traceback" not in err
     assert_same(rows(tmp_path / "small.sqlite"), rows(tmp_path / "alone.sqlite"))
     # What is unpacked is in the folders of the workers, which dask deletes whatever ends them.

@@ -243,7 +243,7 @@ def test_subsets_are_of_each_variants_own_list(written: Written, tmp_path: Path)
         ),
         (
             "axes:\n  a: {path: seed, values: [1]}\nskip: [{a: 1}]\n",
-            ["s.yaml:5:7: skip: leaves no cell"],
+            ["s.yaml:5:7: skip: leaves no case"],
         ),
         (
             "axes:\n  a: {path: seed, values: [1]}\nskip: [{a: {above: 1 mm}}]\n",

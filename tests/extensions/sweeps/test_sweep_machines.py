@@ -103,7 +103,7 @@ def test_a_sweep_runs_and_notices_a_changed_table(
 ) -> None:
     options = ("--workers", "1")
     assert main(["sweep", str(sweep), *options]) == 0
-    assert "2 cells, 2 done" in capsys.readouterr().out
+    assert "2 cases, 2 done" in capsys.readouterr().out
     assert main(["sweep", str(sweep), *options]) == 0
     table = sweep.parent / "park/machines/measured/exx.csv"
     table.write_text(table.read_text(encoding="utf-8").replace("800,", "800,9"), encoding="utf-8")

@@ -46,9 +46,9 @@ def test_figures_are_those_of_the_experiments(
     path = small_sweep(tmp_path, 4, "trials: 64\nrecord: [U4, U5]\n")
     assert sweep(path) == 1
     out, err = capsys.readouterr()
-    assert out == f"{tmp_path}/small.sqlite: 8 cells, 6 done, 2 failed\n"
+    assert out == f"{tmp_path}/small.sqlite: 8 cases, 6 done, 2 failed\n"
     assert (
-        "cell 6 failed: " in err
+        "case 6 failed: " in err
         and "quickstart.yaml" in err
         and str(tmp_path / "quickstart.yaml") not in err
     )
@@ -82,7 +82,7 @@ def test_a_second_run_computes_nothing(
     assert sweep(path) == 1
     assert (
         capsys.readouterr().out
-        == f"{tmp_path}/small.sqlite: 4 cells, 2 done, 2 failed (4 of them before)\n"
+        == f"{tmp_path}/small.sqlite: 4 cases, 2 done, 2 failed (4 of them before)\n"
     )
 
 
@@ -124,7 +124,7 @@ def test_rows_of_an_earlier_method_are_computed_anew_and_told(
         told in captured.err
         and f"this version computes by method {METHOD}; replaced in this run" in captured.err
     )
-    assert captured.out == f"{store}: 4 cells, 2 done, 2 failed\n"
+    assert captured.out == f"{store}: 4 cases, 2 done, 2 failed\n"
     # With the same seeds, so that only what was corrected differs.
     assert_same(rows(store), right)
 
@@ -327,9 +327,9 @@ def test_dry_run_lists_the_cells(tmp_path: Path, capsys: pytest.CaptureFixture[s
     assert sweep(path, "--dry-run") == 1
     out, err = capsys.readouterr()
     # The last of the cells that were tried does not fit.
-    assert "estimated from 3\ncell 3 fails: " in err
+    assert "estimated from 3\ncase 3 fails: " in err
     assert out.splitlines()[1] == "1: size 600 mm, balls 5" and len(out.splitlines()) == 4
-    assert err.startswith("4 cells, about ") and not (tmp_path / "small.sqlite").exists()
+    assert err.startswith("4 cases, about ") and not (tmp_path / "small.sqlite").exists()
 
 
 @pytest.mark.parametrize("content", [b"", b"nonsense" * 1000, b"SQLite format 3\0" + b"\0" * 5000])
@@ -422,7 +422,7 @@ def test_what_a_users_model_raises_is_the_rows_reason(tmp_path: Path) -> None:
     path = with_own_model(tmp_path, "raises_late", "[true, false]")
     for workers in (1, 2):
         done = run("sweep", path, "--workers", workers, "--store", tmp_path / f"{workers}.sqlite")
-        assert done.returncode == 1 and "2 cells, 1 done, 1 failed" in done.stdout, done.stderr
+        assert done.returncode == 1 and "2 cases, 1 done, 1 failed" in done.stdout, done.stderr
         place = re.search(r"raises_late\.py:[0-9]+: in error, code of your own: (.*)", done.stderr)
         assert place and place[1] == wording.NO_MORE_THAN_THIRTY
     assert_same(rows(tmp_path / "1.sqlite"), rows(tmp_path / "2.sqlite"))

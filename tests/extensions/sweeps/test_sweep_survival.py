@@ -188,7 +188,7 @@ def test_killed_at_random_moments(
         process.communicate(timeout=240)
     last = run("sweep", path)
     assert last.returncode == 1 and "Traceback" not in last.stderr, last.stderr
-    assert f"{2 * count} cells" in last.stdout and "left" not in last.stdout
+    assert f"{2 * count} cases" in last.stdout and "left" not in last.stdout
     assert_same(rows(store), rows(undisturbed))
     assert sum(killed.values()) >= 2 * times and all(killed.values()), killed
 
@@ -216,7 +216,7 @@ def test_a_worker_that_dies_each_time_fails_its_cell_alone(tmp_path: Path) -> No
     path.write_text(f"title: t\nbase: quickstart.yaml\naxes: {{{axes}}}\n", encoding="utf-8")
     done = run("sweep", path, "--workers", "2")
     assert done.returncode == 1, done.stderr
-    assert "2 cells, 1 done, 1 failed" in done.stdout
+    assert "2 cases, 1 done, 1 failed" in done.stdout
     assert (
         wording.THE_PROCESS_THAT_COMPUTED_IT_WAS in done.stderr and "Traceback" not in done.stderr
     )

@@ -482,7 +482,7 @@ function table(found, hasPage) {
     make("table", {}, make("thead", {}, make("tr", {}, ...heads)),
       make("tbody", {}, ...some.map((cell) => make("tr", {}, ...cell.values.map((one) => make("td", {}, one)),
         ...(cell.reason ? [make("td", { colspan: "4" }, cell.reason)] : [make("td", {}, String(cell.deficiency)), make("td", {}, micro(cell.average)), make("td", {}, micro(cell.maximum)), make("td", {}, share(cell.within) || "no target")]))))),
-    found.cells.length > MOST_ROWS ? make("p", {}, `${found.cells.length - MOST_ROWS} cells more are on the page`) : null,
+    found.cells.length > MOST_ROWS ? make("p", {}, `${found.cells.length - MOST_ROWS} more cases are on the page`) : null,
     hasPage ? null : make("p", {}, "its page needs the extra report: python -m pip install 'ballplate[report]'"),
   );
 }

@@ -89,8 +89,8 @@ def _sentences_with_target(
         best = best_first(-share, value)[0]
         alike = int((share == share[best]).sum()) - 1
         tied = f"; {_settings(alike)} more {_verb(alike, 'have')} as many" if alike else ""
-        subject = "The only setting does not meet" if judged == 1 else f"None of the {judged}"
-        subject += "" if judged == 1 else " settings meets"
+        subject = "The only case does not meet" if judged == 1 else f"None of the {judged}"
+        subject += "" if judged == 1 else " cases meets"
         sentences = [
             f"{subject} the target uncertainty with all lengths. The"
             f" nearest is {_setting(results, done[best])}, with {percent(float(share[best]))} of"
@@ -124,8 +124,9 @@ def _cheapest_sentence(
         return f"The one with the fewest observations is {name}: {count}."
     tied = f", as {_verb(same, 'have')} {same} more" if same else ""
     return (
-        f"The fewest observations are {observations[best]:.0f}, in {len(fewest)} of these settings."
-        f" Of them {name} has the smallest average of {_quantity(results, column, value[best])}"
+        f"The fewest observations are {observations[best]:.0f}, in {len(fewest)} of these cases."
+        f" Among these, {name} has the smallest average of"
+        f" {_quantity(results, column, value[best])}"
         f"{tied}."
     )
 
@@ -135,11 +136,11 @@ def _sentences_without_target(
 ) -> list[str]:
     """Return sentences on settings without a target."""
     if WITHIN.partition("_")[0] in results.definition["record"]:
-        sentence = "No setting has a target uncertainty that its lengths are compared with."
+        sentence = "No case has a target uncertainty for its lengths."
     else:
-        sentence = "U6 is not recorded, so that no setting is compared with a target uncertainty."
+        sentence = "U6 is not recorded, so that no case is compared with a target uncertainty."
     if partly.all():
-        return [sentence, f"In every setting some of {_symbol(column)} is undetermined."]
+        return [sentence, f"Every case leaves some of {_symbol(column)} undetermined."]
     best, alike = _first_of_best(value, np.flatnonzero(~partly))
     tied = f"; {_settings(alike)} more {_verb(alike, 'have')} the same" if alike else ""
     return [
@@ -177,7 +178,7 @@ def _sentences_on_others(results: ReportedSweep, done: Integers) -> list[str]:
 
 
 def _settings(count: int) -> str:
-    return number_of(count, "setting")
+    return number_of(count, "case")
 
 
 def _verb(count: int, verb: str) -> str:
@@ -228,6 +229,6 @@ def _table(results: ReportedSweep, rows: Integers, column: str, symbol: str) -> 
     notes = ["Observations are readings and certified values; other costs are not included."]
     if starred[rows].any():
         notes.append("Values marked * exclude undetermined ones.")
-    caption = "The best settings"
+    caption = "The best cases"
     blocks = (Block("", tuple(listed)),)
     return Table("answer", caption, headings, names, blocks, notes=tuple(notes))

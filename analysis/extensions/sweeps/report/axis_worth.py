@@ -49,7 +49,7 @@ class AxisWorth:
             )
         if self.planned > 1:
             total = "" if self.settings == self.planned else f" of {self.planned}"
-            text += f", in {self.settings}{total} settings of the other axes"
+            text += f", in {self.settings}{total} combinations of the other axes"
         if self.between:
             whole = self.between == self.settings
             where = "" if self.settings == 1 else f" in {'all' if whole else self.between} of them"

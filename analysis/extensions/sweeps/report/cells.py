@@ -54,7 +54,7 @@ def experiments(
             trust = Trust(run_modules, Path(folder), "add --run-modules if you trust the store")
             sweep = load_sweep(source, base, (Path(folder),), trust)
             if len(sweep.cells) != len(results.cells):
-                raise NoExperimentError("the stored files make other cells than those stored")
+                raise NoExperimentError("the stored files make other cases than those stored")
             return [experiment_of(sweep, cell) for cell in cells]
         except ExperimentError as error:
             first = error.messages[0]

@@ -90,7 +90,7 @@ def _heat(results: ReportedSweep, i: int, j: int, measure: Measure, best: int) -
     shades = np.where(is_open, DEFICIENT, _shades(values.ravel()).reshape(values.shape))
     notes = []
     if further:
-        notes.append(f"All with {setting_words(results, further, common)}, as in the best cell.")
+        notes.append(f"All with {setting_words(results, further, common)}, as in the best case.")
     notes += [
         f"{len(shown)} of {len(axis.labels)} values of {axis.name}."
         for axis, shown in ((rows, row_values), (columns, column_values))

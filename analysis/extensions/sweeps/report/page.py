@@ -80,7 +80,7 @@ def page(
         PageSection("plots", "Along the axes", along_axes),
         PageSection("heat", "Over two axes", joined(heats)),
         PageSection("uncertainties", "Uncertainties", joined(tables)),
-        PageSection("failed", "Failed cells", groups_element(failures(results))),
+        PageSection("failed", "Failed cases", groups_element(failures(results))),
         PageSection("rank", "What the readings determine", _ranks(results)),
         PageSection("designs", "Designs", designs),
         PageSection("error-map", "The error map's uncertainty", drawn_map),
@@ -123,7 +123,7 @@ def _ranks(results: ReportedSweep) -> Html:
         parts += [element("h3", "Weakly determined"), of_weak]
     if of_trials:
         words = (
-            "Differences from linear theory of more than four standard errors, and cells without"
+            "Differences from linear theory of more than four standard errors, and cases without"
             " Monte Carlo."
         )
         parts += [element("h3", "Monte Carlo"), note(words), of_trials]
@@ -131,7 +131,7 @@ def _ranks(results: ReportedSweep) -> Html:
 
 
 def _summary(results: ReportedSweep) -> str:
-    parts = [f"{results.count('done')} of {len(results.cells)} cells done"]
+    parts = [f"{results.count('done')} of {len(results.cells)} cases done"]
     parts += [f"{results.count('failed')} failed"] if results.count("failed") else []
     parts += [f"{results.left} left"] if results.left else []
     unreadable = len(results.found.damaged)
@@ -170,11 +170,11 @@ def _facts(results: ReportedSweep) -> list[tuple[str, str]]:
         reason = results.found.damaged[damaged[0]]
         cells += f", {len(damaged)} unreadable: {cell_list(damaged)} ({reason})"
     facts += [
-        ("Cells", cells),
+        ("Cases", cells),
         ("Recorded", ", ".join(stored["record"])),
         (
             "Monte Carlo",
-            f"{stored['trials']} data sets of each cell" if stored["trials"] else "none",
+            f"{stored['trials']} data sets of each case" if stored["trials"] else "none",
         ),
     ]
     facts += [("Seed", str(stored["seed"]))] if stored["trials"] else []
@@ -185,7 +185,7 @@ def _facts(results: ReportedSweep) -> list[tuple[str, str]]:
             f"{name.removesuffix('_version')} {version}"
             for name, version in zip(names, versions, strict=True)
         )
-        facts.append(("Computed with", words if len(counts) == 1 else f"{words} ({count} cells)"))
+        facts.append(("Computed with", words if len(counts) == 1 else f"{words} ({count} cases)"))
     return facts
 
 
@@ -240,7 +240,7 @@ def _designs(
         open_ = results.value(f"{judged[1]}_undetermined", row)
         text = f", {number(1e6 * value, 3)} µm" if not np.isnan(value) else ""
         text += f", {open_:.0f} undetermined" if open_ else ""
-        heading = f"{which} average of {symbol}{text}: cell {cell}, {results.label(cell)}"
+        heading = f"{which} average of {symbol}{text}: case {cell}, {results.label(cell)}"
         designs += [element("h3", heading), _drawn_design(experiment, cell, k)]
     return joined(designs), _drawn_map(built[0], results, cells[0])
 
@@ -278,7 +278,7 @@ def _positions(drawn: Scene, cell: int) -> Table:
         for place in sorted(drawn.places, key=lambda place: place.number)
     ]
     headings = ("number", "position", "artefact", "probes")
-    caption = f"Positions of cell {cell}"
+    caption = f"Positions of case {cell}"
     return Table(f"positions-{cell}", caption, headings, ("balls read",), (Block("", tuple(rows)),))
 
 
@@ -286,8 +286,8 @@ def _drawn_map(experiment: Experiment, results: ReportedSweep, cell: int) -> Htm
     """Return the error map's uncertainty in slices."""
     drawn = error_map(experiment)
     words = (
-        f"Standard uncertainty of the error function of cell {cell} ({results.label(cell)}), as the"
-        " root mean square over the co-ordinates of a point, with the probe"
+        f"Standard uncertainty of the error function of case {cell} ({results.label(cell)}), as"
+        " the root mean square over the co-ordinates of a point, with the probe"
         f" {experiment.evaluation.probe}, in µm."
     )
     if any(np.isnan(level_slice.values).any() for level_slice in drawn.slices):

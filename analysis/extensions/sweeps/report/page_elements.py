@@ -98,14 +98,14 @@ def groups_element(groups: VerdictGroups) -> Html:
     is_lengthy = groups.size > MOST_LINES
     parts = [_group(group, is_lengthy) for group in groups.shown]
     if groups.more:
-        words = f"{groups.more} further groups of cells are not shown; the store has them."
+        words = f"{groups.more} further groups of cases are not shown; the store has them."
         parts.append(sentence(words))
     return joined(parts)
 
 
 def _group(group: VerdictGroup, is_lengthy: bool) -> Html:
     heading = element("span", group.heading, class_="surprise" if group.is_surprise else None)
-    count = "cell" if group.count == 1 else f"{group.count} cells,"
+    count = "case" if group.count == 1 else f"{group.count} cases,"
     values = f" ({group.values})" if group.values else ""
     summary = joined([heading, f": {count} {group.cells}{values}"])
     if not group.lines:

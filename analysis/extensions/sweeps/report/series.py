@@ -112,7 +112,7 @@ def _pictures(results: ReportedSweep, k: int) -> list[_Picture]:
         ]
     if np.bincount(which).max() < 2:
         thinned = rows[:: -(-len(rows) // MOST_POINTS)]
-        note = "Each point is a cell; the other axes differ from one to the next."
+        note = "Each point is a case; the other axes differ from one to the next."
         note += f" {len(thinned)} of {len(rows)} are drawn." if len(thinned) < len(rows) else ""
         return [_Picture((("", thinned),), note, True)]
     second = max(
@@ -132,12 +132,12 @@ def _pictures(results: ReportedSweep, k: int) -> list[_Picture]:
         note = setting_words(results, further, apart[i])
         note = f"With {note}" if note else ""
         if i == best_setting and len(apart) > 1:
-            note += ", the setting of the best cell"
+            note += ", as in the best case"
         count = len(results.axes[second].labels)
         if len(values) < count:
             note += f"; {len(values)} of {count} values of {results.axes[second].name}"
         if i == order[-1] and len(order) < len(apart):
-            note += f"; {len(apart) - len(order)} settings more are in the store"
+            note += f"; {len(apart) - len(order)} more combinations are in the store"
         pictures.append(
             _picture(results, k, [second], lines, f"{note}.".removeprefix("; ") if note else "")
         )
@@ -207,7 +207,7 @@ def _plot(
         panels.append(Panel(measure, tuple(lines)))
     note = picture.note
     if any(left_out[rows].any() for _, rows in picture.lines):
-        note = f"{note} Cells in which some of it is undetermined are left out.".strip()
+        note = f"{note} Cases with undetermined values are left out.".strip()
     return Plot(axis, symbol, measures[0].unit, tuple(panels), note, picture.is_scattered)
 
 

@@ -78,7 +78,7 @@ def compared(results: ReportedSweep, reference: ReportedSweep, name: str) -> Sto
             factor = " to ".join(dict.fromkeys(number(float(sweep), 3) for sweep in ends))
             sentences.append(
                 f"The average of {quantity} is {words} than in {name} in"
-                f" {changed.sum()} of them, by a factor of {factor}."
+                f" {number_of(int(changed.sum()), 'case')}, by a factor of {factor}."
             )
     same = int((np.abs(ratio - 1) <= SAME).sum())
     if same:
@@ -107,9 +107,9 @@ def _settings_are(count: int) -> str:
     """Return a number of settings with its verb.
 
     >>> _settings_are(1), _settings_are(2)
-    ('1 setting is', '2 settings are')
+    ('1 case is', '2 cases are')
     """
-    return f"{number_of(count, 'setting')} {'is' if count == 1 else 'are'}"
+    return f"{number_of(count, 'case')} {'is' if count == 1 else 'are'}"
 
 
 def _by_setting(*sweeps: ReportedSweep) -> list[dict[tuple[str, ...], int]]:
@@ -184,5 +184,5 @@ def _table(
     headings = tuple(axis.name for axis in results.axes)
     unit = column_unit(column)
     columns = (f"average here, {unit}", f"in {name}, {unit}", "ratio")
-    caption = "Settings that differ most"
+    caption = "Cases that differ most"
     return Table("comparison", caption, headings, columns, (Block("", tuple(table_rows)),))

@@ -73,7 +73,7 @@ def _best(results: ReportedSweep) -> list[Table]:
     measures = [*rank_measures(results), *criterion_measures]
     rows = ranked(results)[:MOST_BEST].tolist()
     note = f"Sorted by the number of undetermined values, then by average {judged[1]}."
-    return [_rows_table(results, "best", "Best cells", measures, (note,), rows)] if rows else []
+    return [_rows_table(results, "best", "Best cases", measures, (note,), rows)] if rows else []
 
 
 def _fits_columns(results: ReportedSweep) -> bool:
@@ -149,7 +149,7 @@ def _rows_table(
     more = len(results.frame) - len(cell_rows)
     if more > 0 and rows is None:
         notes = (
-            f"{more} cells more are not shown here; ballplate sweep --export gives all.",
+            f"{more} more cases are not shown here; ballplate sweep --export gives all.",
             *notes,
         )
     headings = ("cell", *(axis.name for axis in results.axes))

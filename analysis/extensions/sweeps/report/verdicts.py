@@ -133,7 +133,7 @@ def _group(
 ) -> VerdictGroup:
     values = results.label(cells[0]) if len(cells) == 1 else common_values(results, cells)
     if with_example and lines and len(cells) > 1:
-        heading += f", with the amounts of cell {cells[0]}"
+        heading += f", with the values of case {cells[0]}"
     shown, more = lines[:MOST_LINES], max(len(lines) - MOST_LINES, 0)
     return VerdictGroup(
         heading, cell_list(cells), values, len(cells), shown, f"{NOT}as expected" in heading, more
