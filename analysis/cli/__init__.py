@@ -39,7 +39,7 @@ COMMANDS = {
     "run": Command("run", "predict the uncertainties U1 to U6 that a design will achieve", "plan"),
     "plan": Command(
         "plan",
-        "choose positions and certificates from a pool, and bound what any choice could achieve",
+        "choose positions and certificates from a pool, and compute a lower bound for any choice",
         "plan",
     ),
     "simulate": Command("simulate", "write synthetic readings of a design", "measure"),
@@ -119,7 +119,7 @@ def parser(chosen: Sequence[str] | None = None, with_options: bool = True) -> _P
         prog="ballplate",
         description="Plan and evaluate ball-plate experiments for co-ordinate measuring machines.",
         epilog=(
-            "Exit status: 0 as expected, 1 not as expected, 2 wrong usage, 3 a file that cannot"
+            "Exit status: 0 as expected, 1 not as expected, 2 a usage error, 3 a file that cannot"
             " be used, 70 an internal error, 130 or 143 interrupted."
         ),
     )

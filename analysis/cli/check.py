@@ -24,9 +24,9 @@ AS_EXPECTED, NOT_AS_EXPECTED, BAD_FILE = 0, 1, 3
 
 DESCRIPTION = (
     "Determine the rank of each design, the share of lengths within its target, and"
-    " what carries its scale. The exit status is 0 if every rank deficiency is the one"
-    " that the file expects (by default none), every --goal is met and, with --fail-"
-    "weak, nothing is weakly determined; otherwise it is 1. It is 3 if a file cannot be"
+    " its sources of scale. The exit status is 0 if every rank deficiency is the one"
+    " that the file expects (default: 0), every --goal is met and, with --fail-"
+    "weak, no direction is weakly determined; otherwise it is 1. It is 3 if a file cannot be"
     " used; the other files are still checked."
 )
 
@@ -42,15 +42,15 @@ def add_options(parser: ArgumentParser) -> None:
         parser,
         ("text", "github", "junit", "json"),
         "text (default); github: workflow commands of GitHub Actions, which mark lines of a"
-        " pull request; junit: an XML report for build servers; json: an object, or an array of"
-        " them for several experiments, in metres and radians",
+        " pull request; junit: an XML report for build servers; json: an object, or an array"
+        " for several experiments, in metres and radians",
     )
     parser.add_argument(
         "--suggest",
         action="store_true",
         help=(
-            "suggest changes that leave nothing undetermined or weakly determined, each verified,"
-            " ranked by U6 with uncertain probe offsets"
+            "suggest changes that remove all undetermined and weakly determined directions, each"
+            " verified, ranked by U6 with uncertain probe offsets"
         ),
     )
     parser.add_argument(
@@ -58,15 +58,15 @@ def add_options(parser: ArgumentParser) -> None:
         action="store_true",
         help=(
             "write the first repair that --suggest finds for a deficient design into its file,"
-            " keep the rest of the file as it is, and check the file again"
+            " leave the rest of the file unchanged, and check the file again"
         ),
     )
     parser.add_argument(
         "--diff",
         action="store_true",
         help=(
-            "print what --fix would change as a unified diff, and write nothing; the exit"
-            " status is 1 if there is a change"
+            "print the changes of --fix as a unified diff instead of writing them; the"
+            " exit status is 1 if there are any"
         ),
     )
     parser.add_argument(
@@ -110,7 +110,7 @@ def run(options: Namespace) -> int:
     goals = _goals(options)
     is_repairing = options.fix or options.diff
     if options.diff and options.format != "text":
-        raise UsageError(f"--diff does not go with --format {options.format}; leave one out")
+        raise UsageError(f"--diff cannot be combined with --format {options.format}; leave one out")
     wanted = Wanted(
         goals, options.fail_weak, options.suggest or is_repairing, not options.no_modules
     )
@@ -153,7 +153,7 @@ def _name_suggestions(checked: CheckedFile, options: Namespace) -> None:
 
 def _goals(options: Namespace) -> tuple[Any, ...]:
     if options.share is not None and "lengths" not in options.goal:
-        raise UsageError("--share goes with --goal lengths; add it")
+        raise UsageError("--share needs --goal lengths; add it")
     if not options.goal:
         return ()
     parse_goal = service("parse_goal")

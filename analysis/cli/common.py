@@ -45,10 +45,7 @@ def add_json(parser: ArgumentParser) -> None:
     parser.add_argument(
         "--json",
         action="store_true",
-        help=(
-            "print JSON in metres and radians: an object, or an array of them for several"
-            " experiments"
-        ),
+        help="print JSON in metres and radians: an object, or an array for several experiments",
     )
 
 

@@ -114,14 +114,14 @@ def _add_components(parser: ArgumentParser) -> None:
         choices=GROUPINGS,
         metavar="BY",
         help=(
-            "estimate how uncertain groups of observations are against what is stated, by axis,"
+            "estimate the variances of groups of observations relative to the stated ones, by axis,"
             " probe, position, artefact or calibration (variance components, REML)"
         ),
     )
     parser.add_argument(
         "--reweight",
         action="store_true",
-        help="with --components: fit again with the estimated variances in place of the stated",
+        help="with --components: fit again with the estimated variances instead of the stated ones",
     )
 
 
@@ -131,8 +131,8 @@ def _add_trials(parser: ArgumentParser) -> None:
         metavar="N",
         type=trial_count,
         help=(
-            "fit N data sets of the fitted parameters as well, and tell what they scatter beside"
-            " the standard uncertainties (parametric bootstrap)"
+            "also fit N data sets simulated with the fitted parameters, and print the standard"
+            " deviations of the estimates with the standard uncertainties (parametric bootstrap)"
         ),
     )
     parser.add_argument(
@@ -209,9 +209,9 @@ def _refuse_misused(options: Namespace) -> None:
     if wrong is not None:
         name, estimators = wrong
         option = {"offsets": "no-offsets"}.get(name, name).replace("_", "-")
-        raise UsageError(f"--{option} goes with --estimator {estimators} only; leave it out")
+        raise UsageError(f"--{option} applies to --estimator {estimators} only; leave it out")
     if options.trials is None and (options.seed is not None or options.workers is not None):
-        raise UsageError("--seed and --workers go with --trials only; leave them out")
+        raise UsageError("--seed and --workers apply to --trials only; leave them out")
     reason = misused(options.components, options.reweight, options.sigma)
     if reason:
         for name in ("components", "sigma"):
@@ -220,7 +220,7 @@ def _refuse_misused(options: Namespace) -> None:
     if options.output and options.estimator != "full":
         raise UsageError("-o writes the map of the full estimator; leave it out")
     if options.date and not options.output:
-        raise UsageError("--date goes with -o; leave it out")
+        raise UsageError("--date applies to -o only; leave it out")
     if options.plot and options.estimator not in DRAWN:
         raise UsageError("--plot draws residuals by the full estimator or reversal; leave it out")
     if options.report and options.estimator != "full":

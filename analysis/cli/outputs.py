@@ -50,7 +50,7 @@ NAMING = ("files", "file", "earlier", "map", "tasks", "after")
 BESIDE_STORE = ("-wal", "-shm", "-journal", ".lock")
 
 Contents = Mapping[Path, Writer | str] | Mapping[Path | None, Writer | str]
-"""What files are to hold, texts or by writers; None stands for one that no option names."""
+"""Contents of files, as text or by writers; the path is None if no option names the file."""
 
 
 @dataclass(frozen=True)
@@ -286,7 +286,7 @@ def write_outputs(
     except UnwrittenError as error:
         path = Path(error.filename)
         unchanged = (
-            "" if status_of(path) is None or is_device(path) else "; the file there is as it was"
+            "" if status_of(path) is None or is_device(path) else "; the existing file is unchanged"
         )
         print(Message(str(path), 0, 0, "", _cannot(error.__cause__) + unchanged), file=sys.stderr)
         return False

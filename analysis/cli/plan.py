@@ -31,10 +31,10 @@ ORDER_NAMES = ("change-over", "mirrored", "blocks", "least-drift")
 
 
 DESCRIPTION = (
-    "Choose the positions and certificates from the pool of an experiment file that"
-    " minimise a criterion within a budget, and bound what any choice could achieve."
-    " Without a budget, the choice may cost as much as the positions in the file. The"
-    " exit status is 0 if the choice determines everything but what the file expects to stay open,"
+    "Choose the positions and certificates from the pool of an experiment file that minimise a"
+    " criterion within a budget, and compute a lower bound of the criterion for any choice."
+    " Without a budget, the choice may cost as much as the positions in the file. The exit status"
+    " is 0 if the choice leaves no direction undetermined except those that the file expects,"
     " otherwise 1."
 )
 
@@ -93,8 +93,8 @@ def add_options(parser: ArgumentParser) -> None:
         "--moved",
         action="store_true",
         help=(
-            "the artefact no longer stands where it was last read; a position interrupted there"
-            " has to be set up again"
+            "the artefact has moved since it was last read; an interrupted position has"
+            " to be set up again"
         ),
     )
     again.add_argument(
@@ -121,7 +121,11 @@ def add_options(parser: ArgumentParser) -> None:
     output.add_argument(
         "--curve", action="store_true", help="plan for smaller and larger budgets as well"
     )
-    add_picture(output, "--plot", help="draw the choice, its bound, its gains and the curve")
+    add_picture(
+        output,
+        "--plot",
+        help="draw the choice, its lower bound, the improvement by each candidate and the curve",
+    )
     add_force(output)
     add_json(parser)
     parser.add_argument(

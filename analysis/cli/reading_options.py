@@ -37,7 +37,7 @@ def add_readings(parser: ArgumentParser, of_readings: str = NAMED) -> None:
         metavar="CSV",
         type=Path,
         help=(
-            "values of certificates, priors and probe offsets in place of the experiment file's, as"
+            "values of certificates, priors and probe offsets instead of the experiment file's, as"
             " simulate --certificate writes them"
         ),
     )

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 DESCRIPTION = (
     "Compute the rank and the standard uncertainties U1 to U6 of a design at zero"
     " machine error. With --trials, synthetic data sets of the file's true machine are"
-    " estimated as well, and their bias, spread and coverage are printed beside the"
+    " estimated as well, and their bias, spread and coverage are printed with the"
     " linearised uncertainties. The exit status is 0 if the rank is as expected,"
     " otherwise 1."
 )
@@ -48,7 +48,9 @@ def add_options(parser: ArgumentParser) -> None:
 def _trial_count(text: str) -> int:
     count = trial_count(text)
     if count < 2:
-        raise ArgumentTypeError(f'one data set has no scatter; give at least 2, not "{text}"')
+        raise ArgumentTypeError(
+            f'one data set has no standard deviation; give at least 2, not "{text}"'
+        )
     return count
 
 
@@ -60,7 +62,7 @@ def run(options: Namespace) -> int:
     plans, results, interrupted = [], [], False
     with_trials = options.trials is not None or options.until is not None
     if not with_trials and (options.seed is not None or options.workers is not None):
-        raise UsageError("--seed and --workers go with --trials or --until only; leave them out")
+        raise UsageError("--seed and --workers apply to --trials or --until only; leave them out")
     written_before = options.interruption.kept
     chosen = experiments(options)
     if options.report and len(chosen) > 1:
@@ -85,7 +87,7 @@ def run(options: Namespace) -> int:
         results.append(data)
         if interrupted:
             complain(
-                f"{options.interruption.word}: the figures are those of the data sets done so far"
+                f"{options.interruption.word}: the results are those of the data sets done so far"
             )
             break
     if options.json:
@@ -117,7 +119,7 @@ def _trials(experiment: Experiment, options: Namespace) -> Trials:
         def report(step: ProgressStep) -> None:
             options.interruption.answer()
             options.interruption.kept = lambda: (
-                f"the figures of the {step.done} data sets done are lost"
+                f"the results of the {step.done} data sets done are lost"
             )
             shown.show(step)
 

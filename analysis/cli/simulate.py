@@ -37,8 +37,8 @@ def add_options(parser: ArgumentParser) -> None:
         metavar="CSV",
         takes_screen=True,
         help=(
-            "also write values of certificates, priors and probe offsets, drawn about what is read,"
-            " for fit --certificate"
+            "also write values of certificates, priors and probe offsets, drawn about the true"
+            " values, for fit --certificate"
         ),
     )
     parser.add_argument("--seed", type=whole, help="seed of the noise, instead of the file's")

@@ -26,17 +26,17 @@ def add_tables(parser: ArgumentParser) -> None:
         ),
     )
     parser.add_argument(
-        "--unit", metavar="UNIT", help="unit of readings whose columns state none, such as mm"
+        "--unit", metavar="UNIT", help="unit of readings in columns without a unit, such as mm"
     )
     parser.add_argument(
-        "--decimal", choices=("point", "comma"), help="what stands before decimals of readings"
+        "--decimal", choices=("point", "comma"), help="decimal separator of readings"
     )
     parser.add_argument(
         "--coordinates",
         choices=("scale readings", "ball centres", "part"),
         help=(
-            "what readings are: scale readings (default); ball centres, to which the measuring"
-            " program has applied the offsets of probes; or ball centres in co-ordinates of a part"
+            "type of readings: scale readings (default); ball centres, to which the measuring"
+            " program has applied the offsets of probes; or ball centres in part co-ordinates"
         ),
     )
     parser.add_argument(
@@ -75,8 +75,8 @@ def columns(text: str) -> dict[str, str]:
         name, sign, column = (piece.strip() for piece in part.partition("="))
         if not sign or not column or name in assignments:
             raise ArgumentTypeError(
-                f'expected columns such as position=Lage,ball=Nr, not "{text}"; names with commas'
-                " stand in the experiment file"
+                f'expected columns such as position=Lage,ball=Nr, not "{text}"; write names with'
+                " commas in the experiment file"
             )
         assignments[name] = column
     return assignments

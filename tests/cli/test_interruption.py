@@ -76,7 +76,7 @@ def test_one_that_was_swallowed_ends_monte_carlo(
     monkeypatch.setattr(trials, "accuracy_of", interrupted)
     quickstart = str(ROOT / "designs" / "quickstart.yaml")
     assert main(["run", quickstart, "--trials", "1000000", "--workers", "1"]) == 130
-    assert wording.THE_FIGURES_ARE_THOSE in capsys.readouterr().err
+    assert wording.THE_RESULTS_ARE_THOSE in capsys.readouterr().err
 
 
 def test_they_are_remembered() -> None:

@@ -758,7 +758,7 @@ def test_what_was_there_is_whole_when_writing_fails(
         out, err = capsys.readouterr()
         told = [one for one in err.splitlines() if "cannot be written" in one]
         if status == 3:
-            assert len(told) == 1 and told[0].endswith(wording.THE_FILE_THERE)
+            assert len(told) == 1 and told[0].endswith(wording.THE_EXISTING_FILE_IS_UNCHANGED)
             assert any(told[0].startswith(f"{path}: ") for path in written.values())
             # What was computed is told nevertheless.
             assert bool(out) == walk.prints

@@ -366,14 +366,14 @@ def test_options_of_the_reversal_alone(capsys: pytest.CaptureFixture[str]) -> No
     for option in (["--pairs", "all"], ["--across-probes"]):
         _, err = told(capsys, "fit", *DUMMY, *REVERSAL, *option, status=2)
         assert (
-            f"{option[0]} goes with --estimator distances, cresto or kruth only; leave it out"
+            f"{option[0]} applies to --estimator distances, cresto or kruth only; leave it out"
             in err
         )
     _, err = told(capsys, "fit", *DUMMY, *REVERSAL, "--monomials", status=2)
-    assert wording.MONOMIALS_GOES_WITH_ESTIMATOR_FULL in err
+    assert wording.MONOMIALS_APPLIES_TO_ESTIMATOR_FULL in err
     for option in (["--scale", "x"], ["--no-offsets"]):
         _, err = told(capsys, "fit", *DUMMY, *option, status=2)
-        assert f"{option[0]} goes with --estimator reversal only; leave it out" in err
+        assert f"{option[0]} applies to --estimator reversal only; leave it out" in err
     with pytest.raises(SystemExit) as caught:
         main(["fit", *DUMMY, *REVERSAL, "--scale", "z"])
     assert caught.value.code == 2

@@ -155,7 +155,7 @@ def test_an_interruption_reports_what_is_done(workers: str) -> None:
     assert process.returncode == 130
     found = json.loads(out)["monte_carlo"]
     assert found["interrupted"] and found["trials"] >= 512
-    assert wording.THE_FIGURES_ARE_THOSE in err and "Traceback" not in err
+    assert wording.THE_RESULTS_ARE_THOSE in err and "Traceback" not in err
 
 
 class Terminal:

@@ -95,8 +95,8 @@ MM_IS_FAR_FROM_THE_MM = (
 )
 MODULES_ARE_NOT_ALLOWED_HERE = "modules are not allowed here"
 MODULES_ARE_NOT_ALLOWED_HERE_LEAVE = "modules are not allowed here; leave --no-modules out"
-MONOMIALS_GOES_WITH_ESTIMATOR_FULL = (
-    "--monomials goes with --estimator full, distances, cresto or kruth only; leave it out"
+MONOMIALS_APPLIES_TO_ESTIMATOR_FULL = (
+    "--monomials applies to --estimator full, distances, cresto or kruth only; leave it out"
 )
 MONTE_CARLO_DATA_SETS = "Monte Carlo: 10 data sets of the true machine"
 MONTE_CARLO_DATA_SETS_OF_THE_TRUE = "Monte Carlo: 100 data sets of the true machine, seed 1"
@@ -144,8 +144,7 @@ SWAP_THE_NAMES_OF_THE_BALLS = "swap the names of the balls in lines 60 and 71"
 SWAP_THE_NAMES_OF_THE_BALLS_IN_LINES = "swap the names of the balls in lines 5 and 9"
 THE_DESIGN_LEAVES_ERRORS_UNDETERMINED = "the design leaves errors undetermined"
 THE_ESTIMATE_HAS_DIVERGED = "the estimate has diverged; no results are reported"
-THE_FIGURES_ARE_THOSE = "interrupted: the figures are those of the data sets done so far"
-THE_FILE_THERE = "the file there is as it was"
+THE_EXISTING_FILE_IS_UNCHANGED = "the existing file is unchanged"
 THE_LEAST_ELEVATION_MUST_BE_BELOW = (
     "14:57: artefacts.zone.directions: the least elevation must be below the largest; "
     "exchange or correct them"
@@ -156,6 +155,7 @@ THE_PIVOT_IS_THE_CENTRE = (
 THE_RADIUS_OF_IS_ALREADY = (
     '25:5: calibration[4]: the radius of "over" is already in calibration[3]; remove one of the two'
 )
+THE_RESULTS_ARE_THOSE = "interrupted: the results are those of the data sets done so far"
 THE_REVERSAL_NEEDS_A_MACHINE = (
     '3:21: error_model.kind: the reversal needs a machine of kind "metric" in two dimensions'
 )
