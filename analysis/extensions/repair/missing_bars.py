@@ -98,9 +98,9 @@ def _what_is_missing(design: Design, strains: Array, unseen: Array) -> str:
     if with_plates:
         # What else bars would have to do, plates may do.
         normals = normals[:, [_is_among(_unit_strain(np.outer(n, n)), strains) for n in normals.T]]
-    subject = "every place of the ball" if only_gauges else "every bar"
+    subject = "every location of the ball" if only_gauges else "every bar"
     if lengths.to_pivot.any() and not only_gauges:
-        subject = "every bar, and every place of a gauge's ball,"
+        subject = "every bar, and every location of a gauge's ball,"
     if d == 3 and normals.shape[1] == 1 and not few:
         lies = "lies in a plane parallel to" if only_gauges else "lies parallel to"
         return f"{subject} {lies} {_plane(normals[:, 0])}"
@@ -115,7 +115,7 @@ def _what_is_missing(design: Design, strains: Array, unseen: Array) -> str:
         if np.ptp(values) < MISSING:
             who = "every direction of the bar" if lengths.to_pivot.any() else "every bar"
             return f"{who} {_quadric(form - values.mean() * np.eye(d))}"
-    who = "places of the ball" if only_gauges else "bars' directions"
+    who = "locations of the ball" if only_gauges else "bars' directions"
     return f"the {who} are too few or too similar"
 
 

@@ -39,7 +39,7 @@ def positions(experiment: Experiment) -> Iterator[Change]:
                     name, artefact, Pose(*pose), (ReadingGroup(names, layout.names, every, 1),)
                 )
                 if d == len(pose[1]) and is_inside(new, layout, volume, experiment.probes):
-                    description = f"read {artefact} once more {words}"
+                    description = f"read {artefact} again {words}"
                     if d == 3 and len(experiment.probes) > 1:
                         probes = "probe" if len(names) == 1 else "probes"
                         description += f", with {probes} {' and '.join(names)}"

@@ -96,7 +96,7 @@ def fewer_coefficients(experiment: Experiment) -> Iterator[Change]:
                 else words.replace("coefficients", "coefficient").replace("knots", "knot")
             )
             description = (
-                f"ask for {value} {coefficients} instead of {now}, taking the others as zero"
+                f"estimate {value} {coefficients} instead of {now}, holding the others at zero"
             )
             yield Change(
                 ChangeKind.MODEL, description, float(now - value), frozenset({"model"}), apply

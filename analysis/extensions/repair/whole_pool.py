@@ -74,7 +74,10 @@ class PoolGap:
             return "no change was found that would determine it"
         all_of_it = "it" if self.cures else "part of it"
         remedies = "; or ".join(changes_in_words(cure) for cure in cures[:MOST_CURES])
-        return f"what would determine {all_of_it}, offered or done beside these: {remedies}"
+        return (
+            f"changes that would determine {all_of_it}, added to the pool or to the design:"
+            f" {remedies}"
+        )
 
     def to_dict(self) -> dict[str, Any]:
         return {

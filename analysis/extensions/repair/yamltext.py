@@ -228,7 +228,7 @@ def _changed(text: _Text, change: TextChange) -> str:
     for span in way:
         if span.kind == "alias":
             raise _refusal(
-                span, change.steps, "is elsewhere, at the anchor of this alias; change it by hand"
+                span, change.steps, "is an alias; change the value at its anchor by hand"
             )
         if span.anchor in text.aliases:
             raise _refusal(

@@ -71,8 +71,8 @@ class Reach(Result):
         ]
         if self.present.undetermined:
             lines.append(
-                f"rank deficiency {self.deficiency}: repair the design first; ballplate check shows"
-                " what is undetermined"
+                f"rank deficiency {self.deficiency}: repair the design first; ballplate check lists"
+                " the undetermined directions"
             )
         columns = {
             "changed alone": "title",
@@ -119,7 +119,7 @@ class Reach(Result):
         """
         panels = [_panel(answer) for answer in self.answers if answer.tried]
         if not panels:
-            raise ValueError("no value was tried of any unknown, so that there is nothing to draw")
+            raise ValueError("the search tried no value, so there is no curve to draw")
         goal, limit = self.goal, 1.0
         axis = "largest of targets" if goal.kind == "tasks" else f"{goal.symbol} over the goal"
         if goal.kind == "lengths":
@@ -166,6 +166,6 @@ def _outcome(answer: Answer) -> str:
         return (
             f"even {answer.words}: {answer.outcome}"
             if answer.name != "size"
-            else f"best of those tried, {answer.words}: {answer.outcome}"
+            else f"best value tried, {answer.words}: {answer.outcome}"
         )
     return answer.outcome

@@ -139,7 +139,7 @@ def _certificate(root: Node, items: list[str]) -> Unknown:
         )
     title = "certificate's standard uncertainty"
     if skipped:
-        title += f" (without {listing(skipped)}, which states none that can be multiplied)"
+        title += f" (without {listing(skipped)}, which states no standard_uncertainty to multiply)"
     return _scaled("certificate", title, root, lengths + rows_skipped)
 
 

@@ -51,7 +51,7 @@ SHIPPED = {
     ("bryan-gauge", "two pivots"): (),
     ("bryan-gauge", "one height"): (
         (
-            "every place of the ball lies in a plane parallel to the xy plane: nothing"
+            "every location of the ball lies in a plane parallel to the xy plane: nothing"
             " determines the scale of Z nor its squareness to X and Y nor a combination of the"
             " scale of X and the scale of Y; read the ball for example all round at elevations"
             " of 60 and 45 deg as well"
@@ -59,7 +59,7 @@ SHIPPED = {
     ),
     ("bryan-gauge", "one plane"): (
         (
-            "every place of the ball lies in a plane parallel to the xz plane: nothing"
+            "every location of the ball lies in a plane parallel to the xz plane: nothing"
             " determines the scale of Y nor its squareness to X and Z; read the ball for example"
             " all round at elevations of 60 and 30 deg as well"
         ),
@@ -229,9 +229,9 @@ def test_any_three_places_lie_in_a_plane_and_more_do_not(
 ) -> None:
     told = gauges(tmp_path, few, many)
     assert told.startswith(
-        "the places of the ball are too few or too similar"
+        "the locations of the ball are too few or too similar"
         if max(few, many) == 3
-        else "every place of the ball lies in a plane parallel to the xy plane"
+        else "every location of the ball lies in a plane parallel to the xy plane"
     )
 
 

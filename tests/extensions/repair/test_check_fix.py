@@ -163,7 +163,7 @@ def test_data_of_a_mended_file(folder: Path, capsys: pytest.CaptureFixture[str])
     data = json.loads(capsys.readouterr().out)
     assert data["rank_deficiency"] == 0 and data["repairs"] is None
     assert run("check", "--diff", "--json", "shifted.yaml") == 2
-    assert wording.DIFF_DOES_NOT_GO_WITH_FORMAT in capsys.readouterr().err
+    assert wording.DIFF_CANNOT_BE_COMBINED in capsys.readouterr().err
 
 
 def test_links_and_permissions_stay(folder: Path) -> None:
@@ -194,7 +194,7 @@ def test_a_failure_loses_nothing(
     assert sorted(os.listdir(folder)) == ["commented.yaml", "good.yaml", "shifted.yaml"]
     assert "repaired: " not in err and "\nfull rank" not in out
     if isinstance(error, OSError):
-        assert status == 3 and wording.THE_FILE_THERE in err
+        assert status == 3 and wording.THE_EXISTING_FILE_IS_UNCHANGED in err
     else:
         assert status == 130 and err == "interrupted; no file was written\n"
 

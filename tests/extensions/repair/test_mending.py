@@ -176,7 +176,7 @@ variants:
 """,
             "own",
             "11:17: variants.own.positions[0].quarter_turns",
-            "is elsewhere, at the anchor of this alias",
+            "is an alias; change the value at its anchor",
         ),
         (
             """\

@@ -236,8 +236,8 @@ def test_a_model_is_not_made_poorer_where_more_readings_help(tmp_path: Path) -> 
         assert dense.spread(whole).deficiency == 0
     # Where a poorer model is offered, its words say what becomes of the rest.
     words = [one.words for one in offers(experiment)[ChangeKind.MODEL]]
-    assert words and all(one.endswith(wording.TAKING_THE_OTHERS_AS_ZERO) for one in words)
-    assert not any(wording.ASK_FOR_COEFFICIENT_OF_ROTATIONAL in one for one in words)
+    assert words and all(one.endswith(wording.HOLDING_THE_OTHERS_AT_ZERO) for one in words)
+    assert not any(wording.ESTIMATE_COEFFICIENT_OF_ROTATIONAL in one for one in words)
 
 
 def test_words_name_errors_and_positions() -> None:

@@ -161,7 +161,7 @@ def test_words_that_cannot_be_had_do_not_stop_a_plan(
     arguments = ["plan", path, "--positions", "6", "--workers", "1"]
     assert main(arguments) == 1
     told = capsys.readouterr().out
-    assert "even all 8 candidates" in told and wording.WHAT_WOULD_DETERMINE in told
+    assert "even all 8 candidates" in told and wording.CHANGES_THAT_WOULD_DETERMINE in told
     monkeypatch.setattr(whole_pool, "repairs", refuses)
     assert main(arguments) == 1
     assert "even all 8 candidates" in capsys.readouterr().out
@@ -172,7 +172,7 @@ def test_words_that_cannot_be_had_do_not_stop_a_plan(
     assert main(arguments) == 1
     without = capsys.readouterr().out.splitlines()
     left = [line for line in told.splitlines() if line not in without]
-    assert [line.split(" ")[0] for line in left] == ["even", "what"]
+    assert [line.split(" ")[0] for line in left] == ["even", "changes"]
 
 
 def test_plan_says_so_and_of_offsets_that_carry_the_scale(
@@ -198,7 +198,7 @@ def test_a_pool_that_determines_nothing_is_refused_with_what_it_lacks(
     assert main(["plan", path]) == 3
     told = capsys.readouterr().err
     assert wording.NO_SELECTION_DETERMINES_ANY in told and "together leave" in told
-    assert wording.WHAT_WOULD_DETERMINE in told and wording.WITH_A_NEW_PROBE in told
+    assert wording.CHANGES_THAT_WOULD_DETERMINE in told and wording.WITH_A_NEW_PROBE in told
     assert main(["check", path]) == 3
     assert wording.EMPTY_ADD_POSITIONS in capsys.readouterr().err
 

@@ -136,7 +136,7 @@ def test_all_stays_beside_what_is_removed(random: Random, has_comments: bool) ->
     "text, change, place",
     [
         ("a: &x {b: 1}\nc: *x\n", TextChange(("a", "b"), 2), "f:1:4: a.b: others refer to this"),
-        ("a: &x {b: 1}\nc: *x\n", TextChange(("c", "b"), 2), "f:2:4: c.b: is elsewhere"),
+        ("a: &x {b: 1}\nc: *x\n", TextChange(("c", "b"), 2), "f:2:4: c.b: is an alias"),
         ("a: &x 1\nc: *x\n", TextChange(("a",), 2), "f:1:4: a: others refer to this as *x"),
         ("a: [1, &x 2]\nc: *x\n", TextChange(("a",), 2), "f:1:8: a: an anchor here"),
         ("a: &x 1\nc: *x\nd: [*x]\n", TextChange(("d",), 2), "f:3:5: d: an alias here"),

@@ -2,12 +2,13 @@
 
 ADD_OF_THE_POOL = 'add "turned" of the pool (1.5 h)'
 ADD_OF_THE_POOL_MIN = 'add "aside" of the pool (30 min)'
-ASK_FOR_COEFFICIENT_OF_ROTATIONAL = "ask for 1 coefficient of rotational"
 A_COMMENT_HERE_WOULD = "a comment here would be lost"
 A_NEW_PROBE = "a new probe too"
 CANNOT_BE_WRITTEN_AS_IT_WAS = "cannot be written in this form"
-DIFF_DOES_NOT_GO_WITH_FORMAT = "--diff does not go with --format json"
+CHANGES_THAT_WOULD_DETERMINE = "changes that would determine it"
+DIFF_CANNOT_BE_COMBINED = "--diff cannot be combined with --format json"
 EMPTY_ADD_POSITIONS = "positions: empty; add positions, or choose some from the pool"
+ESTIMATE_COEFFICIENT_OF_ROTATIONAL = "estimate 1 coefficient of rotational"
 EVEN_ALL_CANDIDATES_TOGETHER_LEAVE_DIRECTIONS = (
     "even all 8 candidates together leave 2 directions undetermined (EAZ, ECZ, EYZ)"
 )
@@ -31,6 +32,7 @@ EVERY_BAR_LIES_PARALLEL_TO_THE_XZ = (
 )
 EVERY_DIRECTION_OF_THE_BAR_LIES = "every direction of the bar lies parallel to the "
 FULL_RANK_AND_NOTHING_IS_WEAKLY = "full rank, and no weak direction; average U6 0.2"
+HOLDING_THE_OTHERS_AT_ZERO = "holding the others at zero"
 NOTHING_DETERMINES_THE_SCALE = "nothing determines the scale of Z; add for example a bar along z"
 NOTHING_DETERMINES_THE_SCALE_OF_NOR = (
     "nothing determines the scale of Y nor its squareness to X and Z nor a combination of "
@@ -52,15 +54,13 @@ REPAIR_TURN_POSITION_BY_ONE_QUARTER = (
 )
 SCALE_RESTS_ON_PROBE_OFFSETS = "scale rests on probe offsets"
 SMALLEST_SINGULAR_VALUE = "smallest singular value 0.0"
-TAKING_THE_OTHERS_AS_ZERO = "taking the others as zero"
+THE_EXISTING_FILE_IS_UNCHANGED = "the existing file is unchanged"
 THE_FILE_EXPECTS = "the file expects that"
 THE_FILE_HAS_CHANGED_MEANWHILE = "the file has changed meanwhile and is not overwritten"
-THE_FILE_THERE = "the file there is as it was"
 THE_SCALE_OF_NOR_ITS_SQUARENESS = (
     "the scale of Y nor its squareness to X nor a combination of the scale of X and the scale of Z"
 )
 THE_SCALE_RESTS_ON_PROBE_2 = "warning: the scale rests on probe offsets"
 THE_SCALE_RESTS_ON_PROBE_OFFSETS = "the scale rests on probe offsets"
 WERE_NOT_LOOKED_FOR_IN_SO = "were not looked for in so large a design"
-WHAT_WOULD_DETERMINE = "what would determine it"
 WITH_A_NEW_PROBE = "with a new probe too"
