@@ -240,12 +240,15 @@ WRONG_CERTIFICATES = {
     ),
     "a unit of time": (
         SPACED.replace("\\milli\\metre", "\\milli\\second"),
-        'r1c1–r1c3 is no length: the unit "\\milli\\second" is none of a length',
+        'r1c1–r1c3 is no length: the unit "\\milli\\second" is not a unit of a length',
     ),
-    "another unit": (SPACED.replace("\\milli\\metre", "mm"), 'the unit "mm" is none of a length'),
+    "another unit": (
+        SPACED.replace("\\milli\\metre", "mm"),
+        'the unit "mm" is not a unit of a length',
+    ),
     "other balls": (
         SPACED.replace("r1c1", "a").replace("r3c3", "b"),
-        "no result has values of these balls",
+        "no result has values for these balls",
     ),
     "one missing": (
         SPACED.replace("r1c1-r1c3", "r1c1-r1c2"),
@@ -291,11 +294,11 @@ WRONG_CERTIFICATES = {
     ),
     "a unit to a high power": (
         SPACED.replace("\\milli\\metre", "\\metre\\tothe{99999999}"),
-        "is none of a length",
+        "is not a unit of a length",
     ),
     "a relative uncertainty": (
         dcc.certificate(dcc.result(RELATIVE_ALONE)),
-        "r1c1–r1c3 has a relative uncertainty alone, of which certificates do not say whether",
+        "r1c1–r1c3 has only a relative uncertainty, which may be standard or expanded",
     ),
     "labels of another number beside a list": (
         dcc.certificate(dcc.result(BESIDE.format(names=" ".join(LABELS[:3])))),
@@ -307,7 +310,7 @@ WRONG_CERTIFICATES = {
     ),
     "a covariance in lengths": (
         of_list(covariance=dcc.region(MATRIX, "\\micro\\metre")),
-        "is none of the square of a length",
+        "is not a unit of the square of a length",
     ),
     "far from the drawing": (
         SPACED.replace("\\milli\\metre", "\\centi\\metre"),

@@ -41,7 +41,7 @@ class Datum:
     def words(self, names: Sequence[str]) -> str:
         """What defines the axes, as text."""
         if self.axes is None:
-            return "all balls as close as possible to where they are drawn (least squares)"
+            return "all balls as close as possible to their nominal co-ordinates (least squares)"
         definition = axes_words(self.axes, tuple(names))
         return (
             definition
@@ -64,7 +64,9 @@ def chosen_datum(
     """
     names, drawn = layout.names, layout.coordinates
     if len(names) < 2:
-        raise ValueError("a single ball has no axes and no lengths; there is nothing to state")
+        raise ValueError(
+            "a single ball has no axes and no lengths; choose a plate of two balls or more"
+        )
     if list(chosen) == ["all"]:
         return Datum(None)
     if not chosen:

@@ -215,7 +215,7 @@ def _parts(
 
 NO_LENGTH = "is no length"
 RELATIVE = (
-    "has a relative uncertainty alone, of which certificates do not say whether it is expanded;"
+    "has only a relative uncertainty, which may be standard or expanded;"
     " state standard uncertainties in a CSV file"
 )
 

@@ -123,8 +123,8 @@ def _tell(
     away = [value for _, value in result.temperatures if abs(value - REFERENCE_TEMPERATURE) > 0.5]
     if away:
         text = (
-            f"{settings.values} states a temperature of {away[0]:.4g} °C; its values are taken as"
-            " they are, as those at the temperature at which all lengths are meant"
+            f"{settings.values} states a temperature of {away[0]:.4g} °C; its values are"
+            " used unchanged, as lengths at the reference temperature"
         )
         references.problems.doubt(steps, text)
 
@@ -147,7 +147,7 @@ def _nothing_found(
         if names_known
         else "its values have no names"
     )
-    return f'no result has values of these balls, called for example "{example}"; {names_text}'
+    return f'no result has values for these balls, with names such as "{example}"; {names_text}'
 
 
 def _words(text: str) -> tuple[str, ...]:

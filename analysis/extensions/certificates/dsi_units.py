@@ -59,7 +59,9 @@ def length_factor(unit: str, power: int = 1) -> Fraction:
             return factor
     quantity = "a length" if power == 1 else "the square of a length"
     example = r"\milli\metre" if power == 1 else r"\micro\metre\tothe{2}"
-    raise QuantityError(f'the unit "{shorten(unit)}" is none of {quantity}, such as {example}')
+    raise QuantityError(
+        f'the unit "{shorten(unit)}" is not a unit of {quantity}, such as {example}'
+    )
 
 
 def celsius(value: float, unit: str) -> float | None:

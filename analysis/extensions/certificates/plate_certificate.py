@@ -121,12 +121,12 @@ def plate_certificate(
     assert experiment is not None
     if fit.without_scatter:
         raise ValueError(
-            "the readings agree exactly with the model, so that nothing tells their uncertainty;"
+            "the readings agree exactly with the model and give no estimate of their uncertainty;"
             ' fit with sigma "given"'
         )
     for key in about or {}:
         if key not in ABOUT:
-            raise ValueError(f'nothing is stated about "{key}"; {hint(key, ABOUT)}')
+            raise ValueError(f'the certificate has no entry "{key}"; {hint(key, ABOUT)}')
     name = _plate_name(experiment, plate)
     layout = experiment.layouts[name]
     d = experiment.dimension
@@ -197,9 +197,7 @@ def _plate_name(experiment: Experiment, plate: str | None) -> str:
     if plate is None and len(plates) == 1:
         return plates[0]
     if not plates:
-        raise refused(
-            experiment.source, "there is no plate of two balls or more, and so nothing to certify"
-        )
+        raise refused(experiment.source, "no plate has two balls or more; add one")
     if plate is None:
         raise ValueError(f"the experiment has several plates; choose one of {listing(plates)}")
     if plate not in plates:
@@ -238,13 +236,13 @@ def _undetermined(is_open: Array, layout: BallLayout, distances: tuple[PlateDist
     """Why there is no certificate, as text."""
     if all(np.isnan(distance.standard_uncertainty) for distance in distances):
         return (
-            "the readings and what is known determine no lengths of the plate, so that there is"
-            " nothing to certify; calibrate a length (ballplate check says what is missing)"
+            "the readings and the stated values determine no length of the"
+            " plate; calibrate a length (ballplate check lists undetermined directions)"
         )
     names = listing(layout.names[k] for k in np.flatnonzero(is_open.any(axis=1)))
     return (
-        f"co-ordinates of {names} are undetermined in these axes; choose balls for the datum that"
-        " are determined, or have what is missing read"
+        f"co-ordinates of {names} are undetermined in these axes; choose determined balls for the"
+        " datum, or take the missing readings"
     )
 
 
@@ -258,8 +256,8 @@ def _carriers(experiment: Experiment, linearisation: Linearisation, plate: str) 
     of_machine = words == [OWN_SCALES]
     if of_machine and not certified_values(experiment):
         text = (
-            "nothing is calibrated: the plate's lengths would be those of the machine's own scales,"
-            " which nothing vouches for; add a calibration, or priors of the scales"
+            "no calibrated length: the plate's lengths would rest on the machine's own scales,"
+            " which are not traceable; add a calibration, or priors of the scales"
         )
         raise refused(experiment.source, text, "calibration")
     # Where the machine's scale is undetermined, it is the plate itself that is calibrated.
@@ -327,14 +325,15 @@ def _remarks(
     remarks = [*fit.warnings, *filter(None, [fit.complaint])]
     if carriers == (OWN_SCALES,):
         remarks.append(
-            "the error model takes the mean of the machine's scales for right: what they are wrong"
-            " by has no part in the uncertainties; a model with a scale of its own for each axis"
-            " would have the lengths from what is calibrated"
+            "the error model assumes that the mean of the machine's scales is exact: the"
+            " uncertainties do not include its error; a model with a scale for each axis would"
+            " take the lengths from the calibrated values"
         )
     flatness = experiment.artefacts[plate].flatness
     if flatness is not None:
         remarks.append(
-            "nothing is read across the plate's plane: z is as drawn, with a standard uncertainty"
-            f" of {1e6 * flatness:.4g} µm of each ball before the axes were put through them"
+            "the readings determine no co-ordinate normal to the plate's plane: z is nominal,"
+            f" with a standard uncertainty of {1e6 * flatness:.4g} µm for each ball before the"
+            " transformation into these axes"
         )
     return tuple(dict.fromkeys(remarks))

@@ -332,7 +332,7 @@ def test_a_ball_that_nothing_ties_to_the_others_is_left_out_and_told() -> None:
 def test_exact_readings_do_not_make_exact_plates() -> None:
     experiment = bp.experiment({**IN_SPACE, "error_model": {"kind": "metric"}})
     fit = bp.fit(experiment, bp.simulate(experiment, exact=True), "estimated")
-    with pytest.raises(ValueError, match=wording.NOTHING_TELLS_THEIR_UNCERTAINTY):
+    with pytest.raises(ValueError, match=wording.NO_ESTIMATE_OF_THEIR_UNCERTAINTY):
         fit.certificate()
 
 
@@ -352,7 +352,7 @@ WRONG: dict[str, tuple[dict[str, Any], str]] = {
     "one twice": ({"datum": ("r1c1", "r1c1", "r3c3")}, "name 3 different balls"),
     "unknown ball": ({"datum": ("r1c1", "r1c2", "r9c9")}, 'no ball "r9c9"'),
     "unknown plate": ({"plate": "plat"}, 'did you mean "plate"'),
-    "unknown key": ({"about": {"datum": "x"}}, 'nothing is stated about "datum"'),
+    "unknown key": ({"about": {"datum": "x"}}, 'the certificate has no entry "datum"'),
     "factor": ({"coverage_factor": 0.0}, "coverage factor above 0"),
 }
 

@@ -64,7 +64,7 @@ def test_wrong_usage_is_told_in_one_line(folder: Path, capsys: pytest.CaptureFix
     experiment, readings = str(folder / "e.yaml"), str(folder / "r.csv")
     for more, told in (
         (["certificate", "--datum", "r1c1,r9c9,r1c3"], 'no ball "r9c9"'),
-        (["certificate", "--about", "datum=x"], "nothing is stated about"),
+        (["certificate", "--about", "datum=x"], "the certificate has no entry"),
         (["certificate", "-o", str(folder / "p.xml")], "when the plate was measured"),
         (["adjust"], "--scale or --turn"),
         (["adjust", "--scale", "x=1 um"], "a ratio is expected"),
@@ -84,7 +84,7 @@ def test_a_plate_without_a_calibration_has_no_certificate(
     readings.to_csv(folder / "u.csv", index=False)
     line = ["certificate", str(folder / "u.yaml"), str(folder / "u.csv")]
     assert main([*line, "-o", str(folder / "u.html")]) == 3
-    assert "nothing to certify" in capsys.readouterr().err
+    assert "determine no length of the plate" in capsys.readouterr().err
     assert not (folder / "u.html").exists()
 
 
