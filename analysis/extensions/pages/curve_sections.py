@@ -20,9 +20,9 @@ def curves_section(fit: QuotedData) -> Html:
     curves = [function for function in functions if len(function.data["values"]) > 1]
     drawn = [figure(_name(curve), _curve(curve, k)) for curve in curves]
     words = (
-        "An error is where the tip is, less where the scales say: the correction that is to be"
-        f" added to a reading. Bands are expanded uncertainties U, k = {k:g}; where there is"
-        " no curve, the function is undetermined."
+        "An error is the actual position of the tip minus the indicated position: the correction to"
+        f" add to a reading. Bands are expanded uncertainties U, k = {k:g}; gaps mark"
+        " undetermined values."
     )
     rows = [_row(function, k) for function in functions]
     heads = ["error", "meaning", "largest, either sign", f"U there, k = {k:g}", "unit"]

@@ -26,10 +26,10 @@ from .uncertainty_sections import (
 )
 
 FOOT = (
-    "Lengths in micrometres and angles in microradians where nothing else is said; u are standard"
-    " uncertainties, U = k u expanded ones, predicted at zero machine error. Every figure is"
+    "Lengths are in micrometres and angles in microradians unless stated otherwise; u are standard"
+    " uncertainties, U = k u expanded ones, predicted at zero machine error. Every value is"
     " that of ballplate run, lengths, reliability, check --suggest or sheet with --json: its"
-    " data-path says which, and where it stands there."
+    " data-path names the command and the path in the output."
 )
 
 # Directions that are drawn, of each kind; the others are told in words.
@@ -166,7 +166,8 @@ def _rank(run: QuotedData, contents: DesignContents) -> Html:
             "weakly_determined",
             "Weakly determined",
             contents.weak,
-            "The observations hardly notice these; each is drawn one standard deviation long.",
+            "The observations are almost insensitive to these; each is drawn one standard"
+            " deviation long.",
         ),
     )
     for key, title, motions, words in groups:
@@ -195,7 +196,7 @@ def _rank(run: QuotedData, contents: DesignContents) -> Html:
         reasons = (element("li", direction.text()) for direction in run.at("reasons").each())
         parts += [element("h3", "Reasons"), element("ul", *reasons)]
     if not parts:
-        return sentence("Nothing is undetermined or weakly determined.")
+        return sentence("No direction is undetermined or weakly determined.")
     return joined(parts)
 
 
@@ -203,7 +204,7 @@ def _rank(run: QuotedData, contents: DesignContents) -> Html:
 def _suggestions(quoted: Mapping[str, QuotedData]) -> Html:
     """Section on changes that would determine the rest, and their effects."""
     if quoted["check"].data.get("repairs") is None:
-        return sentence("None is needed: nothing is undetermined or weakly determined.")
+        return sentence("No repair is needed: no direction is undetermined or weakly determined.")
     repairs, run = quoted["check"].at("repairs"), quoted["run"]
     before = run.data["quantities"].get("U6", {}).get("average")
     now = (
@@ -262,12 +263,13 @@ def _suggestions(quoted: Mapping[str, QuotedData]) -> Html:
     title = "Changes, by U6 with uncertain probe offsets, each verified"
     made_table = table("repairs", title, heads, rows, (0, 1, 7))
     whole, parts = len(repairs.data["complete"]), len(repairs.data["partial"])
-    introduction = "Each of these determines what is open."
+    introduction = "Each change determines every direction."
     if not whole:
-        introduction = "None of these determines all that is open."
+        introduction = "No change determines every direction."
     elif parts:
         introduction = (
-            "Each repair determines what is open; the other changes determine a part of it."
+            "Each repair determines every direction; the other changes determine some of the"
+            " undetermined ones."
         )
     return joined([sentence(introduction, now), made_table])
 

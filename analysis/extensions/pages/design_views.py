@@ -244,7 +244,7 @@ def motion_view(
     if len(balls):
         subject = f"{subject} and the balls (orange)"
     explanation = (
-        f". Enlarged {times:,.0f} times: {subject}, as against where they are drawn (grey)."
+        f". Enlarged {times:,.0f} times: {subject}, compared with the nominal geometry (grey)."
     )
     caption = joined([element("strong", kind), ": ", words, explanation])
     return SpatialPicture(layers, name, kind.lower(), f"{kind} as a moving picture", caption)

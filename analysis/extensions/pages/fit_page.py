@@ -31,9 +31,9 @@ from .uncertainty_sections import (
 )
 
 FOOT = (
-    "Lengths in micrometres and angles in microradians where nothing else is said; u are standard"
-    " uncertainties, U = k u expanded ones. Every figure is that of ballplate fit or reliability"
-    " with --json: its data-path says which, and where it stands there."
+    "Lengths are in micrometres and angles in microradians unless stated otherwise; u are standard"
+    " uncertainties, U = k u expanded ones. Every value is that of ballplate fit or reliability"
+    " with --json: its data-path names the command and the path in the output."
 )
 
 
@@ -159,7 +159,7 @@ def _verdict(fit: QuotedData, contents: FitContents) -> Html:
         rank = fit.text("complaint")
     scatter = "the residuals are no larger than stated"
     if data["degrees_of_freedom"] <= 0:
-        scatter = "there is no redundancy, so that residuals show nothing"
+        scatter = "there is no redundancy, and residuals reveal no error"
     elif data["too_large"]:
         scatter = "the residuals are larger than the stated uncertainties explain"
     weak = len(data["weakly_determined"])

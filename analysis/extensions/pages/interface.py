@@ -83,7 +83,7 @@ def page(
         ensure_path("path", path)
     of_sweep = getattr(subject, "page_text", None)
     if (run_modules or compare is not None) and of_sweep is None:
-        raise ValueError("run_modules and compare go with sweeps only; leave them out")
+        raise ValueError("run_modules and compare apply to sweeps only; leave them out")
     if isinstance(subject, Fit):
         from .offered import fit_page_text
 
@@ -96,7 +96,7 @@ def page(
         predicted = subject if isinstance(subject, Prediction) and subject.quantities else None
         chosen = subject.experiment if isinstance(subject, Prediction) else experiment_of(subject)
         if chosen is None:
-            raise ValueError("the prediction does not know its experiment; predict it anew")
+            raise ValueError("the prediction holds no experiment; predict it again")
         text = page_of_design(chosen, predicted or predict(chosen, with_scale=True), report)
     if path is not None:
         write_file(Path(path), text.encode("utf-8", "replace"))

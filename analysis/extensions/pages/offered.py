@@ -40,7 +40,7 @@ def fit_page_text(fit: Fit) -> str:
     :raises ValueError: it does not know its experiment.
     """
     if fit.experiment is None:
-        raise ValueError("the fit does not know its experiment, which a page names; fit it anew")
+        raise ValueError("the fit holds no experiment, which a page names; fit it again")
     # Loaded only now: views need no other extension.
     from .fit_contents import fit_contents
     from .fit_page import fit_page

@@ -53,7 +53,7 @@ def _certificates(experiment: Experiment) -> str:
         for certificate in experiment.calibration
     ]
     descriptions += [f"prior of {prior.name}" for prior in experiment.priors]
-    return listing(descriptions) or "none: nothing is known of artefacts but what the readings say"
+    return listing(descriptions) or "no certificate: readings are the only information on artefacts"
 
 
 def _offsets(experiment: Experiment) -> str:

@@ -136,7 +136,7 @@ def suspects_section(fit: QuotedData, untested: str) -> Html:
     if untested:
         return sentence(f"Not tested: {untested}.")
     if "suspected" not in fit:
-        return sentence("None: no test of the residuals exceeds its limit.")
+        return sentence("No test of the residuals exceeds its limit.")
     items = (element("li", suspect.text("words")) for suspect in fit.at("suspected").each())
     return element("ol", *items)
 
@@ -169,9 +169,9 @@ def components_section(fit: QuotedData) -> Html:
         "to",
         "",
     ]
-    caption = f"Variances by {components.data['by']}, as ratios to what is stated"
+    caption = f"Variances by {components.data['by']}, as ratios to the stated ones"
     made = table("components", caption, heads, rows, (0, 7))
-    words = "All other figures are as if these estimates had been stated."
+    words = "All other values use these estimates instead of the stated variances."
     return joined([made, note(words) if fit.data.get("reweighted") else Html()])
 
 
@@ -201,7 +201,9 @@ def reliability_section(reliability: QuotedData) -> Html:
             caption = f"{title} that matter most"
             parts.append(table(f"reliability-{key}", caption, heads, rows, (0, 3, 5)))
             count_left = len(every) - len(rows)
-            note_of_rest = f"{count_left} others are told by ballplate run --reliability --json."
+            note_of_rest = (
+                f"{count_left} others are in the output of ballplate run --reliability --json."
+            )
             parts.append(note(note_of_rest) if count_left else Html())
     return joined(parts)
 

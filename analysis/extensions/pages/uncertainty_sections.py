@@ -126,7 +126,7 @@ def lengths_words(result: QuotedData, target: str, caveat: str = "") -> Html:
 def scale_section(result: QuotedData) -> Html:
     """Where scale comes from."""
     if result.data.get("scale") is None:
-        return sentence("Scale is not determined, or nothing carries it.")
+        return sentence("Scale is undetermined or has no source.")
     scale = result.at("scale")
     carriers = [
         [

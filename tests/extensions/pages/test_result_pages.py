@@ -222,7 +222,7 @@ def test_a_fit_that_fails_has_a_page_that_says_so(fitted: bp.Fit) -> None:
     page = failed.page()
     assert_quoted(page, {"fit": failed.to_dict()})
     assert 'class="verdict bad"' in page and wording.THERE_ARE_NO_RESULTS in page
-    with pytest.raises(ValueError, match="fit it anew"):
+    with pytest.raises(ValueError, match="fit it again"):
         replace(fitted, experiment=None).page()
 
 
@@ -270,9 +270,9 @@ def test_names_of_files_are_escaped_once(tmp_path: Path) -> None:
 
 def test_what_has_no_page_is_refused(tmp_path: Path) -> None:
     prediction = bp.run(small())
-    with pytest.raises(ValueError, match="predict it anew"):
+    with pytest.raises(ValueError, match="predict it again"):
         bp.page(replace(prediction, experiment=None))
-    with pytest.raises(ValueError, match=wording.GO_WITH_SWEEPS_ONLY):
+    with pytest.raises(ValueError, match=wording.APPLY_TO_SWEEPS_ONLY):
         bp.page(prediction, run_modules=True)
     with pytest.raises(TypeError, match=wording.NEITHER_AN_EXPERIMENT_NOR_THE_PATH):
         bp.page(3)  # type: ignore[arg-type]
