@@ -98,7 +98,7 @@ def compensated_points(
         try:
             length, normal = profile.located(place)
         except NotOnProfileError:
-            text = "the place ({0}, {1}) is not on the profile of a feature; correct it"
+            text = "the point ({0}, {1}) is not on the profile of a feature; correct it"
             problems.append(SplineProblem(text, tuple(place.tolist())))
             continue
         lengths.append(length)
@@ -130,7 +130,7 @@ def _corner(curve: ErrorCurve, corner: float, number: int) -> CompensatedPoints:
     try:
         normals, tangents = curve.profile.beside(place)
     except NotOnProfileError:
-        text = "the corner at {0} has a feature of one point beside it; give that another point"
+        text = "the corner at {0} adjoins a feature of one point; give that feature another point"
         raise SplineError([SplineProblem(text, (corner,))]) from None
     if abs(np.linalg.det(normals)) < CORNER:
         text = "the features at {0} are nearly tangent; make it a boundary"

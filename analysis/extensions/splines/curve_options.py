@@ -124,7 +124,8 @@ def curve_settings(options: Asked, points: CurvePoints) -> CurveSettings:
         period = positive("360 deg", x)
     if options.start.strip() == "end" or options.end.strip() == "start":
         raise OptionError(
-            "the curve starts at its start and ends at its end; give --start and --end other places"
+            "the curve starts at its start and ends at its end; give other values of --start and"
+            " --end"
         )
     return CurveSettings(
         order=options.order,

@@ -263,12 +263,13 @@ def _misplaced_corners(
                 SplineProblem("{0} is a corner and a boundary; leave one out", (corner,))
             )
         if (x == corner).any():
-            text = (
-                "a point is on the corner at {0}, and of which feature is not known; leave it out"
-            )
+            text = "a point is on the corner at {0}, so its feature is ambiguous; leave it out"
             problems.append(SplineProblem(text, (corner,)))
         if any(corner in hold.places for hold in holds):
-            text = "nothing can be prescribed at the corner at {0}, of two features; leave it out"
+            text = (
+                "no value or slope can be prescribed at the corner at {0}, between two features;"
+                " leave it out"
+            )
             problems.append(SplineProblem(text, (corner,)))
     if corners and settings.period is not None:
         problems.append(SplineProblem("a periodic curve has no corners; leave them out"))
@@ -317,7 +318,7 @@ def _located(
     if points.x is not None:
         if nominal or any(isinstance(end, tuple) for end in ends):
             text = (
-                "nominal co-ordinates define a place on the profile, but the abscissa is"
+                "nominal co-ordinates define a point on the profile, but the abscissa is"
                 f" {points.x_column.words}"
             )
             raise SplineError(
@@ -385,7 +386,7 @@ def _on_profile(
         )
     except NotOnProfileError as error:
         text = (
-            "the place ({0}, {1}) is not on the profile between two points; correct it, or give the"
+            "the point ({0}, {1}) is not on the profile between two points; correct it, or give the"
             " arc length"
         )
         raise SplineError([SplineProblem(text, nominal[error.args[0]])]) from None
@@ -413,7 +414,7 @@ def _refuse_distant(places: Array, start: Array | None, end: Array | None) -> No
         away = np.hypot(*(places - place).T)
         if away[end_index] > min(float(away.min()), farthest):
             text = (
-                "the place ({0}, {1}) is not on the profile or just beyond it; correct it, or give"
+                "the point ({0}, {1}) is not on the profile or just beyond it; correct it, or give"
                 " the arc length"
             )
             problems.append(SplineProblem(text, tuple(place.tolist())))
@@ -427,9 +428,7 @@ def _refuse_coincident(places: Array) -> None:
     :raises SplineError: there are such.
     """
     same = [
-        SplineProblem(
-            "two neighbouring points are at ({0}, {1}); leave one of them out", tuple(place)
-        )
+        SplineProblem("two neighbouring points are at ({0}, {1}); leave one out", tuple(place))
         for place, two in pairwise(places.tolist())
         if place == two
     ]

@@ -262,9 +262,7 @@ class _Header:
             kind: Literal["length", "angle"] = "length" if unit in LENGTH_UNITS else "angle"
             units: Mapping[str, Fraction] = LENGTH_UNITS if kind == "length" else ANGLE_UNITS
             if name in self.columns or cell in self.texts:
-                messages.append(
-                    place.message("", f'a second column "{shorten(cell)}"; remove one of them')
-                )
+                messages.append(place.message("", f'a second column "{shorten(cell)}"; remove one'))
             elif cell in (POINT, FEATURE, *NORMALS):
                 self.texts[cell] = k
             elif name and unit in units:
@@ -333,7 +331,7 @@ class _Header:
             lack = (
                 f"; {listing(bare)} has no unit, and columns without are not read" if bare else ""
             )
-            text = f"there is no abscissa beside the error{lack}; write for example {EXAMPLE}"
+            text = f"there is an error but no abscissa{lack}; write for example {EXAMPLE}"
             messages.append(self.mark.message("", text))
         if x_column is not None and x_column is y_column:
             messages.append(

@@ -27,10 +27,10 @@ if TYPE_CHECKING:
 
 DESCRIPTION = (
     "Fit a spline to errors along an axis or along the profile of a turned part, by least"
-    " squares, with values and slopes prescribed at its ends or elsewhere, and write it as"
+    " squares, with values and slopes prescribed at its ends or at other points, and write it as"
     " polynomials for a controller. The file has columns such as position_mm and error_um,"
     " or nominal_x_mm and nominal_z_mm for a profile, whose arc length is then the"
-    " abscissa; also point, feature, u_um, normal_x and normal_z. A PLACE is an abscissa"
+    " abscissa; also point, feature, u_um, normal_x and normal_z. A LOCATION is an abscissa"
     ' such as "12.5 mm", start, end, or nominal co-ordinates on the profile such as "37.084'
     ' mm, -37.084 mm".'
 )
@@ -52,7 +52,7 @@ def add_options(parser: ArgumentParser) -> None:
     data.add_argument(
         "--uncertainty",
         metavar="VALUE",
-        help="standard uncertainty of each error, where no column u has it",
+        help="standard uncertainty of each error, if there is no column u",
     )
     data.add_argument(
         "--sigma",
@@ -70,32 +70,32 @@ def add_options(parser: ArgumentParser) -> None:
         type=count,
         help="a knot at every R-th point of each feature; default: 5",
     )
-    knots.add_argument("--knots", metavar="PLACES", help='knots such as "10 mm, 20 mm", or none')
+    knots.add_argument("--knots", metavar="LOCATIONS", help='knots such as "10 mm, 20 mm", or none')
     shape.add_argument(
         "--order", metavar="N", type=count, default=4, help="degree plus one; default: 4, cubic"
     )
     shape.add_argument(
         "--start",
-        metavar="PLACE",
+        metavar="LOCATION",
         default="start",
         help="where the curve starts; default: first point",
     )
     shape.add_argument(
-        "--end", metavar="PLACE", default="end", help="where the curve ends; default: last point"
+        "--end", metavar="LOCATION", default="end", help="where the curve ends; default: last point"
     )
     shape.add_argument(
         "--boundary",
-        metavar="PLACE",
+        metavar="LOCATION",
         action="append",
         default=[],
         help="between features that share value and slope; may be repeated",
     )
     shape.add_argument(
         "--corner",
-        metavar="PLACE",
+        metavar="LOCATION",
         action="append",
         default=[],
-        help="between features that share the place alone; may be repeated",
+        help="between features that share only their location; may be repeated",
     )
     shape.add_argument(
         "--straight",
@@ -122,7 +122,7 @@ def add_options(parser: ArgumentParser) -> None:
     prescribed.add_argument(
         "--at",
         nargs=3,
-        metavar=("PLACE", "value|slope", "VALUE"),
+        metavar=("LOCATION", "value|slope", "VALUE"),
         action="append",
         default=[],
         help='for example --at "30 mm" slope 0; may be repeated',
@@ -130,8 +130,8 @@ def add_options(parser: ArgumentParser) -> None:
     output = parser.add_argument_group("output")
     output.add_argument(
         "--evaluate",
-        metavar="PLACES",
-        help=('also print the values at these places, such as "10 mm, 12.5 mm"'),
+        metavar="LOCATIONS",
+        help=('also print the values at these locations, such as "10 mm, 12.5 mm"'),
     )
     output.add_argument("--powers", choices=("local", "global"), default="local", help=POWERS)
     add_output(

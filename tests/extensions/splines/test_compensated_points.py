@@ -128,7 +128,10 @@ def test_the_uncertainty_of_a_corner_is_that_of_repeated_parts(tmp_path: Path) -
     ("more", "told"),
     [
         ({"boundary": ["20 mm, 0 mm"]}, "a corner and a boundary"),
-        ({"at": [("20 mm, 0 mm", "value", "0 um")]}, "nothing can be prescribed at the corner"),
+        (
+            {"at": [("20 mm, 0 mm", "value", "0 um")]},
+            "no value or slope can be prescribed at the corner",
+        ),
     ],
 )
 def test_what_does_not_go_with_a_corner(more: dict[str, object], told: str, tmp_path: Path) -> None:

@@ -295,7 +295,7 @@ def test_wrong_usage(
             ("--start-slope", "0", "--at", "start", "slope", "1 um/mm"),
             ["the slope at 0 mm is prescribed twice, differently; leave one of them out"],
         ),
-        (("--boundary", "1 mm, 1 mm"), ["the place (1 mm, 1 mm) is not on the profile"]),
+        (("--boundary", "1 mm, 1 mm"), ["the point (1 mm, 1 mm) is not on the profile"]),
         (
             ("--boundary", "90 mm", "--straight", "3"),
             ["there is no feature 3; there are 2", "the boundary at 90 mm is not"],
@@ -304,7 +304,7 @@ def test_wrong_usage(
         (("--order", "2", "--boundary", "9 mm"), ["broken lines share no slope"]),
         (
             ("--x", "nominal_z", "--start", TANGENT),
-            ["nominal co-ordinates define a place on the profile"],
+            ["nominal co-ordinates define a point on the profile"],
         ),
         (("--points", "12-32,44"), ['no point "44"']),
         (
@@ -316,8 +316,8 @@ def test_wrong_usage(
             ("--sigma", "given"),
             ["no uncertainties are stated; add a column such as u_um, or give"],
         ),
-        (("--start", "1 mm, 1 mm"), ["the place (1 mm, 1 mm) is not on the profile"]),
-        (("--end", "20 mm, -20 mm"), ["the place (20 mm, -20 mm) is not on the profile"]),
+        (("--start", "1 mm, 1 mm"), ["the point (1 mm, 1 mm) is not on the profile"]),
+        (("--end", "20 mm, -20 mm"), ["the point (20 mm, -20 mm) is not on the profile"]),
     ],
 )
 def test_what_cannot_be_fitted(
