@@ -90,7 +90,7 @@ def _stood(document: DesignDocument, action: Arguments) -> str:
 
     def stand(experiment: Experiment, place: Position) -> Pose:
         if experiment.dimension == 2:
-            raise ActionError("a plane machine has no axis to stand across")
+            raise ActionError("a plane machine has no axis normal to a plate")
         return _about_middle(experiment, place, plane_rotation(axis, 0))
 
     return _posed(document, str(action["position"]), stand)

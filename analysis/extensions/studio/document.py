@@ -146,7 +146,7 @@ def ensure_as_read(document: DesignDocument) -> None:
         name = document.path.name
         how = "has been removed" if content is None else "has changed"
         raise ChangedOnDiskError(
-            f"{name} {how} on disk since it was opened here; nothing was written: save under"
+            f"{name} {how} on disk since it was opened here and was not overwritten: save under"
             " another name, or open the file again"
         )
 

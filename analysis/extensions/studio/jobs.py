@@ -108,10 +108,10 @@ JOBS: Mapping[str, Work] = {
     "sweep": _sweep,
     "fit": _fit,
 }
-"""What can run beside the studio; another is a function and its line here."""
+"""Computations that can run alongside the studio; to add one, write a function and a line here."""
 
 CHECKS: Mapping[str, Callable[[DesignDocument, Mapping[str, Any]], None]] = {"sweep": _ensure_sweep}
-"""What refuses the settings of a computation before it begins."""
+"""Checks of the settings of a computation before it begins."""
 
 
 @dataclass

@@ -65,7 +65,7 @@ def recovered(document: DesignDocument, owner: str) -> tuple[DesignDocument, str
     names_set_aside = [file.name for file in _set_aside(document.path) if file.name not in note]
     if names_set_aside:
         listed = ", ".join(names_set_aside)
-        more = f"changes that were not saved are in {listed}: look at them, and delete them"
+        more = f"unsaved changes are in {listed}: inspect and delete them"
         note = f"{note}; {more}" if note else more
     return document_found, note
 
@@ -92,8 +92,8 @@ def _recovered(document: DesignDocument, owner: str) -> tuple[DesignDocument, st
         is_known = all(code_object in code_before for code_object in code)
     if not is_known:
         return document, (
-            f"changes that were not saved are in {_put_aside(path).name} and not taken up: they"
-            " have an error model in Python that the file has not; look at them, and delete them"
+            f"unsaved changes are in {_put_aside(path).name} and were not restored: they"
+            " have an error model in Python that the file does not have; inspect and delete them"
         )
     # What nobody has read must not come to run by a change of something else, either.
     trust = document.trust if code_before else UNKNOWN

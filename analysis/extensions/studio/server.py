@@ -184,7 +184,7 @@ def _answering(
             # Nothing has changed by it; whoever looks after the program finds it in the terminal.
             logger.exception("the studio failed to answer %s", request.url.path)
             reason = f"{type(error).__name__}: {error}"
-            return _error(f"the studio failed, and the design is as it was: {reason}")
+            return _error(f"the studio failed; the design is unchanged: {reason}")
 
     return respond
 

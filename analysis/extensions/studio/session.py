@@ -184,7 +184,7 @@ class Session:
             for job in self._jobs.values():
                 job.look()
             if sum(job.state == "running" for job in self._jobs.values()) >= MOST_RUNNING:
-                raise RefusedError(f"{MOST_RUNNING} computations are running; stop one of them")
+                raise RefusedError(f"{MOST_RUNNING} computations are running; stop one")
             number = max(self._jobs, default=0) + 1
             self._jobs[number] = started(name, self._document, settings)
             return number
@@ -246,7 +246,7 @@ class Session:
         :raises RefusedError: it shows another one.
         """
         if action.get("session", self.name) != self.name:
-            raise RefusedError("the studio was started anew; this page shows an earlier design")
+            raise RefusedError("the studio was restarted; this page shows an earlier design")
         if action.get("revision", self.revision) != self.revision:
             raise RefusedError("the design has changed in another window; look again")
 
@@ -301,7 +301,7 @@ class Session:
         while True:
             with self._lock:
                 if self._asked != number:
-                    raise RefusedError("something else was asked for meanwhile")
+                    raise RefusedError("a later request replaced this one")
                 result = self._aside.look()
                 if result is not None:
                     return result
@@ -316,9 +316,9 @@ class Session:
     def _keep(self, action: Mapping[str, Any]) -> None:
         self._await()
         if self._judge.is_busy:
-            raise RefusedError("the figures are being computed; wait for them")
+            raise RefusedError("the results are being computed; wait for them")
         if self._judgement.messages:
-            raise RefusedError("the text is wrong; mend it before the design is kept")
+            raise RefusedError("the text is invalid; correct it before keeping the design")
         self._kept = None if action.get("off") else self._answer
         self.revision += 1
 

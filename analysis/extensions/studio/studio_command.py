@@ -43,12 +43,12 @@ def unsaved(session: Session) -> str:
     from .recovery import kept_in
 
     if session.is_saved:
-        return "nothing is left to be saved"
+        return "all changes are saved"
     unsaved_files = session.kept()
     if unsaved_files == kept_in(session.path):
         return (
             f"changes are not saved, and are in {unsaved_files.name}:"
-            " the same command takes them up again"
+            " the same command restores them"
         )
     if unsaved_files is not None:
         return (

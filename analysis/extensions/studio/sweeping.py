@@ -112,7 +112,7 @@ def _axes(axes_data: Any) -> list[_Axis]:
     names = [axis.name for axis in axes]
     for name in names:
         if names.count(name) > 1:
-            raise ActionError(f"two axes are of {name}; put their values into one")
+            raise ActionError(f"two axes vary {name}; list their values in one")
     return axes
 
 

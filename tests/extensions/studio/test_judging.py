@@ -120,7 +120,7 @@ def test_a_preview_that_is_overtaken_is_refused_and_ends(session):
         while not session._asked:
             time.sleep(0.01)
         found = session.preview({"do": "set", "path": ["title"], "value": "mine"})
-        with pytest.raises(RefusedError, match="meanwhile"):
+        with pytest.raises(RefusedError, match="later request"):
             first.result(60)
     assert found["title"] == "mine"
 

@@ -98,7 +98,7 @@ def test_an_hour(design: Path) -> None:
         settled(page, 4)
         page.wait_for_selector("#forms .field-error")
         assert page.locator("#forms .field-error").count() == 1
-        assert "text is wrong" in page.inner_text("#verdict")
+        assert "text is invalid" in page.inner_text("#verdict")
         page.click("#undo")
         settled(page, 5)
         assert "full rank" in page.inner_text("#verdict")

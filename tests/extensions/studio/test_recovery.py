@@ -68,7 +68,7 @@ def test_what_was_not_saved_is_there_again_with_the_file_a_step_back(design):
     assert not kept_in(design).exists()
     again.act({"do": "redo"})
     again.act({"do": "save"})
-    assert unsaved(again) == wording.NOTHING_IS_LEFT_TO_BE_SAVED
+    assert unsaved(again) == wording.ALL_CHANGES_ARE_SAVED
     assert design.read_text() == text and not kept_in(design).exists()
     assert Session(design).state()["note"] == ""
 
@@ -362,7 +362,7 @@ def test_what_was_not_saved_brings_no_model_in_python_into_a_file(design, ran, c
     assert text != said["text"]
     kept_in(design).write_text(json.dumps(said | {"text": text}))
     state = Session(design).state()
-    assert "not taken up" in state["note"] and state["saved"]
+    assert "not restored" in state["note"] and state["saved"]
     (aside,) = set_aside(design)
     assert json.loads(aside.read_text())["text"] == text and not ran.exists()
 
@@ -388,7 +388,7 @@ def test_what_was_not_saved_does_not_exchange_the_model_in_python_of_a_file(desi
     for variant in ("error_model.object: 'model:build'", f"true_machine: {SETTINGS}"):
         other = f"{said['text']}\nvariants:\n  v:\n    {variant}\n"
         kept_in(design).write_text(json.dumps(said | {"text": other}))
-        assert "not taken up" in Session(design).state()["note"] and not ran.exists()
+        assert "not restored" in Session(design).state()["note"] and not ran.exists()
 
 
 def test_no_later_change_runs_what_came_with_a_text_that_was_not_saved(design, ran):

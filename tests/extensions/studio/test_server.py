@@ -241,9 +241,9 @@ def test_a_page_of_an_earlier_studio_changes_nothing(client, session, design):
     other = Session(design)
     assert other.revision == state["revision"] and other.name != state["session"]
     turn = {"do": "turn", "position": "z low", "session": state["session"], "revision": 0}
-    with pytest.raises(RefusedError, match="started anew"):
+    with pytest.raises(RefusedError, match="restarted"):
         other.act(turn)
-    with pytest.raises(RefusedError, match="started anew"):
+    with pytest.raises(RefusedError, match="restarted"):
         other.preview(turn)
     session.act(turn)
 

@@ -104,7 +104,7 @@ def test_a_cell_that_fails_says_why(document, pageless):
         ([{"paths": ["title", "title"], "values": ["x"]}], "title"),
         ([{"paths": ["artefacts.plat.size"], "values": ["1"]}], "no artefacts.plat; did you mean"),
         ([{"paths": ["title"], "values": ["x", "x"]}], 'has the value "x" twice'),
-        ([{"paths": ["title"], "values": ["x"]}] * 2, "two axes are of title"),
+        ([{"paths": ["title"], "values": ["x"]}] * 2, "two axes vary title"),
         ([{"values": ["x"]}], "its paths and values"),
         ([{"paths": 3, "values": "x"}], "its paths and values"),
         (["x"], "list of axes"),

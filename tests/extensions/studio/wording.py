@@ -1,9 +1,10 @@
 """The wording that the tests of studio expect: a rewording is entered here alone."""
 
+ALL_CHANGES_ARE_SAVED = "all changes are saved"
 BELOW_THE_MEASURING_VOLUME = "below the measuring volume"
 CHANGES_ARE_NOT_SAVED = "changes are not saved, and are in .plate.yaml.unsaved"
 CHANGES_ARE_NOT_SAVED_AND_ARE_IN_PLATE = (
-    "changes are not saved, and are in .plate.yaml.unsaved: the same command takes them up again"
+    "changes are not saved, and are in .plate.yaml.unsaved: the same command restores them"
 )
 COULD_NOT_BE_KEPT = "could not be kept"
 HAS_CHANGED_ON_DISK = "has changed on disk"
@@ -12,5 +13,4 @@ IS_CODE_IN_PYTHON = "is code in Python"
 IS_NOT_THE_NAME = "is not the name of a design in the folder"
 IS_NO_CHARACTER = "is no character of a file"
 LEAVE_SOME_OF_IT_OUT = "leave some of it out"
-NOTHING_IS_LEFT_TO_BE_SAVED = "nothing is left to be saved"
 NOT_SAVED_IN_AN_EARLIER_SESSION = "not saved in an earlier session"

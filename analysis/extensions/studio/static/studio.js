@@ -96,7 +96,7 @@ function act(action, said = "") {
     } catch (error) {
       clearTimeout(slow);
       tell(error.message, true);
-      if (/another window|started anew/.test(error.message)) await refresh();
+      if (/another window|restarted/.test(error.message)) await refresh();
       else show();
       return false;
     }
@@ -232,7 +232,7 @@ function figures(design, messages, pending = false) {
   box.classList.toggle("bad", wrong || rank.deficiency > 0);
   box.classList.toggle("warn", !wrong && !rank.deficiency && design.within !== null && design.within < 1);
   const lines = [];
-  const reason = pending ? "Computing" : messages[0]?.line ? "The text is wrong" : "The text cannot be evaluated";
+  const reason = pending ? "Computing" : messages[0]?.line ? "The text is invalid" : "The text cannot be evaluated";
   if (wrong) lines.push(make("strong", {}, design ? `${reason}; these are the figures before it.` : `${reason}; there are no figures yet.`));
   else lines.push(make("strong", {}, rank.words), rank.deficiency === (rank.expected ?? 0) ? "" : ` (the file expects ${rank.expected ?? 0})`);
   const figured = design ? [
