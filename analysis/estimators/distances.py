@@ -558,7 +558,7 @@ def _distances(design: Design, a: Array, ends: Array) -> Array:
     """Return distances (m,) between corrected points of scale readings `ends` (2, m, d)."""
     offsets = np.broadcast_to(design.probes.offsets[design.evaluation.probe], ends.shape[1:])
     corrected = [x + design.model.error(x, a, offsets) for x in ends]
-    return np.asarray(np.sqrt(((corrected[0] - corrected[1]) ** 2).sum(axis=1)))
+    return np.sqrt(((corrected[0] - corrected[1]) ** 2).sum(axis=1))
 
 
 def share_below(values: Array, published: float) -> float:

@@ -275,7 +275,7 @@ def _mean_readings(observed: ObservedReadings) -> Array:
     count = np.zeros(total.shape[:2])
     np.add.at(total, (readings.position, readings.ball), points)
     np.add.at(count, (readings.position, readings.ball), 1.0)
-    return np.asarray(total / np.maximum(count, 1.0)[:, :, None])
+    return total / np.maximum(count, 1.0)[:, :, None]
 
 
 def _p_value(three: Reversal, five: Reversal) -> float:

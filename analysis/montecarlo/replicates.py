@@ -354,7 +354,7 @@ def _turn_less_one(turn: Array) -> Array:
         (0.5 * np.sinc(angle / (2 * np.pi)) ** 2)[:, None, None],
     )
     cross = cross_matrices(-turn)
-    return np.asarray(first * cross + second * (cross @ cross))
+    return first * cross + second * (cross @ cross)
 
 
 def _turns_less_one(turns: Array) -> Array:
@@ -374,7 +374,7 @@ def _moment(arm: Array, pull: Array) -> Array:
 
     # Separately for each pair of axes: a matrix product per replicate takes twice as long.
     def product(i: int, j: int) -> Array:
-        return np.asarray(np.einsum("bm,bm->b", arm[:, i], pull[:, j]))
+        return np.einsum("bm,bm->b", arm[:, i], pull[:, j])
 
     return np.stack([product(i, j) - product(j, i) for i, j in planes], axis=1)
 

@@ -325,9 +325,8 @@ class _Task:
     def between(self) -> Array:
         """Cost from each place and probe to every other."""
         place, probe = np.divmod(np.arange(len(self.contents) * len(self.names)), len(self.names))
-        return np.asarray(
-            self.changes.plane * (place[:, None] != place)
-            + self.changes.probe * (probe[:, None] != probe)
+        return self.changes.plane * (place[:, None] != place) + self.changes.probe * (
+            probe[:, None] != probe
         )
 
     def visits(self) -> Iterator[Visit]:

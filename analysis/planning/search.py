@@ -82,7 +82,7 @@ class SelectionProblem:
         """
         smooth, value, weight = self.criterion.tangent(root[self.counted, self.counted], *power)
         scale, directions = np.linalg.eigh(weight)
-        return smooth, value, np.asarray(directions * np.sqrt(np.maximum(scale, 0.0)))
+        return smooth, value, directions * np.sqrt(np.maximum(scale, 0.0))
 
 
 @dataclass(frozen=True)

@@ -155,4 +155,4 @@ def _name(
 
 def _unit(vectors: Array) -> Array:
     lengths = np.linalg.norm(vectors, axis=1, keepdims=True)
-    return np.asarray(np.where(lengths > 0, vectors / np.where(lengths > 0, lengths, 1.0), 0.0))
+    return np.where(lengths > 0, vectors / np.where(lengths > 0, lengths, 1.0), 0.0)

@@ -41,7 +41,7 @@ def comparable(values: ArrayLike, digits: int = DIGITS, axis: int | None = None)
     is_something = size > NOTHING * size.max(axis=axis, initial=0.0, keepdims=True)
     mantissa, exponent = np.frexp(np.where(is_finite & is_something, values, 0.0))
     rounded = np.ldexp(np.round(np.ldexp(mantissa, digits)), exponent - digits) + 0.0
-    return np.asarray(np.where(is_finite, rounded, values))
+    return np.where(is_finite, rounded, values)
 
 
 def first_largest(values: Array) -> int:

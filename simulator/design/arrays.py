@@ -203,7 +203,7 @@ def measured(design: Design, readings: Readings) -> Flags:
 def reading_noise(design: Design, readings: Readings) -> Array:
     """Standard uncertainties (m, d) of the mean of each reading's repeats, in metres."""
     times = np.sqrt(readings.repeats)[:, None]
-    return np.asarray(reading_uncertainties(design, readings) / times)
+    return reading_uncertainties(design, readings) / times
 
 
 def nominal_state(design: Design) -> State:
@@ -222,9 +222,7 @@ def nominal_state(design: Design) -> State:
 def nominal_places(design: Design, position: int, balls: Integers) -> Array:
     """Return nominal locations (m, d) of balls of an artefact in a position."""
     planned = design.positions
-    return np.asarray(
-        design.balls.places[balls] @ planned.rotations[position].T + planned.origins[position]
-    )
+    return design.balls.places[balls] @ planned.rotations[position].T + planned.origins[position]
 
 
 def read_in_positions(design: Design, readings: Readings) -> Iterator[tuple[int, Integers, Array]]:
@@ -239,7 +237,7 @@ def read_in_positions(design: Design, readings: Readings) -> Iterator[tuple[int,
 def locations(design: Design, state: State, readings: Readings) -> Array:
     """True positions (m, d) of the balls that are read, T(y, t) in metres."""
     turned = np.einsum("mij,mj->mi", state.rotations[readings.position], state.balls[readings.ball])
-    return np.asarray(turned + state.origins[readings.position])
+    return turned + state.origins[readings.position]
 
 
 def in_sequence(readings: Readings, influences: tuple[Influence, ...]) -> Readings:

@@ -35,7 +35,7 @@ class Volume:
     @property
     def size(self) -> Array:
         """Lengths (d,) of the sides."""
-        return np.asarray(self.upper - self.lower)
+        return self.upper - self.lower
 
     @property
     def diagonals(self) -> tuple[Array, Array]:
@@ -63,7 +63,7 @@ class Volume:
         another unit.
         """
         size = float(self.size.max())
-        return np.asarray((x < self.lower - size) | (x > self.upper + size))
+        return (x < self.lower - size) | (x > self.upper + size)
 
 
 @dataclass(frozen=True, eq=False)

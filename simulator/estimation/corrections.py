@@ -16,7 +16,7 @@ def corrected_points(design: Design, state: State, points: Array, probes: Intege
     """Corrected points x + e(x, a, p) (m, d) for scale readings `points` (m, d) with probes of
     indices (m,), metres.
     """
-    return np.asarray(points + design.model.error(points, state.a, state.probes[probes]))
+    return points + design.model.error(points, state.a, state.probes[probes])
 
 
 def correction_rows(

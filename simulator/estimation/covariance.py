@@ -66,14 +66,14 @@ class Spectrum:
         if self.triangle is None:
             assert self.known is not None
             return self.known
-        return np.asarray(self.scale[:, None] * np.linalg.svd(self.triangle)[2].T)
+        return self.scale[:, None] * np.linalg.svd(self.triangle)[2].T
 
     @property
     def principal_root(self) -> Array:
         """Square root (s, rank) of the shared parameters' covariance, a column for each determined
         direction.
         """
-        return np.asarray(self.directions[:, : self.rank] / self.values[: self.rank])
+        return self.directions[:, : self.rank] / self.values[: self.rank]
 
     @cached_property
     def root(self) -> Array:
@@ -82,7 +82,7 @@ class Spectrum:
         """
         if self.triangle is None:
             return self.principal_root
-        return np.asarray(self.scale[:, None] * np.linalg.inv(self.triangle))
+        return self.scale[:, None] * np.linalg.inv(self.triangle)
 
 
 @single_threaded

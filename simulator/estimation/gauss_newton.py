@@ -195,10 +195,10 @@ def _shared_step(factor: Factor, spectrum: Spectrum) -> Array:
         # root = U diag(values) V' / scale, so U' side follows from root times the directions.
         rest_root = factor.root @ determined
         rest_root /= np.sqrt((rest_root**2).sum(axis=0))
-        return np.asarray(-(spectrum.root @ (rest_root.T @ factor.side)))
+        return -(spectrum.root @ (rest_root.T @ factor.side))
     reduced = triangle(in_order(factor) @ determined, factor.side[:, None])
     steps = scipy_linalg().solve_triangular(reduced.root, reduced.side[:, 0], check_finite=False)
-    return np.asarray(-(determined[:, reduced.order] @ steps))
+    return -(determined[:, reduced.order] @ steps)
 
 
 def moved(state: State, layout: SharedLayout, shared: Array, balls: Array) -> State:

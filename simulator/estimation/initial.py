@@ -118,7 +118,7 @@ def _mean_locations(design: Design, x: Array) -> Array:
     np.add.at(total, (readings.position, readings.ball), seen_places(design, readings, x))
     np.add.at(count, (readings.position, readings.ball), 1.0)
     with np.errstate(invalid="ignore"):
-        return np.asarray(total / count[:, :, None])
+        return total / count[:, :, None]
 
 
 def _assemble(locations: Array, nominal: Array, d: int) -> tuple[Array, list[tuple[Array, Array]]]:

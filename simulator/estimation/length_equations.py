@@ -290,7 +290,7 @@ def _open_directions(equations: _Equations, unknowns: _Unknowns) -> Array:
     _, values, vh = np.linalg.svd(
         np.linalg.qr(rows, mode="r") if len(rows) > rows.shape[1] else rows
     )
-    return np.asarray(vh[int((values > EXACT * values.max(initial=0.0)).sum()) :].T)
+    return vh[int((values > EXACT * values.max(initial=0.0)).sum()) :].T
 
 
 def _solved(

@@ -193,6 +193,4 @@ def _left_out(alpha: float, beta: float, gamma: float) -> Array:
     inverse = _corrected(np.eye(2), "split", alpha, gamma).T
     c, s = np.cos(beta), np.sin(beta)
     exact = np.linalg.inv(inverse) @ np.array([[-s, -c], [c, -s]]) @ inverse
-    return np.asarray(
-        exact - np.array([[-(beta + alpha), -(1.0 + gamma)], [1.0 - gamma, alpha - beta]])
-    )
+    return exact - np.array([[-(beta + alpha), -(1.0 + gamma)], [1.0 - gamma, alpha - beta]])

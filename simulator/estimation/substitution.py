@@ -50,12 +50,10 @@ def in_order(factor: Factor) -> Array:
 def _solve(root: Array, order: Integers | None, side: Array, transposed: bool) -> Array:
     solve_triangular = scipy_linalg().solve_triangular
     if transposed:
-        return np.asarray(
-            solve_triangular(
-                root, side if order is None else side[order], trans="T", check_finite=False
-            )
+        return solve_triangular(
+            root, side if order is None else side[order], trans="T", check_finite=False
         )
-    solution = np.asarray(solve_triangular(root, side, check_finite=False))
+    solution = solve_triangular(root, side, check_finite=False)
     if order is None:
         return solution
     result = np.empty_like(solution)

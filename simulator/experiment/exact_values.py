@@ -149,7 +149,7 @@ def _doubtfulness(exact: _Exact, balls: Array, misfit: Array) -> Array:
     rows = exact.misfit(balls)[1]
     u, values, _ = np.linalg.svd(rows.reshape(len(rows), -1), full_matrices=False)
     unexplained = 1.0 - (u[:, values > KNOWN * values.max(initial=0.0)] ** 2).sum(axis=1)
-    return np.asarray(np.abs(misfit) / np.sqrt(np.maximum(unexplained, SHARE)))
+    return np.abs(misfit) / np.sqrt(np.maximum(unexplained, SHARE))
 
 
 def _least_misfit(exact: _Exact, drawn: Array) -> tuple[Array, Array] | None:

@@ -210,7 +210,7 @@ def _stars(experiment: Experiment) -> list[Stars]:
 def random_points(volume: Volume, count: int, seed: int) -> Array:
     """Points (count, d) drawn evenly from the volume."""
     generator = np.random.default_rng(np.random.SeedSequence(seed))
-    return np.asarray(volume.lower + volume.size * generator.random((count, len(volume.lower))))
+    return volume.lower + volume.size * generator.random((count, len(volume.lower)))
 
 
 def _readings(
@@ -360,7 +360,7 @@ def _null_space(rows: Array) -> Array:
     triangle = np.linalg.qr(rows, mode="r") if len(rows) > rows.shape[1] else rows
     _, values, directions = np.linalg.svd(triangle)
     rank = int((values > FLAT * values[0]).sum())
-    return np.asarray(directions[rank:].T)
+    return directions[rank:].T
 
 
 def _pivots(motions: Array, already: Flags | None = None) -> Flags:

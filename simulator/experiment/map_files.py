@@ -142,4 +142,4 @@ def _array(archive: zipfile.ZipFile, name: str) -> Array:
     if math.prod(shape) * kind.itemsize > size:
         raise ValueError(f"{name} is cut off")
     stream.seek(0)
-    return np.asarray(np.lib.format.read_array(stream, allow_pickle=False))
+    return np.lib.format.read_array(stream, allow_pickle=False)

@@ -41,4 +41,4 @@ def rotation_matrix(angles: Sequence[float]) -> NDArray[np.float64]:
     about_y = np.array([[cb, 0.0, sb], [0.0, 1.0, 0.0], [-sb, 0.0, cb]])
     about_z = np.array([[cc, -sc, 0.0], [sc, cc, 0.0], [0.0, 0.0, 1.0]])
     # Adding zero turns every -0.0 into 0.0.
-    return np.asarray(about_z @ about_y @ about_x + 0.0)
+    return about_z @ about_y @ about_x + 0.0

@@ -158,7 +158,7 @@ class Polynomial(_Polynomials):
         columns = [np.ones_like(s), s][: self.size]
         while len(columns) < self.size:
             columns.append(2.0 * s * columns[-1] - columns[-2])
-        return np.asarray((np.stack(columns) * envelope).T)
+        return (np.stack(columns) * envelope).T
 
     @cached_property
     def monomials(self) -> Array:

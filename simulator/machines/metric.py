@@ -51,7 +51,7 @@ class MetricModel:
         gamma = a[1] if self.scale != "none" else 0.0
         scale_x, scale_y = 1.0 + share_x * gamma, 1.0 + share_y * gamma
         y = x[:, 1] / scale_y
-        return np.asarray((x[:, 0] + a[0] * y) / scale_x), np.asarray(y), scale_x, scale_y
+        return (x[:, 0] + a[0] * y) / scale_x, np.asarray(y), scale_x, scale_y
 
     def error(self, x: Array, a: Array, p: Array) -> Array:
         true_x, true_y, _, _ = self._solve(x, a)

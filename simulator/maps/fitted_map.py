@@ -171,7 +171,7 @@ class FittedMap:
         is_positive = (
             values > ROUNDING * max(float(values[-1]), 0.0) if len(values) else values > 0.0
         )
-        return np.asarray(size[:, None] * vectors[:, is_positive] * np.sqrt(values[is_positive]))
+        return size[:, None] * vectors[:, is_positive] * np.sqrt(values[is_positive])
 
     def standard_uncertainties(
         self, rows: Array | None = None, drawn: Array | None = None
@@ -197,7 +197,7 @@ class FittedMap:
         NaN for those undetermined by `drawn` (k, m).
         """
         root = self.function_root(rows, drawn)
-        return np.asarray(root @ root.T)
+        return root @ root.T
 
     def _blanked(self, rows: Array, values: Array) -> Array:
         return blank(values, rows @ self.undetermined, np.linalg.norm(rows * self.scale, axis=-1))
@@ -233,4 +233,4 @@ def determined_only(null: Array, scale: Array) -> Array:
             np.abs(directions / scale[:, None]).argmax(axis=0), np.arange(directions.shape[1])
         ]
     )
-    return np.asarray(directions * signs)
+    return directions * signs

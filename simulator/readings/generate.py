@@ -92,7 +92,7 @@ def true_influences(design: Design, generator: np.random.Generator) -> Array:
     """
     u = np.array([parameter.uncertainty for parameter in design.influence_parameters], float)
     errors = np.where(np.isfinite(u), u, 0.0) * generator.standard_normal(len(u))
-    return np.asarray(design.influence_values + errors)
+    return design.influence_values + errors
 
 
 # In one piece: the order in which random numbers are drawn determines a seed's values.

@@ -67,9 +67,6 @@ def pieces(fitted: SplineFit, powers: Powers = "local") -> Pieces:
 def _absolute(pieces: Pieces, x: Array) -> Array:
     piece = np.clip(np.searchsorted(pieces.breaks, x, "right") - 1, 0, len(pieces.coefficients) - 1)
     u = np.abs(x - pieces.breaks[piece] if pieces.powers == "local" else x)
-    return np.asarray(
-        sum(
-            np.abs(pieces.coefficients[piece, k]) * u**k
-            for k in range(pieces.coefficients.shape[1])
-        )
+    return sum(
+        np.abs(pieces.coefficients[piece, k]) * u**k for k in range(pieces.coefficients.shape[1])
     )

@@ -149,7 +149,7 @@ def drawn_values(
         part = slice(start, start + len(probes_of_star))
         errors[part] = item.drawn_errors(normal[part], uncertainty[part])
         start = part.stop
-    return np.asarray(np.array(true, float) + errors)
+    return np.array(true, float) + errors
 
 
 def certificate_rows(experiment: Experiment) -> Iterator[tuple[str, str, str, str]]:

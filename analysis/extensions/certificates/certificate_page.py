@@ -182,7 +182,7 @@ def _drawing(certificate: CertifiedBalls) -> str:
 def _aligned(places: Array, drawn: Array) -> Array:
     """Deviations (n, 2) from the drawing, less what a shift and a turn explain."""
     rotation, shift = fit_motion(places, drawn)
-    return np.asarray(places @ rotation.T + shift - drawn)
+    return places @ rotation.T + shift - drawn
 
 
 def _rounded_down(value: float) -> float:

@@ -95,7 +95,7 @@ def chosen_datum(
 def _is_apart(drawn: Array, axes: PlateAxes) -> NDArray[np.bool_]:
     """Which balls (n,) are off the line of the two on an axis."""
     across, along = _across(drawn, axes)
-    return np.asarray(across > IN_LINE * np.maximum(along, across))
+    return across > IN_LINE * np.maximum(along, across)
 
 
 def _across(drawn: Array, axes: PlateAxes) -> tuple[Array, Array]:
@@ -156,7 +156,7 @@ def _in_plane(moved: Array, along: Array, datum: Datum, drawn: Array) -> Array:
     assert axes is not None
     as_drawn = drawn - drawn[axes.origin]
     normal = np.cross(axes.sign * as_drawn[axes.ball], as_drawn[datum.plane])
-    return np.asarray(-moved[datum.plane] if normal[2] < 0.0 else moved[datum.plane])
+    return -moved[datum.plane] if normal[2] < 0.0 else moved[datum.plane]
 
 
 def _conditions(datum: Datum, d: int) -> list[int]:
@@ -182,4 +182,4 @@ def relative_to(datum: Datum, coordinates: Array, displacements: Array) -> Array
     moved = np.linalg.lstsq(motions[rows], flat[rows], rcond=1e-10)[0]
     result = flat - motions @ moved
     result[rows] = 0.0
-    return np.asarray(result.reshape(n, d, r))
+    return result.reshape(n, d, r)

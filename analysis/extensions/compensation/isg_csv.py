@@ -65,7 +65,7 @@ class _Block:
         return tuple(name for name in self.names if name in AXES_LETTERS)
 
     def column(self, name: str) -> Array:
-        return np.asarray(self.rows[:, self.names.index(name)])
+        return self.rows[:, self.names.index(name)]
 
 
 def _write(table: Table, sense: Sense, stem: str) -> dict[str, str]:

@@ -95,7 +95,7 @@ def nodes_along(lower: float, upper: float, start: float, pitch: float, even: bo
     if even:
         first -= start + first * pitch - lower > SAME * pitch
         last += upper - start - last * pitch > SAME * pitch
-        return np.asarray(np.round(start + pitch * np.arange(first, last + 1), 10))
+        return np.round(start + pitch * np.arange(first, last + 1), 10)
     inner = start + pitch * np.arange(first, last + 1)
     inner = inner[(inner - lower > SAME * pitch) & (upper - inner > SAME * pitch)]
     return np.round(np.concatenate([[lower], inner, [upper]]), 10)

@@ -85,7 +85,7 @@ def rounded(values: Array, made: TableFormat) -> Array:
     """Values (..., 6) as the format writes them."""
     steps = np.repeat([made.length_step, made.angle_step], 3)
     rounded_values = np.round(values / steps) * steps
-    return np.asarray(rounded_values if made.has_rotations else rounded_values * (np.arange(6) < 3))
+    return rounded_values if made.has_rotations else rounded_values * (np.arange(6) < 3)
 
 
 def with_sense(table: Table, sense: Sense) -> Table:

@@ -55,7 +55,7 @@ class VolumeTable:
         offset = np.zeros((len(x), 3))
         offset[:, : self.dimension] = p
         turned = errors[:, :3] + np.cross(errors[:, 3:], offset)
-        return np.asarray(turned[:, : self.dimension] + p)
+        return turned[:, : self.dimension] + p
 
 
 def volume_table(model: ErrorModel, a: Array, nodes: tuple[Array, ...], zero: Array) -> VolumeTable:

@@ -76,14 +76,14 @@ class Bootstrap(Result):
         """Of each estimate (m,) over the data sets; NaN with less than two."""
         if len(self.deviations) < 2:
             return np.full(len(self.values), np.nan)
-        return np.asarray(self.deviations.std(axis=0, ddof=1))
+        return self.deviations.std(axis=0, ddof=1)
 
     @property
     def biases(self) -> Array:
         """Mean deviations (m,) of the estimates."""
         if not len(self.deviations):
             return np.full(len(self.values), np.nan)
-        return np.asarray(self.deviations.mean(axis=0))
+        return self.deviations.mean(axis=0)
 
     @property
     def intervals(self) -> Array:
@@ -107,7 +107,7 @@ class Bootstrap(Result):
         units = np.array([function.unit for function in self.functions])
         u = np.nan_to_num(self.uncertainties)
         largest = np.array([u[units == unit].max() for unit in units])
-        return np.asarray(self.standard_deviations / np.where(u > EXACT * largest, u, np.nan))
+        return self.standard_deviations / np.where(u > EXACT * largest, u, np.nan)
 
     @property
     def differing(self) -> tuple[str, ...]:

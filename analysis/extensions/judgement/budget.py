@@ -292,7 +292,7 @@ def _distances(linearisation: Linearisation, places: MeasuredPoints) -> Iterator
     def along(where: Array, derivatives: Array, k: int, later: Integers) -> Array:
         unit = where[later] - where[k]
         unit /= np.linalg.norm(unit, axis=1)[:, None]
-        return np.asarray(np.einsum("md,mds->ms", unit, derivatives[later] - derivatives[k]))
+        return np.einsum("md,mds->ms", unit, derivatives[later] - derivatives[k])
 
     for k in range(n - 1):
         later = k + 1 + np.flatnonzero((drawn[k + 1 :] != drawn[k]).any(axis=1))

@@ -345,7 +345,7 @@ def _lengths(design: Design, state: State) -> Array:
 
     points = design.evaluation.points
     probes = np.full(len(points), design.evaluation.probe)
-    return np.asarray(pdist(corrected_points(design, state, points, probes)))
+    return pdist(corrected_points(design, state, points, probes))
 
 
 def _lack_of_fit(fitted: FittedSum, repeats: PureError) -> float:

@@ -36,7 +36,7 @@ class NestedSums:
 
     def left(self, basis: Array) -> Array:
         """Return the remainder of the target (r,) beyond an orthonormal basis (r, q)."""
-        return np.asarray(self.target - basis @ (basis.T @ self.target))
+        return self.target - basis @ (basis.T @ self.target)
 
     def sum_of_squares(self, is_kept: Flags) -> float:
         """S^2 of the model with some of the columns (n,)."""
@@ -57,7 +57,7 @@ def span(columns: Array, size: float) -> Array:
     if not columns.shape[1]:
         return np.zeros((len(columns), 0))
     u, values, _ = np.linalg.svd(columns, full_matrices=False)
-    return np.asarray(u[:, values > NOTHING * max(size, float(values[0]))])
+    return u[:, values > NOTHING * max(size, float(values[0]))]
 
 
 @single_threaded

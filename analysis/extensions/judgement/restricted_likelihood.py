@@ -100,7 +100,7 @@ def at_ratios(sums: GroupSums, ratios: Array) -> AtRatios:
 def _whitened(root: Array, gram: Array) -> Array:
     """root^-1 gram root^-T."""
     half = scipy_linalg().solve_triangular(root, gram, lower=True)
-    return np.asarray(scipy_linalg().solve_triangular(root, half.T, lower=True))
+    return scipy_linalg().solve_triangular(root, half.T, lower=True)
 
 
 def estimated_ratios(sums: GroupSums, free: Integers) -> Array:

@@ -56,7 +56,7 @@ class SourceSums:
         """Contributions (k,) to the sum of the variances of functions, whose roots g have the sum
         of g' g `squares` (r, r).
         """
-        return np.asarray((self.sums * squares).sum(axis=(1, 2)))
+        return (self.sums * squares).sum(axis=(1, 2))
 
 
 @single_threaded

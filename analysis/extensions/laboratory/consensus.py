@@ -51,7 +51,7 @@ def consensus_motion(
 
 def distances(source: Array, target: Array, rotation: Array, origin: Array) -> Array:
     """Return distances (m,) of moved points `source` (m, d) from `target` (m, d)."""
-    return np.asarray(np.sqrt(((source @ rotation.T + origin - target) ** 2).sum(axis=1)))
+    return np.sqrt(((source @ rotation.T + origin - target) ** 2).sum(axis=1))
 
 
 def _subsets(source: Array) -> NDArray[np.int64]:
@@ -74,7 +74,7 @@ def _widest(content: bytes, d: int) -> NDArray[np.int64]:
     extent = np.linalg.svd(points, compute_uv=False)
     # Across its main line where it has one, so that three points of a row are drawn last.
     spread = extent[:, max(d - 2, 0)] + 1e-3 * extent[:, 0]
-    return np.asarray(drawn[np.argsort(-spread, kind="stable")[:SUBSETS]])
+    return drawn[np.argsort(-spread, kind="stable")[:SUBSETS]]
 
 
 def _motions(source: Array, target: Array) -> tuple[Array, Array]:

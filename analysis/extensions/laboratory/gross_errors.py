@@ -187,9 +187,7 @@ def _turned_onto_itself(design: Design, position: int, rotation: Array, pitch: A
 
 def _in_frame(motions: _Motions, position: Integers, places: Array) -> Array:
     """Return points at (m, d) in the frames of the artefacts."""
-    return np.asarray(
-        np.einsum("mji,mj->mi", motions.rotations[position], places - motions.origins[position])
-    )
+    return np.einsum("mji,mj->mi", motions.rotations[position], places - motions.origins[position])
 
 
 def _against_readings(
@@ -273,7 +271,7 @@ def _offset_uncertainties(design: Design) -> Array:
     uncertain = np.flatnonzero(design.of(Priors).probe >= 0)
     probe, axis = design.of(Priors).probe[uncertain], design.of(Priors).component[uncertain]
     variance[probe, axis] = design.of(Priors).uncertainty[uncertain] ** 2
-    return np.asarray(np.sqrt(variance.sum(axis=1)))
+    return np.sqrt(variance.sum(axis=1))
 
 
 def _medians(local: Array, ball: Integers, otherwise: Array) -> tuple[Array, Integers]:

@@ -148,7 +148,7 @@ def _apart(design: Design, readings: Readings, seen_places: Array) -> Array:
     state = initial_state(replace(design, readings=readings, probes=probes), seen_places)
     places = np.einsum("mij,mj->mi", state.rotations[readings.position], state.balls[readings.ball])
     apart = seen_places - places - state.origins[readings.position]
-    return np.asarray(np.sqrt((apart**2).sum(axis=1)))
+    return np.sqrt((apart**2).sum(axis=1))
 
 
 def doubt_about_offsets(

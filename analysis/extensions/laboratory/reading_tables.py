@@ -183,7 +183,7 @@ def _places(rows: Sequence[FileRow], design: Design, settings: ReadingsSettings)
         added = added - controller_offsets(design, settings)
     index = {name: k for k, name in enumerate(design.probes.names)}
     probe = np.array([index.get(row.texts[2], -1) for row in rows])
-    return np.asarray(x + np.where((probe >= 0)[:, None], added[probe], 0.0))
+    return x + np.where((probe >= 0)[:, None], added[probe], 0.0)
 
 
 def _about_diameters(rows: Sequence[FileRow], diameters: Array) -> list[str]:

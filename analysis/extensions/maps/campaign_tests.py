@@ -107,7 +107,7 @@ def joint_difference(
     triangle = linalg.qr((basis.T @ scaled).T, mode="r")[0][: basis.shape[1]]
 
     def whitened(some: Array) -> Array:
-        return np.asarray(linalg.solve_triangular(triangle, basis.T @ some, trans="T"))
+        return linalg.solve_triangular(triangle, basis.T @ some, trans="T")
 
     difference, first, second = map(whitened, (values[is_uncertain] / size, *parts))
     spread, directions = np.linalg.eigh(first @ first.T + second @ second.T)
@@ -225,4 +225,4 @@ def orthonormal(columns: Array, least: float = NO_DIRECTION, largest: float | No
     basis, triangle, _ = scipy_linalg().qr(columns, mode="economic", pivoting=True)
     sizes = np.abs(np.diagonal(triangle))
     limit = least * (float(sizes.max()) if largest is None else largest)
-    return np.asarray(basis[:, sizes > limit])
+    return basis[:, sizes > limit]

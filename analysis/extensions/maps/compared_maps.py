@@ -64,7 +64,7 @@ class MappedValues:
         """These less their parts in a space of changes of orthonormal columns (m, k)."""
 
         def remainder(some: Array) -> Array:
-            return np.asarray(some - basis @ (basis.T @ some))
+            return some - basis @ (basis.T @ some)
 
         # Twice, because the second pass takes out what rounding left of a large part in the first.
         values, root, null, shared = (

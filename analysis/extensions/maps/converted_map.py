@@ -179,7 +179,7 @@ COLUMNS = {name: column for name, column in ESTIMATE_COLUMNS.items() if name != 
 
 def _corrections(fitted: FittedMap) -> Differences:
     """Corrected points of a map by scale readings and probe offsets."""
-    return lambda x, p: np.asarray(x + fitted.model.error(x, fitted.values, p))
+    return lambda x, p: x + fitted.model.error(x, fitted.values, p)
 
 
 @single_threaded

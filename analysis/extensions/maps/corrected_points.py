@@ -24,7 +24,7 @@ def corrected(
     less scale reading.
     """
     offsets = fitted.probes.offsets[probe_indices(fitted, len(points), probes)]
-    places = np.asarray(points + fitted.model.error(points, fitted.values, offsets))
+    places = points + fitted.model.error(points, fitted.values, offsets)
     return places, _rows(fitted, points, probes, fitted.values, fitted.probes.offsets)
 
 
@@ -60,7 +60,7 @@ def tips(fitted: FittedMap, points: Array, probes: Integers | int | None = None)
     """Where the tips (n, d) are by the scales: scale readings `points` (n, d) with the offsets that
     were stated of the probes, in metres.
     """
-    return np.asarray(points + fitted.drawn_offsets[probe_indices(fitted, len(points), probes)])
+    return points + fitted.drawn_offsets[probe_indices(fitted, len(points), probes)]
 
 
 def probe_indices(fitted: FittedMap, count: int, probes: Integers | int | None = None) -> Integers:

@@ -76,7 +76,7 @@ class Correction(Result):
     @property
     def standard_uncertainties(self) -> Array:
         """Of each co-ordinate (n, d), in metres."""
-        return np.asarray(np.sqrt(np.diagonal(self.blocks, axis1=1, axis2=2)))
+        return np.sqrt(np.diagonal(self.blocks, axis1=1, axis2=2))
 
     @property
     def expanded_uncertainties(self) -> Array:
@@ -88,7 +88,7 @@ class Correction(Result):
         """Corrections (n, d) added to the tips by scales and stated probe offsets, in metres; the
         error of indication has the opposite sign.
         """
-        return np.asarray(self.points - tips(self.fitted, self.given.points, self.given.probes))
+        return self.points - tips(self.fitted, self.given.points, self.given.probes)
 
     @property
     def outside(self) -> Flags:
@@ -116,7 +116,7 @@ class Correction(Result):
         _, root = corrected_with_root(self.fitted, self.given.points, self.given.probes)
         flat = root.reshape(-1, root.shape[2])
         of_readings = np.tile((self.scatter * self.fitted.repeatability) ** 2, len(self.points))
-        return np.asarray(flat @ flat.T + np.diag(of_readings))
+        return flat @ flat.T + np.diag(of_readings)
 
     def headline(self) -> str:
         u = self.expanded_uncertainties

@@ -173,4 +173,4 @@ def _angle(squareness: SquarenessError, errors: Array, size: Array) -> Array:
     """The turn of an axis, from errors (3, d, ...) at the corner and at the ends of both edges."""
     of_axis = (errors[1, squareness.to] - errors[0, squareness.to]) / size[squareness.axis]
     of_other = (errors[2, squareness.axis] - errors[0, squareness.axis]) / size[squareness.to]
-    return np.asarray(squareness.sign * (of_axis + of_other))
+    return squareness.sign * (of_axis + of_other)

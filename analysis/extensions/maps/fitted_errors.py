@@ -35,7 +35,7 @@ class FittedErrors:
     @property
     def resultant(self) -> Array:
         """Length (m,) of the error, NaN if a co-ordinate is undetermined."""
-        return np.asarray(np.linalg.norm(self.errors, axis=1))
+        return np.linalg.norm(self.errors, axis=1)
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,7 +80,7 @@ def rows_of_errors(fitted: FittedMap, points: Array, probes: Probed) -> ErrorRow
 def errors_of(fitted: FittedMap, points: Array, probes: Probed) -> Array:
     """Return estimated errors (m, d) at points (m, d), undetermined ones included."""
     offsets = fitted.probes.offsets[probe_indices(fitted, len(points), probes)]
-    return np.asarray(fitted.model.error(points, fitted.values, offsets) - offsets)
+    return fitted.model.error(points, fitted.values, offsets) - offsets
 
 
 @single_threaded
@@ -124,7 +124,7 @@ def length_rows(fitted: FittedMap, places: MapPlaces, probe: int) -> ErrorRows:
     direction = apart / np.linalg.norm(apart, axis=1)[:, None]
 
     def along(start: Array, end: Array) -> Array:
-        return np.asarray(np.einsum("md,mdb->mb", direction, end - start))
+        return np.einsum("md,mdb->mb", direction, end - start)
 
     rows = along(corrected(fitted, *first)[1], corrected(fitted, *last)[1])
     at_first, at_last = drawn_rows(fitted, *first), drawn_rows(fitted, *last)

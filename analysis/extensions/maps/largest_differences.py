@@ -46,7 +46,7 @@ def largest_at_points(
     """
 
     def size(x: Array, p: Array) -> Array:
-        return np.asarray(np.linalg.norm(differences(x, p), axis=1))
+        return np.linalg.norm(differences(x, p), axis=1)
 
     d = len(volume.lower)
     x = even_grid(*volume.corners, [POINTS_ALONG[d]] * d)

@@ -52,7 +52,7 @@ class LengthGroups:
         empty group.
         """
         within = self.within_expanded if expanded else self.within
-        return np.asarray(np.where(self.count > 0, within / np.maximum(self.count, 1), np.nan))
+        return np.where(self.count > 0, within / np.maximum(self.count, 1), np.nan)
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -45,9 +45,7 @@ class MapConversion:
         arm = x + p - (self.places + self.offsets).mean(axis=0)
         shift, turn = np.split(self.motion, [old.dimension])
         moved = shift + rotation_sensitivity(arm) @ turn
-        return np.asarray(
-            new.model.error(x, new.values, p) - old.model.error(x, old.values, p) + moved
-        )
+        return new.model.error(x, new.values, p) - old.model.error(x, old.values, p) + moved
 
 
 @single_threaded
@@ -73,7 +71,7 @@ def converted(
     motions = np.concatenate([shifts, rotation_sensitivity(arm)], axis=2).reshape(x.size, -1)
 
     def residual(columns: Array) -> Array:
-        return np.asarray(columns - own_columns @ (size[:, None] * (inverse @ columns)))
+        return columns - own_columns @ (size[:, None] * (inverse @ columns))
 
     # What the model can move by itself is no motion between frames.
     beyond = residual(motions)
@@ -96,7 +94,7 @@ def converted(
         model=model,
         settings=settings,
         values=values,
-        covariance=np.asarray(root @ root.T),
+        covariance=root @ root.T,
         undetermined=determined_only(whole @ fitted.undetermined, scale),
         frame=frame,
     )

@@ -51,13 +51,13 @@ class FigureGroup:
     def is_compared(self) -> NDArray[np.bool_]:
         u = self.standard_uncertainties
         largest = np.nanmax(u, initial=0.0)
-        return np.asarray(~np.isnan(u) & (u > HELD * largest))
+        return ~np.isnan(u) & (u > HELD * largest)
 
     @property
     def normalised(self) -> Array:
         """E_n (m,): difference over expanded uncertainty; NaN if excluded from the comparison."""
         u = np.where(self.is_compared, self.standard_uncertainties, np.nan)
-        return np.asarray(self.differences / (self.coverage_factor * u))
+        return self.differences / (self.coverage_factor * u)
 
     @property
     def exceeding(self) -> int:

@@ -121,7 +121,7 @@ def _masked(rows: ErrorRows, mask: Array) -> ErrorRows:
 
 
 def _directions(starts: Array, ends: Array) -> Array:
-    return np.asarray((ends - starts) / np.linalg.norm(ends - starts, axis=1)[:, None])
+    return (ends - starts) / np.linalg.norm(ends - starts, axis=1)[:, None]
 
 
 def _ratio(parts: Array, whole: float) -> Array:

@@ -63,4 +63,4 @@ def symmetric_root(covariance: Array, scale: Array) -> Array:
     [[4.0, 2.0], [2.0, 3.0]]
     """
     values, vectors = np.linalg.eigh(covariance / np.outer(scale, scale))
-    return np.asarray(scale[:, None] * (vectors * np.sqrt(np.maximum(values, 0.0))) @ vectors.T)
+    return scale[:, None] * (vectors * np.sqrt(np.maximum(values, 0.0))) @ vectors.T

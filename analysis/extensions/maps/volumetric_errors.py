@@ -55,7 +55,7 @@ class VolumetricErrors:
     @property
     def resultant(self) -> Array:
         """Length (m,) of the systematic error."""
-        return np.asarray(np.linalg.norm(self.systematic, axis=1))
+        return np.linalg.norm(self.systematic, axis=1)
 
 
 @dataclass(frozen=True, eq=False)
@@ -137,7 +137,7 @@ class Volumetric:
     def systematic(self, points: Array) -> Array:
         """Return systematic errors (m, 3) at scale readings (m, 3)."""
         probe = np.broadcast_to(self.machine.probe, points.shape)
-        return np.asarray(self.truth.model.error(points, self.truth.a, probe) - probe)
+        return self.truth.model.error(points, self.truth.a, probe) - probe
 
     def random_roots(self, points: Array) -> tuple[Array, Array]:
         """Return sensitivities times deviations: (m, 3, k) per approach, and (m, 3, l) lasting."""
@@ -174,10 +174,10 @@ class Volumetric:
         drawn_last, lasting_last = self.random_roots(ends)
         along = [
             np.einsum("mi,mik->mk", direction, array)
-            for array in (drawn_first, drawn_last, np.asarray(lasting_last - lasting_first))
+            for array in (drawn_first, drawn_last, lasting_last - lasting_first)
         ]
         deviation = np.sqrt(sum((array**2).sum(axis=1) for array in along))
-        return LengthErrors(starts, ends, nominal, error, np.asarray(deviation))
+        return LengthErrors(starts, ends, nominal, error, deviation)
 
 
 def length_errors(starts: Array, ends: Array, moved: Array) -> Array:
@@ -186,9 +186,8 @@ def length_errors(starts: Array, ends: Array, moved: Array) -> Array:
     """
     difference = ends - starts
     # |d + m| - |d| without the difference of two long lengths.
-    return np.asarray(
-        (2.0 * (difference * moved).sum(axis=1) + (moved**2).sum(axis=1))
-        / (np.linalg.norm(difference + moved, axis=1) + np.linalg.norm(difference, axis=1))
+    return (2.0 * (difference * moved).sum(axis=1) + (moved**2).sum(axis=1)) / (
+        np.linalg.norm(difference + moved, axis=1) + np.linalg.norm(difference, axis=1)
     )
 
 
@@ -219,7 +218,7 @@ def drawn_machine_errors(built: Volumetric, places: MapPlaces, draws: Draws) -> 
 def _deviations(deviation: float | Points, positions: Array) -> Array:
     """A standard deviation at positions (m,) along its axis."""
     if isinstance(deviation, Points):
-        return np.asarray(np.interp(positions, deviation.positions, deviation.values))
+        return np.interp(positions, deviation.positions, deviation.values)
     return np.full(len(positions), deviation)
 
 

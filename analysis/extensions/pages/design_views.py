@@ -277,7 +277,7 @@ def _moving_readings(design: Design, most: int) -> Integers:
     mine = design.plate_readings
     keys = np.stack([design.readings.position[mine], design.readings.ball[mine]], axis=1)
     _, first = np.unique(keys, axis=0, return_index=True)
-    return np.asarray(mine[first[:: -(-len(first) // most) or 1]])
+    return mine[first[:: -(-len(first) // most) or 1]]
 
 
 def _outline(points: Array) -> Array:
@@ -290,13 +290,13 @@ def _outline(points: Array) -> Array:
         if len(points) > 1
         else np.zeros((1, len(plane)))
     )
-    return np.asarray(centre + corners @ plane[: corners.shape[1]])
+    return centre + corners @ plane[: corners.shape[1]]
 
 
 def _some(balls: Integers, most: int) -> Integers:
     """Return locations of each ball's first reading, or of a selection of balls."""
     _, first = np.unique(balls, return_index=True)
-    return np.asarray(first[:: -(-len(first) // most) or 1])
+    return first[:: -(-len(first) // most) or 1]
 
 
 def _counts(design: Design) -> Sequence[int]:

@@ -74,4 +74,4 @@ def moved_balls(linearisation: Linearisation, motion: Motion, readings: Readings
         else poses[:, 2:] * np.stack([-arms[:, 1], arms[:, 0]], axis=1)
     )
     displacements = np.einsum("mij,mj->mi", rotation, motion.balls[readings.ball])
-    return np.asarray(poses[:, :d] + turned + displacements)
+    return poses[:, :d] + turned + displacements

@@ -49,7 +49,7 @@ class _Eye:
 
     def paper(self, points: Array) -> Array:
         across = (points - self.centre) @ self.view.T * self.scale
-        return np.asarray(np.round([0.5 * WIDTH, 0.5 * HEIGHT] + across * [1.0, -1.0], 1))
+        return np.round([0.5 * WIDTH, 0.5 * HEIGHT] + across * [1.0, -1.0], 1)
 
 
 @dataclass(frozen=True, eq=False)

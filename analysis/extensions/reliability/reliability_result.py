@@ -205,8 +205,8 @@ class Reliability(Result):
 
     def _biases(self, noncentrality: float) -> Array:
         with np.errstate(divide="ignore"):
-            return np.asarray(
-                np.where(self.information > 0.0, noncentrality / np.sqrt(self.information), np.inf)
+            return np.where(
+                self.information > 0.0, noncentrality / np.sqrt(self.information), np.inf
             )
 
     def is_harmless(self, k: int) -> bool:

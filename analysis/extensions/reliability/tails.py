@@ -43,9 +43,7 @@ def log_chance(
                 - betaln(a, b)
             )
         logarithm = np.where(chance > SMALLEST, np.log(np.maximum(chance, SMALLEST)), leading)
-    return np.asarray(
-        np.where((q <= 0) | (freedom - q < 1) & (not given), 0.0, np.minimum(logarithm, 0.0))
-    )
+    return np.where((q <= 0) | (freedom - q < 1) & (not given), 0.0, np.minimum(logarithm, 0.0))
 
 
 def normal_equivalent(log_p: float) -> float:

@@ -234,4 +234,4 @@ def _null_space(rows: Array, size: float | None = None) -> Array:
     triangle = np.linalg.qr(rows, mode="r") if len(rows) > rows.shape[1] else rows
     _, values, directions = np.linalg.svd(triangle)
     largest = values.max(initial=0.0) if size is None else size
-    return np.asarray(directions[int((values > MISSING * largest).sum()) :].T)
+    return directions[int((values > MISSING * largest).sum()) :].T

@@ -87,7 +87,7 @@ def _what_is_told(rows: Array, strains: Array) -> Array:
     u, values, _ = np.linalg.svd(rows[:, size:], full_matrices=False)
     determined = u[:, values > SINGULAR_VALUE_TOLERANCE * max(values.max(initial=0.0), 1.0)]
     strain_effects = rows[:, :size] @ strains
-    return np.asarray(strain_effects - determined @ (determined.T @ strain_effects))
+    return strain_effects - determined @ (determined.T @ strain_effects)
 
 
 def bar_directions(d: int) -> Iterator[tuple[str, str, Array]]:

@@ -127,7 +127,7 @@ def _without(rows: Array, by_pose: Array) -> Array:
     u, sizes, _ = np.linalg.svd(by_pose.reshape(-1, by_pose.shape[2]), full_matrices=False)
     u = u[:, sizes > 1e-10 * sizes[0]]
     flat = rows.reshape(len(u), -1)
-    return np.asarray((flat - u @ (u.T @ flat)).reshape(rows.shape))
+    return (flat - u @ (u.T @ flat)).reshape(rows.shape)
 
 
 def _triangle(rows: Array) -> Array:

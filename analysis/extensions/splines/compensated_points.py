@@ -43,7 +43,7 @@ class CompensatedPoints:
     @property
     def compensated(self) -> Array:
         """Where the points are to be cut."""
-        return np.asarray(self.nominal - self.errors[:, None] * self.normals)
+        return self.nominal - self.errors[:, None] * self.normals
 
     def csv(self) -> str:
         """The points as CSV, in millimetres and micrometres."""

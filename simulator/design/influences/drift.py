@@ -165,7 +165,7 @@ class Clock:
         seconds = beside.get(TIME, np.full(len(readings), np.nan))
         if np.isnan(seconds).any():
             seconds = self.seconds(readings)
-        return np.asarray((seconds - np.average(seconds, weights=readings.repeats)) / HOUR)
+        return (seconds - np.average(seconds, weights=readings.repeats)) / HOUR
 
     def seconds(self, readings: Readings) -> Array:
         """Seconds (m,) at which readings are made, one after the other, repeats together."""

@@ -83,7 +83,7 @@ class Disturbed:
         """Locations (m, d) of the balls about the origin of their artefact, along the machine's
         axes.
         """
-        return np.asarray(np.einsum("mij,mj->mi", self.rotations, self.places))
+        return np.einsum("mij,mj->mi", self.rotations, self.places)
 
     def column(self, name: str) -> Array:
         """Return values (m,) of a column, NaN for readings without one."""

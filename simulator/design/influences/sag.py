@@ -170,12 +170,12 @@ def _shape(
     if shape is not None and not isinstance(shape, str):
         listed = shape if isinstance(shape, tuple) else (shape,)
         terms = [term.factor * u[:, 0] ** term.x * u[:, 1] ** term.y for term in listed]
-        return np.asarray(np.sum(terms, axis=0))
+        return np.sum(terms, axis=0)
     along = [AXIS_NAMES.index(component) for component in QUADRATIC[shape or "both"]]
     size = np.append(extent, 0.0)[along]
     squared = ((u[:, along] * size) ** 2).sum(axis=1)
     largest = squared.max(initial=0.0)
-    return np.asarray(1.0 - squared / largest if largest > 0.0 else np.zeros(len(u)))
+    return 1.0 - squared / largest if largest > 0.0 else np.zeros(len(u))
 
 
 def _values(path: Path, names: tuple[str, ...]) -> Array:

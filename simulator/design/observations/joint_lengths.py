@@ -363,7 +363,7 @@ def _directions(lengths: LengthArrays, noise: Array, rows: Integers) -> tuple[Ar
 def _range(along: Array) -> Array:
     """Orthonormal basis (m, r) of the changes of lengths that displacements (m, k) make."""
     vectors, values, _ = np.linalg.svd(along, full_matrices=False)
-    return np.asarray(vectors[:, values > FLAT * values[0]])
+    return vectors[:, values > FLAT * values[0]]
 
 
 def _outside(within: Array, uncertainty: Array, size: float) -> Array:
@@ -375,7 +375,7 @@ def _outside(within: Array, uncertainty: Array, size: float) -> Array:
     if uncertainty.max() < EXACT_CERTIFICATE * size:
         return np.zeros((0, len(within)))
     scaled = within / np.maximum(uncertainty, SMALLEST * size)[:, None]
-    return np.asarray(np.linalg.qr(scaled, mode="complete")[0][:, within.shape[1] :].T)
+    return np.linalg.qr(scaled, mode="complete")[0][:, within.shape[1] :].T
 
 
 def _independent(equations: Array, told_once: bool) -> tuple[Array, Array]:
@@ -390,6 +390,6 @@ def _independent(equations: Array, told_once: bool) -> tuple[Array, Array]:
         return np.eye(len(equations)), equations.T
     left_vectors, values, right = np.linalg.svd(equations, full_matrices=False)
     is_independent = values > TOLD_TWICE * values[0]
-    return np.asarray(left_vectors[:, is_independent].T / values[is_independent, None]), np.asarray(
+    return left_vectors[:, is_independent].T / values[is_independent, None], (
         right[is_independent].T
     )

@@ -55,7 +55,7 @@ class Lengths(LengthArrays, Observations):
     def errors(self, generator: np.random.Generator, count: int) -> Array:
         """One error for each certificate, wherever it is read."""
         drawn = generator.standard_normal((count, int(self.certificate.max(initial=-1)) + 1))
-        return np.asarray(self.uncertainty * drawn[:, self.certificate])
+        return self.uncertainty * drawn[:, self.certificate]
 
     def weights(self, design: Design, state: State) -> Array:
         weights_known = 1.0 / self.uncertainty[self.uncertainty > 0.0]
@@ -255,7 +255,7 @@ def true_lengths(design: Design, truth: State) -> Array:
     along = np.abs(np.einsum("md,md->m", lengths.direction, between))
     length = np.where(lengths.projected, along, np.sqrt((between**2).sum(axis=1)))
     _, first = np.unique(lengths.certificate, return_index=True)
-    return np.asarray(length[first][lengths.certificate])
+    return length[first][lengths.certificate]
 
 
 def _measured_lengths(design: Design, origins: Array, x: Array) -> Array:

@@ -122,7 +122,7 @@ class Priors(Observations):
         """
         if self.by_offset is None:
             return np.zeros(len(self))
-        return np.asarray(np.einsum("mld,ld->m", self.by_offset, offsets))
+        return np.einsum("mld,ld->m", self.by_offset, offsets)
 
     def _derivative(self, design: Design, state: State) -> Array:
         """Derivative (m, s) of the values by the shared parameters."""

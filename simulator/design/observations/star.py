@@ -76,7 +76,7 @@ class Star:
         u, _, vh = np.linalg.svd(together)
         sign = np.ones(together.shape[:-1])
         sign[..., -1] = np.sign(np.linalg.det(u @ vh))
-        return np.asarray((u * sign[..., None, :]) @ vh)
+        return (u * sign[..., None, :]) @ vh
 
 
 def _moves(star: Star) -> Array:
@@ -95,7 +95,7 @@ def _moves(star: Star) -> Array:
 def _free(star: Star) -> Array:
     """Orthonormal directions (l d, k) in which its tips move as one body."""
     left_vectors, sizes, _ = np.linalg.svd(_moves(star), full_matrices=False)
-    return np.asarray(left_vectors[:, sizes > IN_LINE * sizes.max(initial=0.0)])
+    return left_vectors[:, sizes > IN_LINE * sizes.max(initial=0.0)]
 
 
 def _in_line(star: Star) -> bool:
@@ -120,7 +120,7 @@ def _shape(star: Star) -> tuple[Array, Integers]:
         remainder = remainder - np.outer(direction, direction @ remainder)
     places = np.sort(np.array(chosen, np.int64))
     u, _, vh = np.linalg.svd(across[:, places], full_matrices=False)
-    return np.asarray(u @ vh), places
+    return u @ vh, places
 
 
 @dataclass(frozen=True)
@@ -244,8 +244,8 @@ def _turned(star: Star, probes: Integers, design: Design, x: Array) -> Array:
     alone = replace(star, has_place=False)
     turn = alone.rotation(offsets)
     if star.has_place:
-        return np.asarray(star.coordinates @ turn.T)
+        return star.coordinates @ turn.T
     held_probes = np.flatnonzero(~design.probes.free[probes].any(axis=1))
     turned = star.coordinates @ turn.T
     reference_probes = held_probes if len(held_probes) else np.arange(len(probes))
-    return np.asarray(turned + (drawn[reference_probes] - turned[reference_probes]).mean(axis=0))
+    return turned + (drawn[reference_probes] - turned[reference_probes]).mean(axis=0)

@@ -35,7 +35,7 @@ class Whitening:
         """The transpose of `whitened`, which leads from whitened residuals (m, ...) to
         gradients.
         """
-        return np.asarray(self._projected(rows) / _along(self.own, rows))
+        return self._projected(rows) / _along(self.own, rows)
 
     def _projected(self, rows: Array) -> Array:
         if not self.direction.any():
@@ -43,7 +43,7 @@ class Whitening:
         direction = _along(self.direction, rows)
         total = np.zeros((int(self.group.max()) + 1, *rows.shape[1:]))
         np.add.at(total, self.group, direction * rows)
-        return np.asarray(rows - direction * total[self.group])
+        return rows - direction * total[self.group]
 
 
 def _along(values: Array, rows: Array) -> Array:
@@ -109,12 +109,12 @@ class CovarianceRoot:
     def whitened(self, rows: Array) -> Array:
         """`rows` (m, ...) made uncorrelated and of unit variance: diag(1/s) V' D^-1 rows."""
         scaled = np.tensordot(self.vectors.T, rows / _along(self.own, rows), axes=1)
-        return np.asarray(scaled / _along(self.deviations, rows))
+        return scaled / _along(self.deviations, rows)
 
     def pulled(self, rows: Array) -> Array:
         """The transpose of `whitened`."""
         scaled = np.tensordot(self.vectors, rows / _along(self.deviations, rows), axes=1)
-        return np.asarray(scaled / _along(self.own, rows))
+        return scaled / _along(self.own, rows)
 
     def drawn(self, normal: Array) -> Array:
         """Errors (..., m) of standard normal numbers (..., m), by the symmetric root, which does
@@ -122,12 +122,12 @@ class CovarianceRoot:
         """
         exact = self.own <= EXACT
         mixed = ((normal @ self.vectors) * self.deviations) @ self.vectors.T
-        return np.asarray(np.where(exact, 0.0, self.own * mixed))
+        return np.where(exact, 0.0, self.own * mixed)
 
     @property
     def weights(self) -> Array:
         """The largest derivative (m,) of each whitened row by a value."""
-        return np.asarray(np.abs(self.vectors / self.own[:, None]).max(axis=0) / self.deviations)
+        return np.abs(self.vectors / self.own[:, None]).max(axis=0) / self.deviations
 
 
 def covariance_root(covariance: Array, rounding: Array | float = 0.0) -> CovarianceRoot:

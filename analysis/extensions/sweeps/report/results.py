@@ -210,7 +210,7 @@ def best_first(*keys: NDArray[np.generic]) -> Integers:
     [1, 2, 3, 0]
     """
     *before, value = keys
-    return np.asarray(np.lexsort([comparable(value), *reversed(before)]))
+    return np.lexsort([comparable(value), *reversed(before)])
 
 
 def cell_list(cells: Iterable[int], most: int = 12) -> str:
