@@ -456,7 +456,7 @@ def test_every_random_part_is_told(
     (tmp_path / "m.yaml").write_text(bare.replace(old, new))
     machine = load_machine(tmp_path / "m.yaml")
     assert random_part(machine) == random
-    deviation = Volumetric(machine).errors(np.array([[0.3, 0.6, 0.7]])).deviation
+    deviation = Volumetric(machine).errors(np.array([[0.3, 0.6, 0.7]])).uncertainties
     assert bool(deviation.any()) == bool(random)
 
 

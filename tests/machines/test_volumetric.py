@@ -55,7 +55,7 @@ def test_diagonals_of_scale_errors_have_their_closed_form() -> None:
     built = Volumetric(machine(errors=errors))
     found = built.lengths(*built.volume.diagonals)
     expected = np.linalg.norm(SIZE * (1 + scales)) - np.linalg.norm(SIZE)
-    np.testing.assert_allclose(found.error, expected, rtol=0, atol=1e-15)
+    np.testing.assert_allclose(found.errors, expected, rtol=0, atol=1e-15)
     np.testing.assert_allclose(found.nominal, np.linalg.norm(SIZE), rtol=1e-15)
 
 
@@ -74,7 +74,7 @@ def test_diagonals_of_squareness_have_their_closed_form() -> None:
     ):
         x, y, z = (np.array(end) - start) * SIZE
         turned = np.linalg.norm([x - beta1 * z, y - alpha * x - beta2 * z, z])
-        assert found.error[k] == pytest.approx(turned - np.linalg.norm(SIZE), abs=1e-15)
+        assert found.errors[k] == pytest.approx(turned - np.linalg.norm(SIZE), abs=1e-15)
         np.testing.assert_array_equal(found.starts[k], np.array(start) * SIZE)
 
 
@@ -83,7 +83,7 @@ def test_a_square_machine_that_expands_evenly_has_no_error_but_its_scale() -> No
     described = machine(temperature=temperature, reference=(0.3, 0.2, 0.1))
     built = Volumetric(described)
     found = built.lengths(*built.volume.diagonals)
-    np.testing.assert_allclose(found.error, 25e-6 * np.linalg.norm(SIZE), rtol=0, atol=1e-15)
+    np.testing.assert_allclose(found.errors, 25e-6 * np.linalg.norm(SIZE), rtol=0, atol=1e-15)
     np.testing.assert_allclose(
         Volumetric(described).systematic(np.array([[0.3, 0.2, 0.1]])), 0.0, atol=1e-20
     )
@@ -318,12 +318,12 @@ def test_random_parts_are_those_of_monte_carlo(name: str) -> None:
         found["start"][k], found["end"][k] = tips[0] - start, tips[1] - end
         found["length"][k] = np.linalg.norm(tips[1] - tips[0]) - np.linalg.norm(end - start)
     built = Volumetric(described)
-    deviation = built.errors(np.array([start, end])).deviation
+    deviation = built.errors(np.array([start, end])).uncertainties
     # The standard error of a standard deviation is a part 1 / sqrt(2 n) of it.
     limit = 4.0 / np.sqrt(2 * count)
     np.testing.assert_allclose(found["start"].std(axis=0), deviation[0], rtol=limit)
     np.testing.assert_allclose(found["end"].std(axis=0), deviation[1], rtol=limit)
-    of_length = built.lengths(start[None], end[None]).deviation[0]
+    of_length = built.lengths(start[None], end[None]).uncertainties[0]
     assert found["length"].std() == pytest.approx(of_length, rel=limit)
 
 
@@ -334,14 +334,14 @@ def test_random_parts_add_in_quadrature() -> None:
         np.array([[0.0, 0.0, 0.6]])
     )
     np.testing.assert_allclose(
-        found.deviation[0], [np.hypot(0.6 * 5e-6, 1e-6), 1e-6, 1e-6], rtol=1e-12
+        found.uncertainties[0], [np.hypot(0.6 * 5e-6, 1e-6), 1e-6, 1e-6], rtol=1e-12
     )
 
 
 def test_random_parts_of_a_length_do_not_cancel_at_a_common_position() -> None:
     built = Volumetric(machine(errors=(ParametricError("EYX", deviation=2e-6),)))
     found = built.lengths(np.array([[0.5, 0.0, 0.0]]), np.array([[0.5, 1.0, 0.0]]))
-    assert found.deviation[0] == pytest.approx(np.sqrt(2.0) * 2e-6, rel=1e-12)
+    assert found.uncertainties[0] == pytest.approx(np.sqrt(2.0) * 2e-6, rel=1e-12)
 
 
 def test_temperature_and_squareness_do_cancel() -> None:
@@ -352,11 +352,11 @@ def test_temperature_and_squareness_do_cancel() -> None:
     along_x = Volumetric(described).lengths(
         np.array([[0.0, 1.0, 0.0]]), np.array([[1.5, 1.0, 0.0]])
     )
-    assert along_x.deviation[0] == pytest.approx(0.0, abs=1e-18)
+    assert along_x.uncertainties[0] == pytest.approx(0.0, abs=1e-18)
     along_y = Volumetric(described).lengths(
         np.array([[0.0, 0.2, 0.0]]), np.array([[0.0, 1.0, 0.0]])
     )
-    assert along_y.deviation[0] == pytest.approx(5e-6 * 0.8, rel=1e-12)
+    assert along_y.uncertainties[0] == pytest.approx(5e-6 * 0.8, rel=1e-12)
 
 
 def test_the_fitted_model_has_what_is_stated() -> None:

@@ -6,6 +6,7 @@ opposite in sign to the error of indication. The offset of the probe is not part
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,39 +17,10 @@ from ballplate.simulator.maps import FittedMap
 from .corrected_points import POINTS_AT_ONCE, corrected, drawn_rows, probe_indices, tips
 from .map_places import MapPlaces
 from .realisations import Draws, Realisations, symmetric_root
-from .volumetric_errors import length_errors
+from .volumetric_errors import LengthErrors, VolumetricErrors, length_errors
 
 # Indices (m,) of probes, or of the one of all points.
 Probed = Integers | int
-
-
-@dataclass(frozen=True, eq=False)
-class FittedErrors:
-    """Estimated errors (m, d) at scale readings `points` (m, d), with standard `uncertainties` (m,
-    d), in metres; NaN where undetermined.
-    """
-
-    points: Array
-    errors: Array
-    uncertainties: Array
-
-    @property
-    def resultant(self) -> Array:
-        """Length (m,) of the error, NaN if a co-ordinate is undetermined."""
-        return np.linalg.norm(self.errors, axis=1)
-
-
-@dataclass(frozen=True, eq=False)
-class FittedLengths:
-    """Errors (m,) of distances from `starts` to `ends` (m, d): true distances less those that the
-    scales say, in metres, with standard `uncertainties` (m,); both are NaN where undetermined.
-    """
-
-    starts: Array
-    ends: Array
-    nominal: Array
-    errors: Array
-    uncertainties: Array
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,6 +31,10 @@ class ErrorRows:
 
     rows: Array
     drawn: Array | None
+
+    def by(self, change: Callable[[Array], Array]) -> ErrorRows:
+        """Return both changed alike."""
+        return ErrorRows(change(self.rows), None if self.drawn is None else change(self.drawn))
 
     def uncertainties(self, fitted: FittedMap) -> Array:
         """Standard uncertainties (...), NaN where undetermined."""
@@ -84,7 +60,7 @@ def errors_of(fitted: FittedMap, points: Array, probes: Probed) -> Array:
 
 
 @single_threaded
-def fitted_errors(fitted: FittedMap, points: Array, probes: Probed) -> FittedErrors:
+def fitted_errors(fitted: FittedMap, points: Array, probes: Probed) -> VolumetricErrors:
     """Errors at points (m, d), in metres, with probes of indices (m,), or of one."""
     uncertainties = np.zeros(points.shape)
     for start in range(0, len(points), POINTS_AT_ONCE):
@@ -92,11 +68,11 @@ def fitted_errors(fitted: FittedMap, points: Array, probes: Probed) -> FittedErr
         rows = rows_of_errors(fitted, points[some], _part(probes, some))
         uncertainties[some] = rows.uncertainties(fitted)
     errors = np.where(np.isnan(uncertainties), np.nan, errors_of(fitted, points, probes))
-    return FittedErrors(points, errors, uncertainties)
+    return VolumetricErrors(points, errors, uncertainties)
 
 
 @single_threaded
-def fitted_lengths(fitted: FittedMap, places: MapPlaces, probe: int) -> FittedLengths:
+def fitted_lengths(fitted: FittedMap, places: MapPlaces, probe: int) -> LengthErrors:
     """Return errors of lengths between tips, with stated offsets where the scales place them; both
     ends use one probe unless they have their own.
     """
@@ -106,7 +82,7 @@ def fitted_lengths(fitted: FittedMap, places: MapPlaces, probe: int) -> FittedLe
     uncertainties = length_rows(fitted, places, probe).uncertainties(fitted)
     errors = np.where(np.isnan(uncertainties), np.nan, length_errors(first, last, moved))
     nominal = np.linalg.norm(last - first, axis=1)
-    return FittedLengths(places.starts, places.ends, nominal, errors, uncertainties)
+    return LengthErrors(places.starts, places.ends, nominal, errors, uncertainties)
 
 
 def length_ends(places: MapPlaces, probe: int) -> tuple[tuple[Array, Integers], ...]:

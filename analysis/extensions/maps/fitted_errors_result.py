@@ -14,12 +14,8 @@ import numpy as np
 from ballplate.presentation import (
     Columns,
     Result,
-    Vectors,
-    box_edges,
     by_axis,
-    draw_vectors,
     given,
-    projection,
     records,
 )
 from ballplate.results import few_degrees_of_freedom, left_out_words
@@ -29,8 +25,6 @@ from ballplate.simulator.machines import Integers
 from ballplate.simulator.maps import FittedMap
 
 from .fitted_errors import (
-    FittedErrors,
-    FittedLengths,
     drawn_errors,
     fitted_errors,
     fitted_lengths,
@@ -48,7 +42,7 @@ from .part_budget import PartBudget, fitted_budget
 from .part_tables import budget_data, budget_lines
 from .realisations import Draws, Realisations
 from .volumetric_errors import LengthErrors, VolumetricErrors
-from .volumetric_plots import draw_grid, draw_line
+from .volumetric_plots import draw_grid, draw_line, draw_points
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -84,8 +78,8 @@ class FittedErrorMap(Result):
     places: MapPlaces
     probes: Integers
     probe: int
-    errors: FittedErrors
-    lengths: FittedLengths
+    errors: VolumetricErrors
+    lengths: LengthErrors
     realisations: Realisations | None = None
     with_budget: bool = False
 
@@ -203,30 +197,13 @@ class FittedErrorMap(Result):
         k, errors_at_points = self.fitted.coverage_factor, self.errors
         if np.isnan(errors_at_points.resultant).all():
             raise ValueError("all errors are undetermined; leave the picture out")
-        shown = VolumetricErrors(
-            errors_at_points.points, errors_at_points.errors, errors_at_points.uncertainties
-        )
         if self.places.kind == "line":
-            return draw_line(shown, path, k, f"U, k = {k:g}", "correction")
-        ends, u = self.lengths, np.full(len(self.lengths.nominal), np.nan)
+            return draw_line(errors_at_points, path, k, f"U, k = {k:g}", "correction")
         if self.places.kind == "grid" and self.fitted.dimension == 3:
-            lengths = LengthErrors(
-                *(array[:4] for array in (ends.starts, ends.ends, ends.nominal, ends.errors, u))
-            )
-            x, y, z = self.places.counts
-            return draw_grid(shown, lengths, (x, y, z), magnification, path)
-        is_determined = ~np.isnan(errors_at_points.resultant)
-        view, edges = np.eye(2), None
-        if self.fitted.dimension == 3:
-            view, towards = projection(3)
-            volume = self.fitted.volume
-            edges = box_edges(volume.lower, volume.upper, towards)[0] @ view.T
-        vectors = Vectors(
-            "",
-            errors_at_points.points[is_determined] @ view.T,
-            errors_at_points.errors[is_determined] @ view.T,
-        )
-        return draw_vectors((vectors,), f"{self.title}: corrections", path, edges, "errors")
+            counts = self.places.counts
+            return draw_grid(errors_at_points, self.lengths, counts, magnification, path)
+        title = f"{self.title}: corrections"
+        return draw_points(errors_at_points, self.fitted.volume, title, path)
 
 
 def fitted_map_errors(

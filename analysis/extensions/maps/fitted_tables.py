@@ -8,12 +8,11 @@ from typing import Any
 import numpy as np
 from ballplate.presentation import ROUNDING, by_axis, number, picked, table_lines
 from ballplate.simulator.computing import comparable
-from ballplate.simulator.machines import Array
 from ballplate.simulator.maps import FittedMap, verdict_data, verdict_line
 
-from .fitted_errors import FittedErrors, FittedLengths
 from .realisations import Realisations
-from .volumetric_tables import CONVENTION, tables_csv, with_drawn
+from .volumetric_errors import LengthErrors, VolumetricErrors
+from .volumetric_tables import CONVENTION, millimetres, point_text, tables_csv, with_drawn
 
 UNDETERMINED = "undetermined"
 
@@ -48,12 +47,12 @@ def map_data(label: str, fitted: FittedMap, probe: int | None = None) -> dict[st
     return data
 
 
-def length_lines(lengths: FittedLengths, names: Sequence[str], factor: float) -> list[str]:
+def length_lines(lengths: LengthErrors, names: Sequence[str], factor: float) -> list[str]:
     """Errors of lengths, with their uncertainties."""
     columns = {
         "length error of": list(names),
-        "from": list(map(_point, lengths.starts)),
-        "to": list(map(_point, lengths.ends)),
+        "from": list(map(point_text, lengths.starts)),
+        "to": list(map(point_text, lengths.ends)),
         "length, mm": (lengths.nominal, lambda value: f"{1e3 * value:.3f}"),
         "error, µm": (lengths.errors, lengths.uncertainties),
         "U, µm": (factor * lengths.uncertainties, expanded),
@@ -66,11 +65,11 @@ def expanded(uncertainty: float) -> str:
     return number(0.0 if uncertainty < ROUNDING else 1e6 * uncertainty, 3)
 
 
-def error_lines(errors: FittedErrors, factor: float, names: Sequence[str] = ()) -> list[str]:
+def error_lines(errors: VolumetricErrors, factor: float, names: Sequence[str] = ()) -> list[str]:
     """Errors point by point with their uncertainties, and the largest; points may have names."""
     u, columns = errors.uncertainties, list[tuple[str, Any]]()
     columns += [("point", list(names))] if names else []
-    columns += by_axis("{}, mm", errors.points, _millimetres).items()
+    columns += by_axis("{}, mm", errors.points, millimetres).items()
     for k, letter in enumerate("XYZ"[: errors.points.shape[1]]):
         columns += [(f"{letter}, µm", (errors.errors[:, k], u[:, k]))]
         columns += [("U", (factor * u[:, k], expanded))]
@@ -82,7 +81,7 @@ def _resultant(value: float) -> str:
     return UNDETERMINED if np.isnan(value) else number(1e6 * value)
 
 
-def _largest(errors: FittedErrors, factor: float) -> list[str]:
+def _largest(errors: VolumetricErrors, factor: float) -> list[str]:
     determined = np.flatnonzero(~np.isnan(errors.resultant))
     if not len(determined):
         return ["all errors are undetermined"]
@@ -90,7 +89,7 @@ def _largest(errors: FittedErrors, factor: float) -> list[str]:
     least = float(np.nanmax(errors.uncertainties))
     text = (
         f"largest resultant {number(1e6 * float(errors.resultant[worst]))} µm at"
-        f" {_point(errors.points[worst])} mm; largest U of a co-ordinate"
+        f" {point_text(errors.points[worst])} mm; largest U of a co-ordinate"
         f" {number(1e6 * factor * least, 3)} µm"
     )
     undetermined = len(errors.points) - len(determined)
@@ -122,7 +121,7 @@ def realisation_lines(realisations: Realisations, names: Sequence[str]) -> list[
 
 
 def point_csv(
-    errors: FittedErrors,
+    errors: VolumetricErrors,
     factor: float,
     realisations: Realisations | None,
     names: Sequence[str] = (),
@@ -140,11 +139,3 @@ def point_csv(
         for error, u in with_drawn(errors.errors, errors.uncertainties, realisations)
     ]
     return tables_csv([*heads, "resultant_um", "k"], tables, realisations is not None, names)
-
-
-def _point(point: Array) -> str:
-    return f"({', '.join(_millimetres(value) for value in point)})"
-
-
-def _millimetres(value: float) -> str:
-    return f"{1e3 * value + 0.0:.10g}"

@@ -107,17 +107,15 @@ def _figures(
 
 def _flat(rows: ErrorRows, count: int) -> ErrorRows:
     """The rows of all co-ordinates, whose squares add to the mean over points."""
-    parts = (rows.rows, rows.rows if rows.drawn is None else rows.drawn)
-    flat, drawn = (part.reshape(-1, part.shape[-1]) / np.sqrt(count) for part in parts)
-    return ErrorRows(flat, None if rows.drawn is None else drawn)
+    return rows.by(lambda part: part.reshape(-1, part.shape[-1]) / np.sqrt(count))
 
 
 def _row(rows: ErrorRows, k: int) -> ErrorRows:
-    return ErrorRows(rows.rows[k : k + 1], None if rows.drawn is None else rows.drawn[k : k + 1])
+    return rows.by(lambda part: part[k : k + 1])
 
 
 def _masked(rows: ErrorRows, mask: Array) -> ErrorRows:
-    return ErrorRows(rows.rows * mask, None if rows.drawn is None else rows.drawn * mask)
+    return rows.by(lambda part: part * mask)
 
 
 def _directions(starts: Array, ends: Array) -> Array:
@@ -190,21 +188,15 @@ def machine_budget(built: Volumetric, places: MapPlaces) -> tuple[PartBudget, ..
     """
     points, starts, ends = places.points, places.starts, places.ends
     truth, machine = built.truth, built.machine
-    functions = {parameter.function: parameter.meaning for parameter in truth.model.parameters}
-    random = [parameter.function for parameter in built.approach[0].parameters]
-    random += [PROBING[0]] * 3 + [parameter.function for parameter in built.lasting[0].parameters]
-    meanings = {
-        parameter.function: parameter.meaning
-        for model in (built.approach[0], built.lasting[0])
-        for parameter in model.parameters
-    }
-    every = list(dict.fromkeys([*functions, *random]))
-    parts = [
-        PROBING if name == PROBING[0] else (name, (functions | meanings)[name]) for name in every
-    ]
-    masks = np.array(
-        [[parameter.function == name for parameter in truth.model.parameters] for name in every]
-    )
+    approach, lasting_errors = built.approach[0].parameters, built.lasting[0].parameters
+    every_parameter = (*truth.model.parameters, *approach, *lasting_errors)
+    meanings = {parameter.function: parameter.meaning for parameter in every_parameter}
+    random = [parameter.function for parameter in approach]
+    random += [PROBING[0]] * 3 + [parameter.function for parameter in lasting_errors]
+    of_truth = [parameter.function for parameter in truth.model.parameters]
+    every = list(dict.fromkeys([*of_truth, *random]))
+    parts = [PROBING if name == PROBING[0] else (name, meanings[name]) for name in every]
+    masks = np.array([[function == name for function in of_truth] for name in every])
     split = _Split(truth.model, truth.a, masks.reshape(len(every), -1))
     offset = np.array(machine.probe)
     both_ends = _End(starts, offset, offset), _End(ends, offset, offset)

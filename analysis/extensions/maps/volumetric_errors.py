@@ -44,31 +44,32 @@ ALONG = 101
 
 @dataclass(frozen=True, eq=False)
 class VolumetricErrors:
-    """Errors at scale readings `points` (m, 3): `systematic` (m, 3), and `deviation` (m, 3) of the
-    random part.
+    """Errors (m, d) at scale readings `points` (m, d), with standard `uncertainties` (m, d), in
+    metres: systematic errors of a machine file with the deviations of their random part, or
+    estimates of a map, NaN where undetermined.
     """
 
     points: Array
-    systematic: Array
-    deviation: Array
+    errors: Array
+    uncertainties: Array
 
     @property
     def resultant(self) -> Array:
-        """Length (m,) of the systematic error."""
-        return np.linalg.norm(self.systematic, axis=1)
+        """Length (m,) of the error, NaN if a co-ordinate is undetermined."""
+        return np.linalg.norm(self.errors, axis=1)
 
 
 @dataclass(frozen=True, eq=False)
 class LengthErrors:
-    """Errors (m,) of distances from `starts` to `ends` (m, 3): true distances less those that the
-    scales say.
+    """Errors (m,) of distances from `starts` to `ends` (m, d): true distances less those that the
+    scales say, with standard `uncertainties` (m,), as for points.
     """
 
     starts: Array
     ends: Array
     nominal: Array
-    error: Array
-    deviation: Array
+    errors: Array
+    uncertainties: Array
 
 
 @dataclass(frozen=True)

@@ -16,9 +16,12 @@ from ballplate.presentation import (
     PAPER,
     SERIES,
     SHOWN,
+    Vectors,
     blank_axes,
     box,
+    box_edges,
     draw_box,
+    draw_vectors,
     drawing,
     legend_above,
     number,
@@ -28,6 +31,7 @@ from ballplate.presentation import (
     save,
 )
 from ballplate.simulator.computing import comparable
+from ballplate.simulator.design import Volume
 from ballplate.simulator.machines import AXES, Array, Integers, meaning, symbol
 
 from .volumetric_errors import AlongAxis, LengthErrors, VolumetricErrors
@@ -61,8 +65,8 @@ def magnification_of(errors: VolumetricErrors) -> float:
 
 def draw_grid(
     errors: VolumetricErrors,
-    diagonals: LengthErrors,
-    counts: tuple[int, int, int],
+    lengths: LengthErrors,
+    counts: tuple[int, ...],
     magnified: float | None = None,
     path: str | Path | None = None,
 ) -> Figure:
@@ -74,7 +78,7 @@ def draw_grid(
     factor = magnified or magnification_of(errors)
     view, away = projection(3)
     nominal = errors.points.reshape(*counts, 3)
-    moved = nominal + factor * errors.systematic.reshape(*counts, 3)
+    moved = nominal + factor * errors.errors.reshape(*counts, 3)
     with drawing(430.0, WIDTH) as figure:
         axes = blank_axes(figure)
         volume = box(nominal[0, 0, 0], nominal[-1, -1, -1])
@@ -90,7 +94,7 @@ def draw_grid(
         drawn = np.concatenate([volume.edges.reshape(-1, 2), moved.reshape(-1, 3) @ view.T])
         low, high = np.nanmin(drawn, axis=0), np.nanmax(drawn, axis=0)
         middle = nominal.reshape(-1, 3).mean(axis=0) @ view.T
-        for k, corner in enumerate(diagonals.starts @ view.T):
+        for k, corner in enumerate(lengths.starts[:4] @ view.T):
             x, y = corner + 0.06 * size * (middle - corner) / np.linalg.norm(middle - corner)
             circle = {
                 "boxstyle": "circle,pad=0.2",
@@ -106,13 +110,30 @@ def draw_grid(
         axes.legend(loc="upper left", borderaxespad=0.8)
         legend = [
             f"{k + 1}: {number(1e6 * float(error), 3)} µm"
-            for k, error in enumerate(diagonals.error)
+            for k, error in enumerate(lengths.errors[:4])
         ]
-        lengths = f"length errors of the diagonals from the corners {', '.join(legend)}"
-        figure.text(0.5, 0.025, lengths, ha="center", fontsize=8.5)
+        words = f"length errors of the diagonals from the corners {', '.join(legend)}"
+        figure.text(0.5, 0.025, words, ha="center", fontsize=8.5)
         axes.set_xlim(low[0] - 0.2 * size, high[0] + 0.16 * size)
         axes.set_ylim(low[1] - 0.16 * size, high[1] + 0.2 * size)
-        return save(figure, path, f"Volumetric errors, magnified {factor:g} times; {lengths}")
+        return save(figure, path, f"Volumetric errors, magnified {factor:g} times; {words}")
+
+
+def draw_points(
+    errors: VolumetricErrors, volume: Volume, title: str, path: str | Path | None = None
+) -> Figure:
+    """A picture of magnified errors at points in a volume, in space seen from the front and above;
+    undetermined ones are left out.
+
+    :raises OSError: the file cannot be written.
+    """
+    is_determined = ~np.isnan(errors.resultant)
+    view, edges = np.eye(2), None
+    if len(volume.lower) == 3:
+        view, towards = projection(3)
+        edges = box_edges(volume.lower, volume.upper, towards)[0] @ view.T
+    places, vectors = (array[is_determined] @ view.T for array in (errors.points, errors.errors))
+    return draw_vectors((Vectors("", places, vectors),), title, path, edges, "errors")
 
 
 def _face(axes: Axes, face: Array, colour: str, width: float, is_near: bool) -> None:
@@ -157,7 +178,7 @@ def draw_line(
         axes = placed_axes(figure, LEFT, BELOW, WIDTH - LEFT - RIGHT, 320.0 - BELOW - ABOVE)
         axes.set_title(where, loc="left", pad=TITLE_PAD)
         for k, letter in enumerate("XYZ"[: len(start)]):
-            values, half = 1e6 * errors.systematic[:, k], 1e6 * factor * errors.deviation[:, k]
+            values, half = 1e6 * errors.errors[:, k], 1e6 * factor * errors.uncertainties[:, k]
             _band(axes, positions, values, half, k, letter)
         axes.plot(
             positions,
@@ -167,7 +188,7 @@ def draw_line(
             linestyle=DASHES[3],
             label="resultant",
         )
-        _band_in_legend(axes, bool(errors.deviation.any()), band)
+        _band_in_legend(axes, bool(errors.uncertainties.any()), band)
         _finish(axes, f"{name}, mm", f"{quantity}, µm")
         worst = int(comparable(np.nan_to_num(errors.resultant)).argmax())
         subtitle = (

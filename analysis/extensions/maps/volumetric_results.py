@@ -13,11 +13,7 @@ from typing import TYPE_CHECKING, Any
 from ballplate.presentation import (
     Columns,
     Result,
-    Vectors,
-    box_edges,
     by_axis,
-    draw_vectors,
-    projection,
 )
 from ballplate.simulator.experiment import load_machine
 from ballplate.simulator.inputs import Message
@@ -36,7 +32,7 @@ from .volumetric_errors import (
     along_axes,
     drawn_machine_errors,
 )
-from .volumetric_plots import draw_along, draw_grid, draw_line
+from .volumetric_plots import draw_along, draw_grid, draw_line, draw_points
 from .volumetric_tables import (
     along_csv,
     along_data,
@@ -147,9 +143,9 @@ class ErrorsAtPoints(MachineErrors):
         errors = self.errors
         columns = {
             **by_axis("{}, mm", errors.points),
-            **by_axis("error {}, µm", errors.systematic),
+            **by_axis("error {}, µm", errors.errors),
             "resultant, µm": errors.resultant,
-            **by_axis("random {}, µm", errors.deviation),
+            **by_axis("random {}, µm", errors.uncertainties),
             "unit": ["m"] * len(errors.points),
         }
         return columns, ()
@@ -159,26 +155,16 @@ class ErrorsAtPoints(MachineErrors):
 
     def plot(self, path: str | Path | None = None) -> Figure:
         """The errors as vectors, magnified, seen from the front and above."""
-        view, towards = projection(3)
-        volume, errors = self.machine.volume, self.errors
-        edges = box_edges(volume.lower, volume.upper, towards)[0]
-        vectors = Vectors("", errors.points @ view.T, errors.systematic @ view.T)
-        return draw_vectors((vectors,), self.title, path, edges @ view.T, "errors")
+        return draw_points(self.errors, self.machine.volume, self.title, path)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class VolumetricMap(ErrorsAtPoints):
     """Errors on a grid over the volume, and of the four body diagonals."""
 
-    @property
-    def counts(self) -> tuple[int, int, int]:
-        """Numbers of points along the axes."""
-        x, y, z = self.places.counts
-        return x, y, z
-
     def plot(self, path: str | Path | None = None, magnification: float | None = None) -> Figure:
         """The outside of the grid, nominal and displaced by its magnified errors."""
-        return draw_grid(self.errors, self.lengths, self.counts, magnification, path)
+        return draw_grid(self.errors, self.lengths, self.places.counts, magnification, path)
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -163,36 +163,35 @@ def _numbers(built: Volumetric) -> list[tuple[Parameter, float]]:
 def diagonal_lines(errors: LengthErrors) -> list[str]:
     """Length errors of the body diagonals."""
     columns = {
-        "body diagonal": [str(k + 1) for k in range(len(errors.error))],
-        "from": list(map(_point, errors.starts)),
-        "to": list(map(_point, errors.ends)),
+        "body diagonal": [str(k + 1) for k in range(len(errors.errors))],
+        "from": list(map(point_text, errors.starts)),
+        "to": list(map(point_text, errors.ends)),
         "length, mm": (errors.nominal, lambda value: f"{1e3 * value:.3f}"),
-        "error, µm": errors.error,
-        "random, µm": errors.deviation,
+        "error, µm": errors.errors,
+        "random, µm": errors.uncertainties,
     }
-    return table_lines(columns, without=None if errors.deviation.any() else "random, µm")
+    return table_lines(columns, without=None if errors.uncertainties.any() else "random, µm")
 
 
 def length_line(errors: LengthErrors) -> str:
     """The length error of a single line."""
-    random = (
-        f", random {number(1e6 * float(errors.deviation[0]))} µm" if errors.deviation.any() else ""
-    )
+    u = errors.uncertainties
+    random = f", random {number(1e6 * float(u[0]))} µm" if u.any() else ""
     return (
         f"length {1e3 * errors.nominal[0]:.3f} mm, length error"
-        f" {number(1e6 * float(errors.error[0]))} µm{random}"
+        f" {number(1e6 * float(errors.errors[0]))} µm{random}"
     )
 
 
 def error_lines(errors: VolumetricErrors) -> list[str]:
     """Errors point by point, and their extremes."""
     columns = [
-        *by_axis("{}, mm", errors.points, _millimetres).items(),
-        *by_axis("{}, µm", errors.systematic, _two_decimals, "XYZ").items(),
+        *by_axis("{}, mm", errors.points, millimetres).items(),
+        *by_axis("{}, µm", errors.errors, _two_decimals, "XYZ").items(),
         ("resultant", (errors.resultant, _two_decimals)),
     ]
-    if errors.deviation.any():
-        random = by_axis("{}", errors.deviation, _two_decimals, ("random X", "Y", "Z"))
+    if errors.uncertainties.any():
+        random = by_axis("{}", errors.uncertainties, _two_decimals, ("random X", "Y", "Z"))
         columns += random.items()
     return [*table_lines(columns), *extreme_lines(errors)]
 
@@ -205,7 +204,7 @@ def extreme_lines(errors: VolumetricErrors) -> list[str]:
         for axis, v in zip(AXES, errors.points[worst].tolist(), strict=True)
     )
     bands = ", ".join(
-        f"{axis.upper()} {number(1e6 * float(np.ptp(errors.systematic[:, k])))}"
+        f"{axis.upper()} {number(1e6 * float(np.ptp(errors.errors[:, k])))}"
         for k, axis in enumerate(AXES)
     )
     resultant = errors.resultant
@@ -228,7 +227,7 @@ def along_lines(along: AlongAxis) -> list[str]:
     )
     axis = AXES[along.error.axis]
     columns = {
-        f"{axis}, mm": (positions[keep], _millimetres),
+        f"{axis}, mm": (positions[keep], millimetres),
         **{
             f"{name}, {unit}": (values[keep], _three_decimals)
             for name, values in columns_shown.items()
@@ -266,7 +265,7 @@ def error_csv(
     heads += ["resultant_um", *(f"random_{axis}_um" for axis in AXES)]
     tables = [
         [1e3 * errors.points, 1e6 * error, 1e6 * np.linalg.norm(error, axis=1), 1e6 * deviation]
-        for error, deviation in with_drawn(errors.systematic, errors.deviation, realisations)
+        for error, deviation in with_drawn(errors.errors, errors.uncertainties, realisations)
     ]
     return tables_csv(heads, tables, realisations is not None, names)
 
@@ -355,16 +354,16 @@ def diagonal_data(errors: LengthErrors) -> list[dict[str, Any]]:
 def length_data(errors: LengthErrors) -> list[dict[str, Any]]:
     """Length errors, in metres."""
     ends = {"from": errors.starts, "to": errors.ends}
-    return records(**ends, length=errors.nominal, error=errors.error, random=errors.deviation)
+    return records(**ends, length=errors.nominal, error=errors.errors, random=errors.uncertainties)
 
 
 def error_data(errors: VolumetricErrors) -> list[dict[str, Any]]:
     """Errors point by point, in metres."""
     return records(
         position=errors.points,
-        error=errors.systematic,
+        error=errors.errors,
         resultant=errors.resultant,
-        random=errors.deviation,
+        random=errors.uncertainties,
     )
 
 
@@ -381,9 +380,11 @@ def along_data(along: AlongAxis) -> dict[str, Any]:
     }
 
 
-def _millimetres(value: float) -> str:
+def millimetres(value: float) -> str:
+    """A length in millimetres."""
     return f"{1e3 * value + 0.0:.10g}"
 
 
-def _point(point: Array) -> str:
-    return f"({', '.join(map(_millimetres, point))})"
+def point_text(point: Array) -> str:
+    """A point, in millimetres."""
+    return f"({', '.join(map(millimetres, point))})"

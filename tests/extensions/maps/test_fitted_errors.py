@@ -246,15 +246,17 @@ def test_random_parts_of_a_machine_file_add_in_squares() -> None:
     assert found.realisations is not None
     for k, one in enumerate(found.budget[1:]):
         squares = float((one.uncertainties**2).sum())
-        assert np.sqrt(squares) == pytest.approx(found.lengths.deviation[k], rel=1e-12)
+        assert np.sqrt(squares) == pytest.approx(found.lengths.uncertainties[k], rel=1e-12)
         assert one.variance_shares.sum() == pytest.approx(1.0)
-        assert one.total == pytest.approx(found.lengths.error[k], abs=1e-15)
+        assert one.total == pytest.approx(found.lengths.errors[k], abs=1e-15)
     spread = found.realisations.errors.std(axis=0)
-    known = found.errors.deviation > 0.0
+    known = found.errors.uncertainties > 0.0
     # 1000 draws know a standard deviation to 2.2 %.
-    assert known.any() and np.abs(spread[known] / found.errors.deviation[known] - 1.0).max() < 0.12
+    assert (
+        known.any() and np.abs(spread[known] / found.errors.uncertainties[known] - 1.0).max() < 0.12
+    )
     assert found.realisations.lengths.std(axis=0) == pytest.approx(
-        found.lengths.deviation, rel=0.05
+        found.lengths.uncertainties, rel=0.05
     )
 
 

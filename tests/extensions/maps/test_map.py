@@ -92,11 +92,11 @@ def test_json_has_full_precision(capsys: pytest.CaptureFixture[str]) -> None:
     found = json.loads(capsys.readouterr().out)
     built = Volumetric(load_machine(BRIDGE))
     expected = built.errors(map_places(built.volume, PlacesAsked((3, 2, 2))).points)
-    assert [one["error"] for one in found["grid"]] == expected.systematic.tolist()
-    assert [one["random"] for one in found["grid"]] == expected.deviation.tolist()
+    assert [one["error"] for one in found["grid"]] == expected.errors.tolist()
+    assert [one["random"] for one in found["grid"]] == expected.uncertainties.tolist()
     assert [one["error"] for one in found["diagonals"]] == built.lengths(
         *built.volume.diagonals
-    ).error.tolist()
+    ).errors.tolist()
     assert found["arrangement"] == "MB1" and found["parametric_errors"]["EBX"]["symbol"] == "Ey(x)"
     assert found["parametric_errors"]["ECX"] == {
         "symbol": "Ez(x)",
@@ -146,8 +146,8 @@ def test_a_line_between_two_points(capsys: pytest.CaptureFixture[str]) -> None:
     built = Volumetric(load_machine(BRIDGE))
     second = built.lengths(*built.volume.diagonals)
     assert (
-        found["length"]["error"] == second.error[1]
-        and found["length"]["random"] == second.deviation[1]
+        found["length"]["error"] == second.errors[1]
+        and found["length"]["random"] == second.uncertainties[1]
     )
     assert run("map", BRIDGE, "--line", diagonal, "--points", "3") == 0
     assert "length 1514.100 mm, length error 21.65 µm, random 5.762 µm" in capsys.readouterr().out
@@ -240,7 +240,7 @@ def test_magnification_is_round() -> None:
 
     built = Volumetric(load_machine(ARM))
     found = built.errors(map_places(built.volume, PlacesAsked((3, 3, 3))).points)
-    steps = [magnification_of(type(found)(found.points, factor * found.systematic, found.deviation))
+    steps = [magnification_of(type(found)(found.points, factor * found.errors, found.uncertainties))
              for factor in (0.5, 1.0, 2.0, 0.0)]  # fmt: skip
     assert steps == [2000, 1000, 500, 1]
     assert all(one >= other for one, other in pairwise(steps))
