@@ -24,7 +24,7 @@ from ballplate.simulator.readings.generate import NoReadingError
 from ballplate.simulator.readings.simulated import on_stated_machine
 
 from .accumulator import Accumulator
-from .figures import MonteCarloOutcome, outcome, power_of_difference, power_of_misfit
+from .figures import MonteCarloOutcome, outcome, power_of_misfit
 from .targets import targets
 from .trial_runs import TASK, run_trials, sum_of_task
 
@@ -145,7 +145,7 @@ def _optimism(experiment: Experiment, shared: Reference) -> Optimism:
     more = widened.parameter_count - linearise(widened).deficiency - determined
     if more == 0:
         return Optimism(power, None)
-    return Optimism(power, OwnModel(more, misfit, power_of_difference(more, misfit)))
+    return Optimism(power, OwnModel(more, misfit, power_of_misfit(more, misfit)))
 
 
 def _widened(design: Design, truth: Truth) -> Priors:

@@ -231,16 +231,9 @@ def _root_of_bias(
     return MonteCarloEstimate(value, max(value / improbable, error / (2.0 * value)))
 
 
-def power_of_difference(more: int, gain: float) -> float:
-    """Return the probability that `more` parameters, which lower S^2 without noise by `gain`, lower
-    it significantly, at 95 %.
-    """
-    return power_of_misfit(more, gain)
-
-
 def power_of_misfit(freedom: int, noise_free: float) -> float:
     """Return the probability that S^2 exceeds its 95 % quantile if readings without noise leave
-    `noise_free`.
+    `noise_free`; or that more parameters, as many as `freedom`, lower it significantly.
 
     >>> round(power_of_misfit(100, 0.0), 3)
     0.05

@@ -35,6 +35,17 @@ WEAK = 10.0
 
 # Highest degree of polynomial tried for a curve before it is called irregular.
 HIGHEST = 10
+
+# Unit of small values → unit in which sentences show them, 1e-6 as large, of temperatures 1e-3.
+SHOWN = {
+    "m": "µm",
+    "rad": "µrad",
+    "1": "ppm",
+    "1/K": "ppm/K",
+    "K": "mK",
+    "m/h": "µm/h",
+    "1/h": "ppm/h",
+}
 SHAPES = {1: "linear", 2: "quadratic", 3: "cubic"}
 
 
@@ -550,15 +561,11 @@ def _amount(value: float, unit: str) -> str:
     >>> _amount(8.12e-3, "K"), _amount(1.234e-3, "m"), _amount(2e-9, "rad")
     ('8.12 mK', '1230 µm', '0.002 µrad')
     """
-    shown = {"m": "µm", "rad": "µrad", "1": "ppm", "1/K": "ppm/K", "K": "mK"}
-    shown |= {"m/h": "µm/h", "1/h": "ppm/h"}
     amount = (1e3 if unit == "K" else 1e6) * value
     text = f"{printable(amount):.3g}"
-    return (
-        f"{float(text):.0f} {shown[unit]}"
-        if "e+" in text and abs(amount) < 1e6
-        else f"{text} {shown[unit]}"
-    )
+    if "e+" in text and abs(amount) < 1e6:
+        text = f"{float(text):.0f}"
+    return f"{text} {SHOWN[unit]}"
 
 
 def changed_names(direction: Direction) -> list[str]:

@@ -12,7 +12,7 @@ from itertools import combinations, product
 from typing import Any, Literal
 
 import numpy as np
-from ballplate.presentation import Result, aligned, finite, number
+from ballplate.presentation import Result, aligned, number
 from ballplate.results import ARCSECOND, coverage_factor, few_degrees_of_freedom
 from ballplate.simulator.computing import single_threaded
 from ballplate.simulator.geometry import AXIS_NAMES, rigid_motions
@@ -257,7 +257,7 @@ class AdjustedMachine(Result):
         changes = [change.words for change in self.changes]
         return [*changes, *self.verdicts, "", *table, *legend, "", self.headline()]
 
-    def to_dict(self) -> dict[str, Any]:
+    def data(self) -> dict[str, Any]:
         errors = self.normalised_errors
         return {
             "title": self.title,
@@ -275,17 +275,17 @@ class AdjustedMachine(Result):
             "quantities": {
                 line.name: {
                     "unit": line.unit,
-                    "before": _data(self.before[i]),
-                    "predicted": _data(self.predicted[i]),
-                    **({} if self.found is None else {"found": _data(self.found[i])}),
-                    "normalised_error": finite(float(errors[i])),
+                    "before": self.before[i],
+                    "predicted": self.predicted[i],
+                    **({} if self.found is None else {"found": self.found[i]}),
+                    "normalised_error": errors[i],
                 }
                 for i, line in enumerate(self.lines_of_machine)
             },
             "within": self.is_within,
             "difference": None if self.difference is None else self.difference.to_dict(),
-            "lack_of_fit": list(self.verdicts),
-            "notes": list(self.notes),
+            "lack_of_fit": self.verdicts,
+            "notes": self.notes,
         }
 
     def rows(self) -> list[dict[str, Any]]:
@@ -309,10 +309,6 @@ class AdjustedMachine(Result):
 
 def _shown(value: float, otherwise: str = "undetermined") -> str:
     return otherwise if np.isnan(value) else number(value)
-
-
-def _data(line: LineValue) -> dict[str, Any]:
-    return {"value": finite(line.value), "standard_uncertainty": finite(line.standard_uncertainty)}
 
 
 def adjusted_machine(

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from ballplate.presentation import Result, aligned, finite, number, picked
+from ballplate.presentation import Result, aligned, number, picked, records
 from ballplate.results import FEW
 from ballplate.simulator.computing import comparable
 from ballplate.simulator.maps import InCommon, verdict_data, verdict_line
@@ -300,7 +300,7 @@ class MapDifference(Result):
         )
         return [*aligned(rows, [False, True, False, True, True, True]), remark]
 
-    def to_dict(self) -> dict[str, Any]:
+    def data(self) -> dict[str, Any]:
         comparison, motion = self.comparison, self.comparison.motion
         tested = (
             *self.tests,
@@ -317,18 +317,13 @@ class MapDifference(Result):
             "years": self.years,
             "changed": self.is_changed,
             "level": LEVEL,
-            "motion": [
-                {
-                    "name": name,
-                    "value": finite(float(value)),
-                    "standard_uncertainty": finite(float(u)),
-                    "unit": "m" if name.startswith("shift") else "rad",
-                }
-                for name, value, u in zip(
-                    motion.names, motion.values, motion.standard_uncertainties, strict=True
-                )
-            ],
-            "tests": [_test_data(test) for test in tested],
+            "motion": records(
+                name=motion.names,
+                value=motion.values,
+                standard_uncertainty=motion.standard_uncertainties,
+                unit=["m" if name.startswith("shift") else "rad" for name in motion.names],
+            ),
+            "tests": list(map(_test_data, tested)),
             "groups": [
                 {
                     **picked(group, "kind", "count", "undetermined", "exceeding"),
@@ -337,13 +332,7 @@ class MapDifference(Result):
                 for group in comparison.groups
             ],
             "functions_not_compared": comparison.why_no_functions or None,
-            "figures": [
-                {
-                    name: finite(value) if isinstance(value, float) else value
-                    for name, value in row.items()
-                }
-                for row in self.rows()
-            ],
+            "figures": self.rows(),
         }
 
     def rows(self) -> list[dict[str, Any]]:
@@ -457,13 +446,11 @@ def _group_table(groups: Sequence[FigureGroup]) -> list[str]:
 
 def _map_data(side: ComparedMap) -> dict[str, Any]:
     return {
-        "label": side.label,
-        "title": side.title,
-        "date": side.date,
+        **picked(side, "label", "title", "date"),
         "expected": side.is_expected,
-        "degrees_of_freedom": finite(side.degrees_of_freedom),
+        "degrees_of_freedom": side.degrees_of_freedom,
         **({} if side.is_expected else {"lack_of_fit": verdict_data(side.lack_of_fit)}),
-        "frame_takes_out": list(side.held),
+        "frame_takes_out": side.held,
     }
 
 
@@ -471,7 +458,5 @@ def _test_data(test: JointTest) -> dict[str, Any]:
     return {
         "what": test.what,
         "chi_squared": test.statistic,
-        **picked(test, "dimensions", "fixed"),
-        "degrees_of_freedom": finite(test.degrees_of_freedom),
-        "p": test.p,
+        **picked(test, "dimensions", "fixed", "degrees_of_freedom", "p"),
     }
