@@ -4,7 +4,7 @@ section 6.2.7.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
@@ -39,7 +39,7 @@ from ballplate.simulator.readings.simulated import on_stated_machine, too_large
 
 from ..presentation.formatting import by_name, given, number, picked
 from ..presentation.result import FitResult, Result
-from ..presentation.table_columns import Columns, table_lines
+from ..presentation.table_columns import MainTable, table_lines
 from ..results.estimates import ESTIMATE_COLUMNS, ParameterEstimate
 from ..results.text_blocks import iteration_lines
 from ..uncertainty.summaries import uncertainties
@@ -137,7 +137,7 @@ class AlternativeFit(FitResult):
             **self.notes_data(),
         }
 
-    def columns(self) -> tuple[Columns, Sequence[Any]]:
+    def columns(self) -> MainTable:
         """One row per parameter of the machine."""
         return ESTIMATE_COLUMNS, self.estimates
 
@@ -247,7 +247,7 @@ class EstimatorComparison(Result):
         }
         return data | given(against_truth=errors_data)
 
-    def columns(self) -> tuple[Columns, Sequence[Any]]:
+    def columns(self) -> MainTable:
         """One row per data set on which both estimators converged."""
         converged = [k for k in range(self.trials) if k not in self.failed]
         columns = {

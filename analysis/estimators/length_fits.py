@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any, Literal
 
@@ -26,7 +26,7 @@ from ballplate.simulator.readings.observed_readings import ObservedReadings
 
 from ..presentation.formatting import picked
 from ..presentation.result import FitResult
-from ..presentation.table_columns import Columns, table_lines
+from ..presentation.table_columns import MainTable, table_lines
 from ..rank.verdicts import rank_complaint
 from ..results.adjustments import Adjustment, adjustments, few_degrees_of_freedom, freedom_words
 from ..results.text_blocks import adjustment_data, adjustment_lines
@@ -128,7 +128,7 @@ class LengthFit(FitResult):
             **self.notes_data(),
         }
 
-    def columns(self) -> tuple[Columns, Sequence[Any]]:
+    def columns(self) -> MainTable:
         """One row per adjustment of the machine."""
         columns = {
             "adjustment": "what",

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -22,7 +21,7 @@ from ..presentation.formatting import (
     picked,
 )
 from ..presentation.result import FitResult
-from ..presentation.table_columns import Columns, table_lines
+from ..presentation.table_columns import MainTable, table_lines
 from ..presentation.vectors import Vectors, draw_vectors
 from ..results.estimates import ParameterEstimate
 from ..results.fits import Fit
@@ -186,7 +185,7 @@ class ReversalFit(FitResult):
             **self.notes_data(),
         }
 
-    def columns(self) -> tuple[Columns, Sequence[Any]]:
+    def columns(self) -> MainTable:
         """One row per parameter, with that of multiple redundancy."""
         redundant = {p.name: (p.value, p.standard_uncertainty) for p in self.redundant}
         pairs = [redundant.get(p.name, (np.nan, np.nan)) for p in self.estimates]

@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 from ballplate.simulator.experiment.model import AtMost, Candidate, ChangeTimes, Position
+from ballplate.simulator.inputs.number_arrays import Integers
 from ballplate.simulator.inputs.settings import number_of
 from ballplate.simulator.machines.protocol import Array
-from numpy.typing import NDArray
 
 from .changeover import Setup, changeover, kind_of
 
@@ -73,8 +73,8 @@ class Constraints:
 
     budget: Budget
     seconds: Array
-    readings: NDArray[np.int64]
-    positions: NDArray[np.int64]
+    readings: Integers
+    positions: Integers
     kinds: tuple[Setup | None, ...]
     changes: ChangeTimes
     must: frozenset[int]
@@ -125,7 +125,7 @@ class Constraints:
         """True if no limit of time would allow any of some positions."""
         return not replace(self, budget=Budget()).can_read(members)
 
-    def additions(self, chosen: Collection[int]) -> NDArray[np.int64]:
+    def additions(self, chosen: Collection[int]) -> Integers:
         """Candidates that a selection, which keeps to the limits itself, may be extended by, one at
         a time.
         """

@@ -24,9 +24,9 @@ from ballplate.simulator.estimation.functions import (
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.geometry.motions import without_rigid_motion
 from ballplate.simulator.inputs.messages import refused
+from ballplate.simulator.inputs.number_arrays import Flags
 from ballplate.simulator.inputs.quantities import Target
 from ballplate.simulator.machines.protocol import Array
-from numpy.typing import NDArray
 
 from ..uncertainty.quantities import QUANTITIES, functions_of
 from .candidate_rows import STEP
@@ -257,7 +257,7 @@ class PairBlock:
 
     first: slice
     second: slice
-    chosen: NDArray[np.bool_]
+    chosen: Flags
     length: Array
     weights: tuple[tuple[int, int, Array], ...]
 
@@ -307,7 +307,7 @@ class Pairs:
             for second in runs[i:]:
                 yield self._block(first, second)
 
-    def _apart(self, first: slice, second: slice) -> tuple[Array, NDArray[np.bool_]]:
+    def _apart(self, first: slice, second: slice) -> tuple[Array, Flags]:
         """Return vectors (rows, columns, d) between points, and a mask that selects each distance
         once.
         """

@@ -13,7 +13,7 @@ from .files import write_file
 from .formats import as_html, as_latex, as_markdown
 from .formatting import as_data
 from .table import Block, Entry, Row, Table
-from .table_columns import Columns, table_rows
+from .table_columns import MainTable, table_rows
 
 if TYPE_CHECKING:
     import pandas
@@ -80,7 +80,7 @@ class Result:
             raise NotImplementedError
         return table_rows(*columns)
 
-    def columns(self) -> tuple[Columns, Sequence[Any]] | None:
+    def columns(self) -> MainTable | None:
         """The columns of its main table, see `presentation.table_columns`, and the items of its
         rows; None if `rows` has them.
         """

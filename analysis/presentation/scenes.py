@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 from ballplate.simulator.design.arrays import Design, locations, nominal_state
+from ballplate.simulator.inputs.number_arrays import Flags
 from ballplate.simulator.machines.protocol import Array
-from numpy.typing import NDArray
 
 # The eye: turned about z, then raised, in degrees.
 TURN, RISE = -35.0, 24.0
@@ -47,7 +47,7 @@ class Box:
     """
 
     edges: Array
-    hidden: NDArray[np.bool_]
+    hidden: Flags
     axes: tuple[tuple[str, Array, float, float], ...]
 
     @property
@@ -134,7 +134,7 @@ def projection(dimension: int) -> tuple[Array, Array]:
     return np.stack([right, up]), away
 
 
-def box_edges(lower: Array, upper: Array, away: Array) -> tuple[Array, NDArray[np.bool_]]:
+def box_edges(lower: Array, upper: Array, away: Array) -> tuple[Array, Flags]:
     """Return edges of the volume, and which are behind it."""
     d = len(lower)
     corners = np.array(np.meshgrid(*zip(lower, upper, strict=True), indexing="ij")).reshape(d, -1).T

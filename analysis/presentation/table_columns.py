@@ -25,6 +25,8 @@ FACTORS = {"mm": 1e3, "µm": 1e6, "µrad": 1e6, "ppm": 1e6, "arcsec": math.degre
 ROUNDING = 1e-15
 
 Columns = Mapping[str, Any] | Sequence[tuple[str, Any]]
+# Columns of a table with the items of its rows, whose values its functions make.
+MainTable = tuple[Columns, Sequence[Any]]
 
 
 def table_lines(

@@ -13,7 +13,7 @@ from ballplate.presentation.formats import as_html
 from ballplate.presentation.formatting import given, picked
 from ballplate.presentation.result import FitResult
 from ballplate.presentation.scenes import box_edges, projection
-from ballplate.presentation.table_columns import Columns, table_lines
+from ballplate.presentation.table_columns import MainTable, table_lines
 from ballplate.presentation.vectors import Vectors, draw_vectors
 from ballplate.rank.verdicts import Verdict
 from ballplate.results.adjustments import Adjustment, few_degrees_of_freedom, freedom_words
@@ -243,7 +243,7 @@ class Fit(FitResult):
             **self.notes_data(),
         }
 
-    def columns(self) -> tuple[Columns, Sequence[Any]]:
+    def columns(self) -> MainTable:
         """One row per parameter."""
         return ESTIMATE_COLUMNS, self.estimates
 

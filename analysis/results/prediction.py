@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
@@ -14,7 +14,7 @@ from ballplate.simulator.inputs.settings import hint, number_of
 
 from ..presentation.formatting import given
 from ..presentation.result import Result
-from ..presentation.table_columns import Columns
+from ..presentation.table_columns import MainTable
 from ..rank.verdicts import Verdict
 from ..uncertainty.scale import Scale
 from ..uncertainty.summaries import Quantity, tasks_of
@@ -157,7 +157,7 @@ class Prediction(Result):
     def _repr_html_(self) -> str:
         return super()._repr_html_() + picture_in_space(self)
 
-    def columns(self) -> tuple[Columns, Sequence[Any]]:
+    def columns(self) -> MainTable:
         """One row for each of U1 to U6; without these, one with the rank and U6."""
         if self.quantities:
             symbols = {"symbol": list(self.quantities)}

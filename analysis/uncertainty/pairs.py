@@ -10,9 +10,9 @@ import numpy as np
 from ballplate.simulator.computing.rounding import comparable, first_largest
 from ballplate.simulator.estimation.functions import Displacements
 from ballplate.simulator.geometry.motions import without_rigid_motion
+from ballplate.simulator.inputs.number_arrays import Flags
 from ballplate.simulator.inputs.quantities import LengthFunction
 from ballplate.simulator.machines.protocol import Array, Integers
-from numpy.typing import NDArray
 
 # Points on a side of a tile of pairs, whose products stay in cache.
 TILE = 256
@@ -61,7 +61,7 @@ class PairTile:
     second: Integers
     lengths: Array
     uncertainties: Array
-    is_open: NDArray[np.bool_]
+    is_open: Flags
 
 
 def all_pairs(
@@ -170,7 +170,7 @@ def _tile(
                 along += term
         along *= difference[i]
         weighted += along
-    chosen: NDArray[np.bool_] = np.triu(squared > 0, 1) if diagonal else squared > 0
+    chosen: Flags = np.triu(squared > 0, 1) if diagonal else squared > 0
     lengths = squared[chosen]
     values = np.sqrt(np.maximum(weighted[chosen] / lengths, 0.0))
     open_ = np.zeros(len(values), bool)

@@ -8,8 +8,9 @@ before they are compared, sorted or chosen from; of equal ones the first is take
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from ..inputs.number_arrays import Flags, Integers
 from ..machines.protocol import Array
 
 # Binary digits in which numbers have to agree, about six decimal ones.
@@ -58,7 +59,7 @@ def first_largest(values: Array) -> int:
     return int(near[comparable(values[near]).argmax()])
 
 
-def first_largest_of_columns(values: Array) -> NDArray[np.int64]:
+def first_largest_of_columns(values: Array) -> Integers:
     """Return the row (k,) of the largest of each column of values (m, k) without NaN, by the rule
     of `first_largest`.
 
@@ -75,7 +76,7 @@ def first_largest_of_columns(values: Array) -> NDArray[np.int64]:
     return row[order[np.searchsorted(column[order], np.arange(len(largest)))]]
 
 
-def above(values: ArrayLike, limit: float) -> NDArray[np.bool_]:
+def above(values: ArrayLike, limit: float) -> Flags:
     """Return a mask of `values` that exceed a limit by more than rounding.
 
     >>> above([0.1 + 0.2, 0.31, np.nan], 0.3).tolist()

@@ -12,7 +12,6 @@ from functools import cached_property
 from typing import Any, ClassVar, Self, TypeVar, cast
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..inputs.own_code import error_text, own_frame
 from ..inputs.unusable import UnusableError
@@ -365,7 +364,7 @@ class Observations(ABC):
         return np.full(len(self), -1)
 
     @property
-    def is_exact(self) -> NDArray[np.bool_]:
+    def is_exact(self) -> Flags:
         """Mask (m,) of values without uncertainty."""
         return np.full(len(self), False)
 

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from ..geometry.ball_layouts import ArtefactSettings, BallLayout, corners, frozen
 from ..inputs.messages import Step, Steps
+from ..inputs.number_arrays import Array
 from ..inputs.problems import Problems, written_text
 from ..inputs.settings import hint, listing, shorten
 from ..inputs.trust import UNKNOWN, Trust
@@ -19,7 +20,6 @@ from ..inputs.yamltree import Sequence as SequenceNode
 from ..inputs.yamltree import written
 from .objects import Volume
 
-Floats = NDArray[np.float64]
 Indices = NDArray[np.intp]
 
 # Of all positions with their repeats: half a million readings take half a gigabyte.
@@ -205,7 +205,7 @@ class References:
 
 def lengths_per_axis(
     setting: Any, steps: Steps, references: References
-) -> tuple[Floats | None, bool]:
+) -> tuple[Array | None, bool]:
     """Return lengths of all axes (d,), if stated, and whether the statement is valid."""
     dimension = references.dimension
     if setting is None or dimension is None:

@@ -8,12 +8,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..inputs.number_arrays import Flags
 from ..inputs.quantities import Target
 from ..machines.protocol import Array, Integers
-
-Flags = NDArray[np.bool_]
 
 # Fraction of the volume by which scale readings may be outside: measured offsets of probes are no
 # round numbers, and artefacts are not set up just as drawn.
@@ -164,7 +162,7 @@ class Readings:
     def __len__(self) -> int:
         return len(self.ball)
 
-    def select(self, chosen: NDArray[np.bool_] | Integers) -> Readings:
+    def select(self, chosen: Flags | Integers) -> Readings:
         """The readings at the given indices."""
         uncertainty = None if self.uncertainty is None else self.uncertainty[chosen]
         beside = self.beside and {name: column[chosen] for name, column in self.beside.items()}

@@ -28,12 +28,12 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..computing.threads import single_threaded
 from ..design.arrays import Design
 from ..design.observations.joint_lengths import equation_root
 from ..design.observations.lengths import Lengths, length_whitening
+from ..inputs.number_arrays import Flags
 from ..machines.protocol import Array
 from ..machines.spatial_metric import parameters_of_metric
 from .covariance import EXACT, MICROMETRE
@@ -74,9 +74,9 @@ class LengthSolution:
     deficiency: int
     centres: Array
     lengths: Array
-    open_factors: NDArray[np.bool_]
-    open_centres: NDArray[np.bool_]
-    open_lengths: NDArray[np.bool_]
+    open_factors: Flags
+    open_centres: Flags
+    open_lengths: Flags
     scatter: float
     equations: int
     degrees_of_freedom: int

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..design.lookup import Floats, References
+from ..design.lookup import References
 from ..design.objects import SLIGHTLY, Machine, Volume
 from ..design.observations.calibration import Calibration
 from ..design.observations.distances import DistanceCalibration
@@ -18,6 +18,7 @@ from ..geometry.artefacts import BryanGaugeSettings, TwoSpheresSettings
 from ..geometry.motions import pose_size
 from ..geometry.positions import ball_coordinates
 from ..inputs.messages import ExperimentError, Message, Steps
+from ..inputs.number_arrays import Array
 from ..inputs.problems import Problems, written_text
 from ..inputs.quantities import format_length
 from ..inputs.settings import listing, number_of
@@ -317,7 +318,7 @@ def check_inside(
     references.problems.add(steps, text)
 
 
-def excess(points: Floats, volume: Volume) -> tuple[Floats, Floats, list[str]]:
+def excess(points: Array, volume: Volume) -> tuple[Array, Array, list[str]]:
     """Return how far points (n, d) are outside the volume, along which axis, and on which side."""
     below, above = volume.lower - points, points - volume.upper
     by_axis = np.maximum(below, above)
@@ -572,7 +573,7 @@ def _check_joint_lengths(calibrations: Mapping[Steps, Calibration], references: 
 
 
 def check_points(
-    points: Floats,
+    points: Array,
     steps: Steps,
     volume: Volume,
     problems: Problems,

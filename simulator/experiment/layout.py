@@ -7,7 +7,6 @@ from __future__ import annotations
 from collections.abc import Collection
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..computing.rounding import comparable
 from ..design.arrays import Design, Observations, Readings
@@ -31,6 +30,7 @@ from ..design.observations.star import Stars, observed_stars
 from ..geometry.artefacts import BryanGaugeSettings
 from ..geometry.motions import pose_size
 from ..inputs.messages import ExperimentError
+from ..inputs.number_arrays import Integers
 from ..inputs.yamltree import Mark
 from ..machines.protocol import Array
 from ..machines.settings import build_error_model
@@ -189,8 +189,8 @@ def _priors(experiment: Experiment, held_flags: Flags, parameters: int) -> Prior
 
 
 def _across(
-    experiment: Experiment, rotations: Array, position_artefact: NDArray[np.int64]
-) -> NDArray[np.int64] | None:
+    experiment: Experiment, rotations: Array, position_artefact: Integers
+) -> Integers | None:
     """Return the machine's axis (k,) across artefacts that are read in their plane, -1 for others,
     if there are such artefacts.
     """
@@ -276,7 +276,7 @@ def _stated(experiment: Experiment, first_ball: dict[str, int]) -> list[Observat
 
 def _held(
     balls: Balls,
-    position_artefact: NDArray[np.int64],
+    position_artefact: Integers,
     rotations: Array,
     observations: Collection[Observations],
 ) -> Flags:
@@ -337,7 +337,7 @@ def _in_machine_axes(motions: Array, rotation: Array) -> Array:
     return np.concatenate([rotation @ motions[:d], turned])
 
 
-def _motion_of_coordinates(places: Array, axis: NDArray[np.int64], d: int) -> Array:
+def _motion_of_coordinates(places: Array, axis: Integers, d: int) -> Array:
     """Return the change of co-ordinates (m, pose size) by a small motion of the artefact's
     frame.
     """

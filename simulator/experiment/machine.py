@@ -9,11 +9,12 @@ from typing import Any
 
 import numpy as np
 
-from ..design.lookup import Floats, References
+from ..design.lookup import References
 from ..design.noise import Noise, NoiseSettings
 from ..design.objects import Machine, Volume
 from ..geometry.ball_layouts import frozen
 from ..inputs.messages import ExperimentError, Steps
+from ..inputs.number_arrays import Array
 from ..inputs.problems import Problems
 from ..inputs.quantities import LengthFunction, Target, format_length, typed_length
 from ..inputs.settings import hint
@@ -190,7 +191,7 @@ def _unknown(probe: str, references: References) -> str:
     return f'unknown probe "{probe}"; {hint(probe, references.probes)}'
 
 
-def _points(settings: Any, machine: Machine | None, references: References) -> Floats | None:
+def _points(settings: Any, machine: Machine | None, references: References) -> Array | None:
     problems, dimension, steps = references.problems, references.dimension, ("evaluation", "points")
     if dimension is None:
         return None
@@ -219,7 +220,7 @@ def _points(settings: Any, machine: Machine | None, references: References) -> F
 
 def _points_of_file(
     file: str, steps: Steps, machine: Machine | None, references: References
-) -> Floats | None:
+) -> Array | None:
     assert references.dimension is not None
     try:
         rows = read_table(references.file(file), [], AXES[: references.dimension])

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from ..design.influences.protocol import InfluenceSettings
-from ..design.lookup import Floats, Indices
+from ..design.lookup import Indices
 from ..design.noise import Noise
 from ..design.objects import Machine
 from ..design.observations.calibration import Calibration
@@ -21,6 +21,7 @@ from ..design.observations.star import Star
 from ..geometry.ball_layouts import ArtefactSettings, BallLayout
 from ..geometry.positions import Pose
 from ..inputs.messages import ExperimentError, Message, Steps, format_path
+from ..inputs.number_arrays import Array
 from ..inputs.quantities import Target
 from ..inputs.trust import UNKNOWN, Trust
 from ..inputs.yamltree import Mark, Node, mark_of, to_python, written
@@ -42,8 +43,8 @@ class Probe:
     """
 
     name: str
-    offset: Floats
-    standard_uncertainty: Floats | None = None
+    offset: Array
+    standard_uncertainty: Array | None = None
     angles: tuple[float, float] | None = None
 
     @property
@@ -72,7 +73,7 @@ class ReadingGroup:
     balls: tuple[str, ...]
     ball_indices: Indices
     repeats: int
-    standard_uncertainty: Floats | None = None
+    standard_uncertainty: Array | None = None
 
     @property
     def count(self) -> int:
@@ -124,13 +125,13 @@ class Prior:
     position: str | None
     probe: str | None
     component: int
-    by_model: Floats
+    by_model: Array
     value: float
     standard_uncertainty: float
     mark: Mark
     path: str = ""
     unit: Unit = "m"
-    by_offset: Mapping[str, Floats] | None = None
+    by_offset: Mapping[str, Array] | None = None
     data: MapData | None = None
     share: MapShare | None = None
 
@@ -144,7 +145,7 @@ class Task:
     """
 
     name: str
-    points: Floats
+    points: Array
     probes: tuple[str, str]
     target: Target | None
 
@@ -155,7 +156,7 @@ class Evaluation:
     tasks.
     """
 
-    points: Floats
+    points: Array
     probe: str
     tasks: tuple[Task, ...] = ()
 

@@ -11,7 +11,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from ..design.lookup import Floats, Indices, References, lengths_per_axis
+from ..design.lookup import Indices, References, lengths_per_axis
 from ..design.objects import Volume
 from ..geometry.ball_layouts import BallLayout
 from ..geometry.positions import (
@@ -25,6 +25,7 @@ from ..geometry.positions import (
     nominal_pose,
 )
 from ..inputs.messages import Steps
+from ..inputs.number_arrays import Array
 from ..inputs.quantities import length_text, typed_length
 from ..inputs.yamltree import to_python, written
 from .model import Position, Probe, ReadingGroup
@@ -54,7 +55,7 @@ class Bounds:
 
     volume: Volume
     probes: Mapping[str, Probe]
-    reach: Mapping[str, Floats]
+    reach: Mapping[str, Array]
     edge: float | None
 
 
@@ -94,7 +95,7 @@ class _Group:
     probes: Mapping[str, tuple[tuple[str, ...], ...]]
     balls: tuple[_Balls, ...]
     repeats: int
-    uncertainty: Floats | None
+    uncertainty: Array | None
     names_artefact: bool
     names_probes: bool
     # What a file says of the readings besides probes and balls.
@@ -142,12 +143,12 @@ def generate(
     return list(_candidates(group, reasons, references.dimension or 3))
 
 
-def extent(points: Floats) -> Floats:
+def extent(points: Array) -> Array:
     """Return the lowest and the highest co-ordinates (2, d) of points (n, d)."""
     return np.array([points.min(axis=0), points.max(axis=0)])
 
 
-def outline(pose: Pose, layout: BallLayout, edge: float) -> Floats:
+def outline(pose: Pose, layout: BallLayout, edge: float) -> Array:
     """Return the lowest and the highest co-ordinates (2, d) of a plate with `edge` of material
     beyond its balls.
     """
@@ -156,7 +157,7 @@ def outline(pose: Pose, layout: BallLayout, edge: float) -> Floats:
     return extent(around[:, : len(pose.origin)] @ pose.rotation.T + pose.origin)
 
 
-def is_within(indices: Floats, lower: Floats, upper: Floats) -> Any:
+def is_within(indices: Array, lower: Array, upper: Array) -> Any:
     """True if extents (…, 2, d) are within limits (d,)."""
     return np.all(
         (indices[..., 0, :] >= lower - TOLERANCE) & (indices[..., 1, :] <= upper + TOLERANCE),

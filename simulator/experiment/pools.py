@@ -13,13 +13,14 @@ from typing import Any
 
 import numpy as np
 
-from ..design.lookup import Floats, ReadingCount, References
+from ..design.lookup import ReadingCount, References
 from ..design.objects import Machine
 from ..design.observations.calibration import Calibration
 from ..design.observations.radius import RadiusCalibration
 from ..geometry.ball_layouts import frozen
 from ..geometry.positions import AXIS_INDEX, ball_coordinates
 from ..inputs.messages import Steps, format_path
+from ..inputs.number_arrays import Array
 from ..inputs.problems import written_count, written_text
 from ..inputs.quantities import format_length
 from ..inputs.settings import hint, listing
@@ -338,7 +339,7 @@ def _check_names(references: References) -> bool:
     return len(problems.messages) == before
 
 
-def _reach(limits: LimitsSettings, references: References) -> dict[str, Floats]:
+def _reach(limits: LimitsSettings, references: References) -> dict[str, Array]:
     """Lower and upper ends (2, d) of where balls can be read, by probe."""
     problems, reach = references.problems, {}
     for name, region in limits.reach.items():
@@ -388,7 +389,7 @@ def _check_bounds(position: Position, steps: Steps, bounds: Bounds, references: 
                     problems.add(steps, text)
 
 
-def _beyond(points: Floats, ends: Floats) -> str:
+def _beyond(points: Array, ends: Array) -> str:
     lowest, highest = extent(points)
     for k, axis in enumerate(list(AXIS_INDEX)[: points.shape[1]]):
         if lowest[k] < ends[0, k] - TOLERANCE:

@@ -6,11 +6,12 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from ..design.lookup import Floats, References
+from ..design.lookup import References
 from ..design.objects import Machine
 from ..geometry.artefacts import BryanGaugeSettings
 from ..geometry.motions import AXIS_NAMES, pose_parameter_names
 from ..inputs.messages import Steps, format_path
+from ..inputs.number_arrays import Array
 from ..inputs.quantities import QuantityError, parse_angle, parse_length, parse_ratio
 from ..inputs.settings import hint, shorten
 from ..inputs.yamltree import mark_of
@@ -66,7 +67,7 @@ def resolve_priors(
 
 # What a name stands for: name of the parameter, position, probe, component, row over the model,
 # unit, nominal value.
-_Known = tuple[str, str | None, str | None, int, Floats, Unit, float]
+_Known = tuple[str, str | None, str | None, int, Array, Unit, float]
 
 
 def _known(

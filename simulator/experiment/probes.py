@@ -8,11 +8,12 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from ..design.lookup import Floats, References, lengths_per_axis
+from ..design.lookup import References, lengths_per_axis
 from ..design.observations.star import Star
 from ..geometry.ball_layouts import frozen
 from ..geometry.rotations import rotation_matrix
 from ..inputs.messages import ExperimentError, Steps
+from ..inputs.number_arrays import Array
 from ..inputs.settings import hint, listing
 from ..inputs.tables import read_table
 from ..inputs.yamltree import written
@@ -139,7 +140,7 @@ def resolve_stars(
 
 def _star_values(
     settings: StarSettings, names: tuple[str, ...], steps: Steps, references: References
-) -> Floats | None:
+) -> Array | None:
     """Return co-ordinates (l, d) of a star's tips from its table, or report faults."""
     letters = list("xyz"[: references.dimension])
     try:
@@ -204,7 +205,7 @@ def _reference_probe(sections: Sections, references: References) -> str:
 
 def _offset_uncertainty(
     settings: ProbeSettings, steps: Steps, references: References
-) -> Floats | None:
+) -> Array | None:
     """Return standard uncertainties (d,) of an estimated offset, infinite for an unknown one, if
     stated and valid.
     """

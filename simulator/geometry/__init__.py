@@ -15,7 +15,6 @@ if TYPE_CHECKING:
     from .listed_directions import directions
     from .motions import (
         AXIS_NAMES,
-        Array,
         cross_matrices,
         fit_motion,
         fixes_pose,

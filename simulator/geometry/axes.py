@@ -9,8 +9,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..inputs.number_arrays import Array
 from .ball_layouts import AxesSettings, BallLayout
 
 # A ball nominally this near to an axis, as a fraction of its distance from the origin, is meant to
@@ -56,7 +56,7 @@ def plate_axes(layout: BallLayout, settings: AxesSettings | None = None) -> Plat
     return PlateAxes(origin, ball, axis, -1.0 if along < 0.0 else 1.0)
 
 
-def _farthest(offsets: NDArray[np.float64]) -> tuple[int, int]:
+def _farthest(offsets: Array) -> tuple[int, int]:
     """Return the ball that fixes an axis best, and the axis, from offsets (n, 2) to the origin."""
     distance = np.linalg.norm(offsets, axis=1)
     for axis in (0, 1):
@@ -78,9 +78,7 @@ def axes_words(axes: PlateAxes, names: tuple[str, ...]) -> str:
     )
 
 
-def in_plate_axes(
-    balls: NDArray[np.float64], axes: PlateAxes
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def in_plate_axes(balls: Array, axes: PlateAxes) -> tuple[Array, Array]:
     """Return co-ordinates (n, 2) of balls (n, 2) in the plate's axes, and their rotation (2, 2).
 
     >>> in_plate_axes(np.array([[1.0, 1.0], [1.0, 3.0]]), PlateAxes(0, 1, 0))[0].tolist()

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BeforeValidator, Field, StringConstraints, model_validator
 
+from ..inputs.number_arrays import Array
 from ..inputs.quantities import Length, PositiveLength
 from ..inputs.settings import NonEmpty, Settings, listing, nearest, shorten
 
@@ -40,7 +41,7 @@ class BallLayout:
     """
 
     names: tuple[str, ...]
-    coordinates: NDArray[np.float64]
+    coordinates: Array
     pair_sets: Mapping[str, Pairs] = field(default_factory=dict)
     corner_set: tuple[int, ...] = ()
 
@@ -195,7 +196,7 @@ class ArtefactSettings(Settings):
         raise NotImplementedError
 
 
-def frozen(values: Any) -> NDArray[np.float64]:
+def frozen(values: Any) -> Array:
     """Return values as a read-only array."""
     array = np.array(values, dtype=float)
     array.setflags(write=False)

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 
-from .motions import Array
+from ..inputs.number_arrays import Array
 
 
 def grid_points(sides: Iterable[Array]) -> Array:

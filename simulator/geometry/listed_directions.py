@@ -7,9 +7,9 @@ from __future__ import annotations
 from typing import Annotated, Self
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
+from ..inputs.number_arrays import Array
 from ..inputs.quantities import Angle
 from ..inputs.settings import Forms, Settings
 
@@ -91,7 +91,7 @@ DIRECTIONS = (
 
 def directions(
     settings: GeneratedDirectionsSettings | tuple[tuple[float, float], ...],
-) -> NDArray[np.float64]:
+) -> Array:
     """Return unit vectors (m, 3).
 
     >>> directions(((0.0, 0.0), (np.pi / 2, 0.0))).round(9).tolist()
@@ -118,7 +118,7 @@ def directions(
     return _unit_vectors(np.array(pairs))
 
 
-def _unit_vectors(angles: NDArray[np.float64]) -> NDArray[np.float64]:
+def _unit_vectors(angles: Array) -> Array:
     azimuth, elevation = angles.T
     flat = np.cos(elevation)
     return np.stack([flat * np.cos(azimuth), flat * np.sin(azimuth), np.sin(elevation)], axis=1)

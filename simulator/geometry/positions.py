@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..inputs.number_arrays import Array
 from .ball_layouts import BallLayout
 from .rotations import rotation_matrix
 
@@ -35,8 +35,8 @@ class Pose:
     ``rotation``: (d, d), proper. ``origin``: (d,) in metres.
     """
 
-    rotation: NDArray[np.float64]
-    origin: NDArray[np.float64]
+    rotation: Array
+    origin: Array
 
     def __post_init__(self) -> None:
         for array in (self.rotation, self.origin):
@@ -100,7 +100,7 @@ def nominal_pose(
     return Pose(rotation, origin)
 
 
-def plane_rotation(plane: str, turns: int, dimension: int = 3) -> NDArray[np.float64]:
+def plane_rotation(plane: str, turns: int, dimension: int = 3) -> Array:
     """Return the rotation (d, d) of an artefact in a plane after quarter-turns."""
     turn = QUARTER_TURNS[turns % 4]
     if dimension == 2:
@@ -111,12 +111,12 @@ def plane_rotation(plane: str, turns: int, dimension: int = 3) -> NDArray[np.flo
     return rotation
 
 
-def bounding_rectangle(layout: BallLayout) -> NDArray[np.float64]:
+def bounding_rectangle(layout: BallLayout) -> Array:
     """Return the lower and upper corner, (2, 2) metres, of the balls in the artefact's x and y."""
     plane = layout.coordinates[:, :2]
     return np.array([plane.min(axis=0), plane.max(axis=0)])
 
 
-def ball_coordinates(pose: Pose, layout: BallLayout) -> NDArray[np.float64]:
+def ball_coordinates(pose: Pose, layout: BallLayout) -> Array:
     """Return the nominal co-ordinates (n, d) of an artefact's balls in the machine, in metres."""
     return layout.coordinates[:, : len(pose.origin)] @ pose.rotation.T + pose.origin

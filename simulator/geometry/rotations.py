@@ -6,7 +6,8 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
+
+from ..inputs.number_arrays import Array
 
 
 def cosine_and_sine(angle: float) -> tuple[float, float]:
@@ -21,7 +22,7 @@ def cosine_and_sine(angle: float) -> tuple[float, float]:
     return math.cos(angle), math.sin(angle)
 
 
-def rotation_matrix(angles: Sequence[float]) -> NDArray[np.float64]:
+def rotation_matrix(angles: Sequence[float]) -> Array:
     """Return the rotation by angles (rad): (3, 3) for three angles, (2, 2) for one.
 
     Three angles turn about the fixed x axis, then y, then z: Rz(c) Ry(b) Rx(a).

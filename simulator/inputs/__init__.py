@@ -18,7 +18,6 @@ if TYPE_CHECKING:
     )
     from .covariances import (
         MOST_NAMES,
-        Floats,
         NamedMatrix,
         half_digit,
         matrix_problems,

@@ -8,16 +8,14 @@ from decimal import Decimal, InvalidOperation
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from .messages import MOST_MESSAGES, ExperimentError, Message, refused
+from .number_arrays import Array
 from .quantities import LENGTH_UNITS, plain_unit
 from .settings import hint, shorten
 from .spreadsheets import text_of_cell
 from .tables import split_cells, table_lines, wrong_count, wrong_number
 from .yamltree import Mark
-
-Floats = NDArray[np.float64]
 
 MOST_NAMES = 2000
 # Tolerance of symmetry, in halves of the last digit: both entries were rounded separately.
@@ -33,8 +31,8 @@ class NamedMatrix:
     """
 
     names: tuple[str, ...]
-    values: Floats
-    rounding: Floats
+    values: Array
+    rounding: Array
     is_correlation: bool
     marks: tuple[Mark, ...]
     unit: str = "um"

@@ -12,9 +12,9 @@ from pathlib import Path
 from typing import Any, NoReturn
 
 import numpy as np
-from numpy.typing import NDArray
 
 from .messages import in_one_line
+from .number_arrays import Array
 from .settings import shorten
 from .unusable import UnusableError
 
@@ -98,9 +98,9 @@ def own_result(call: Callable[..., Any], *arguments: Any) -> Any:
 def own_array(
     call: Callable[..., Any],
     shape: tuple[int, ...],
-    *arguments: NDArray[np.float64],
+    *arguments: Array,
     is_plausible: bool = True,
-) -> NDArray[np.float64]:
+) -> Array:
     """Return the array (`shape`) of a user's function for arrays; finite for plausible ones.
 
     :raises OwnCodeError: it has failed, or returned another type, shape or number.

@@ -15,10 +15,11 @@ from fractions import Fraction
 from typing import Annotated, Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from pydantic import GetCoreSchemaHandler, GetJsonSchemaHandler, PlainValidator, WithJsonSchema
 from pydantic_core import CoreSchema, core_schema
 
+from .number_arrays import Array
 from .settings import describe, hint, shorten
 
 PI = Fraction("3.14159265358979323846264338327950288419716939937510582")
@@ -415,7 +416,7 @@ class LengthFunction:
     constant: float
     slope: float = 0.0
 
-    def at(self, length: ArrayLike) -> NDArray[np.float64]:
+    def at(self, length: ArrayLike) -> Array:
         """Return the values (m, any shape) at lengths (m, the same shape).
 
         >>> LengthFunction(0.25, 0.5).at([0.0, 1.0])
@@ -453,7 +454,7 @@ class Target:
         k = self.coverage_factor
         return LengthFunction(self.stated.constant / k, self.stated.slope / k)
 
-    def at(self, length: ArrayLike) -> NDArray[np.float64]:
+    def at(self, length: ArrayLike) -> Array:
         """Return target standard uncertainties (m, any shape) at lengths (m, the same shape)."""
         return self.standard.at(length)
 

@@ -6,10 +6,10 @@ from dataclasses import dataclass
 from typing import Literal, Protocol, runtime_checkable
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
-Integers = NDArray[np.int64]
+from ..inputs.number_arrays import Array
+from ..inputs.number_arrays import Integers as Integers
+
 Unit = Literal["m", "rad", "1", "K", "1/K", "m/h", "1/h"]
 
 

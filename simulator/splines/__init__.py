@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from .constraints import Constraint, periodic, prescribed, straight
     from .knots import at_every, with_boundaries
     from .polynomial_pieces import Pieces, Powers, pieces
-    from .space import Array, Side, SplineSpace
+    from .space import Side, SplineSpace
     from .spline_fit import SplineFit, fit
     from .spline_problems import SplineError, SplineProblem
 

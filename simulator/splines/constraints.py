@@ -10,7 +10,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .space import Array, Side, SplineSpace
+from ..inputs.number_arrays import Array
+from .space import Side, SplineSpace
 
 NAMES = ("value", "slope", "second derivative")
 

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from .space import Array
+from ..inputs.number_arrays import Array
 
 # With fewer points between a knot and a boundary the curvature, which jumps there, is hardly
 # determined.

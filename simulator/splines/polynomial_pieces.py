@@ -13,7 +13,7 @@ from typing import Literal
 
 import numpy as np
 
-from .space import Array
+from ..inputs.number_arrays import Array
 from .spline_fit import SplineFit
 
 Powers = Literal["local", "global"]

@@ -12,11 +12,10 @@ from functools import cached_property
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..inputs.number_arrays import Array
 from .spline_problems import SplineError, SplineProblem
 
-Array = NDArray[np.float64]
 Side = Literal["above", "below"]
 """From which side a derivative is taken where it jumps."""
 

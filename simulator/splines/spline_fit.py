@@ -13,9 +13,10 @@ from functools import cached_property
 
 import numpy as np
 
+from ..inputs.number_arrays import Array
 from ..inputs.settings import number_of
 from .constraints import Constraint, rows
-from .space import Array, Side, SplineSpace
+from .space import Side, SplineSpace
 from .spline_problems import SplineError, SplineProblem
 
 # Rows of length 1, and columns of functions of size 1: what is smaller is rounding.

@@ -15,6 +15,7 @@ from ballplate.simulator.design import (
     Clock,
     DesignParts,
     Disturbed,
+    Flags,
     Influence,
     InfluenceParameter,
     InfluenceSettings,
@@ -29,7 +30,6 @@ from ballplate.simulator.experiment import (
     with_chosen,
 )
 from ballplate.simulator.machines import Array, Integers
-from numpy.typing import NDArray
 
 from .drift_in_orders import effects_on_distances
 
@@ -180,7 +180,7 @@ class _Ways:
 
     each: tuple[tuple[int, tuple[str, ...]], ...]
     middles: Array
-    is_own: NDArray[np.bool_]
+    is_own: Flags
     takes: Array
     change: Array
 

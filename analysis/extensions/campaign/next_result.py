@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
 from ballplate.extensions.requirements.goals import Goal, Judgement
-from ballplate.presentation import Columns, Result, number
+from ballplate.presentation import MainTable, Result, number
 from ballplate.results import Fit, PlannedUncertainty, freedom_words
 from ballplate.simulator.computing import comparable
 from ballplate.simulator.inputs import listing, number_of
@@ -187,7 +187,7 @@ class NextStep(Result):
             "remarks": self.notes,
         }
 
-    def columns(self) -> tuple[Columns, Sequence[Any]]:
+    def columns(self) -> MainTable:
         """One row for each position that can be read next, the best first."""
         columns = {
             "position": "name",

@@ -2,13 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from importlib.metadata import version
 from typing import Any
 
 import numpy as np
-from ballplate.presentation import Columns, Result, aligned, number, picked, to_uncertainty
+from ballplate.presentation import (
+    MainTable,
+    Result,
+    aligned,
+    number,
+    picked,
+    to_uncertainty,
+)
 from ballplate.results import freedom_words
 from ballplate.simulator.inputs import listing
 from ballplate.simulator.machines import Array
@@ -201,7 +208,7 @@ class CertifiedBalls(Result):
             "notes": list(self.notes),
         }
 
-    def columns(self) -> tuple[Columns, Sequence[Any]]:
+    def columns(self) -> MainTable:
         """One row for each co-ordinate."""
         count, d = self.coordinates.shape
         columns = {

@@ -11,8 +11,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from ballplate.simulator.design import Flags
 from ballplate.simulator.geometry import (
-    Array,
     BallLayout,
     PlateAxes,
     axes_words,
@@ -22,7 +22,7 @@ from ballplate.simulator.geometry import (
     without_rigid_motion,
 )
 from ballplate.simulator.inputs import hint
-from numpy.typing import NDArray
+from ballplate.simulator.machines import Array
 
 # A ball nearer to the line of two others than this fraction of how far it is along fixes no plane.
 IN_LINE = 1e-3
@@ -92,7 +92,7 @@ def chosen_datum(
     return Datum(axes, plane)
 
 
-def _is_apart(drawn: Array, axes: PlateAxes) -> NDArray[np.bool_]:
+def _is_apart(drawn: Array, axes: PlateAxes) -> Flags:
     """Which balls (n,) are off the line of the two on an axis."""
     across, along = _across(drawn, axes)
     return across > IN_LINE * np.maximum(along, across)

@@ -19,7 +19,6 @@ from ballplate.extensions.laboratory.xmltree import Element, read_xml
 from ballplate.simulator.inputs import (
     MOST_NAMES,
     ExperimentError,
-    Floats,
     Mark,
     Message,
     NamedMatrix,
@@ -30,6 +29,7 @@ from ballplate.simulator.inputs import (
     shorten,
     unit_of_area,
 )
+from ballplate.simulator.machines import Array
 
 from .dsi_units import celsius, length_factor
 
@@ -415,7 +415,7 @@ def _plain(text: str) -> float:
         return math.nan
 
 
-def matrix_of(result: DigitalResult, chosen: list[int]) -> tuple[Floats, Floats] | None:
+def matrix_of(result: DigitalResult, chosen: list[int]) -> tuple[Array, Array] | None:
     """Covariance and its rounding (m, m) of chosen lengths of a result; None where it states none
     of two of them together.
 

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from ballplate.presentation import Columns, Result, aligned, given, picked, table_lines
+from ballplate.presentation import MainTable, Result, aligned, given, picked, table_lines
 from ballplate.simulator.experiment import BINARY, load_machine, read_map
 from ballplate.simulator.geometry import grid_points
 from ballplate.simulator.inputs import (
@@ -66,7 +66,7 @@ class CompensationTable(Result):
         p = np.zeros(x.shape) if offset is None else np.broadcast_to(offset, x.shape)
         return correction(self.table, x, np.asarray(p, float)) - p
 
-    def columns(self) -> tuple[Columns, Sequence[Any]]:
+    def columns(self) -> MainTable:
         """One row for each node of an axis, or of the volume."""
         if isinstance(self.table, VolumeTable):
             places = np.stack(np.meshgrid(*self.table.nodes, indexing="ij"), axis=-1)

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from ballplate.presentation import Columns, Result, picked, table_lines
+from ballplate.presentation import MainTable, Result, picked, table_lines
 from ballplate.results import EstimatedFunctions, Function, estimated_functions
 from ballplate.simulator.computing import (
     ProgressStep,
@@ -167,7 +166,7 @@ class Bootstrap(Result):
             "estimates": self.rows(),
         }
 
-    def columns(self) -> tuple[Columns, Sequence[Any]]:
+    def columns(self) -> MainTable:
         """Columns with one row per estimate; undetermined ones are NaN."""
         columns = {
             "parameter": "name",

@@ -8,7 +8,7 @@ from itertools import chain
 from typing import Any
 
 import numpy as np
-from ballplate.presentation import Columns, Result, aligned, number, picked
+from ballplate.presentation import MainTable, Result, aligned, number, picked
 from ballplate.results import Fit, Grouping, few_degrees_of_freedom
 from ballplate.simulator.computing import comparable, single_threaded
 from ballplate.simulator.estimation import (
@@ -92,7 +92,7 @@ class UncertaintyBudget(Result):
         rows.append([expanded, *(_micrometres(figure, self.coverage_factor) for figure in figures)])
         return aligned(rows, [False, *[True] * len(figures)])
 
-    def columns(self) -> tuple[Columns, Sequence[Any]]:
+    def columns(self) -> MainTable:
         """Columns with one row per source and uncertainty."""
         count = len(self.sources)
         pairs = [(figure, k) for figure in self.figures for k in range(count)]

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from ballplate.presentation import Columns, FitResult, aligned, number, picked
+from ballplate.presentation import FitResult, MainTable, aligned, number, picked
 from ballplate.simulator.readings import ObservedReadings
 
 from .lack_of_fit import chance_words
@@ -154,7 +153,7 @@ class Validation(FitResult):
             **self.notes_data(),
         }
 
-    def columns(self) -> tuple[Columns, Sequence[Any]]:
+    def columns(self) -> MainTable:
         """One row for each that was left out."""
         return COLUMNS, self.left_out
 

@@ -7,9 +7,9 @@ from itertools import combinations
 
 import numpy as np
 from ballplate.simulator.computing import comparable
+from ballplate.simulator.design import Flags
 from ballplate.simulator.geometry import fit_motion
-from ballplate.simulator.machines import Array
-from numpy.typing import NDArray
+from ballplate.simulator.machines import Array, Integers
 
 # Subsets tried, and the points that each is judged by. With a third of the points wrong, three
 # right ones are drawn together more than once in four draws.
@@ -17,9 +17,7 @@ SUBSETS = 200
 JUDGES = 400
 
 
-def consensus_motion(
-    source: Array, target: Array, reach: Array
-) -> tuple[Array, Array, NDArray[np.bool_]]:
+def consensus_motion(source: Array, target: Array, reach: Array) -> tuple[Array, Array, Flags]:
     """Return rotation (d, d), origin (d,) and a mask (m,) of the points that agree with them.
 
     The motion brings as many points `source` (m, d) as possible within `reach` (m,) of `target`
@@ -54,7 +52,7 @@ def distances(source: Array, target: Array, rotation: Array, origin: Array) -> A
     return np.sqrt(((source @ rotation.T + origin - target) ** 2).sum(axis=1))
 
 
-def _subsets(source: Array) -> NDArray[np.int64]:
+def _subsets(source: Array) -> Integers:
     """Return indices (c, d) of subsets that fix a motion, the most widely spread of the drawn
     ones.
     """
@@ -62,7 +60,7 @@ def _subsets(source: Array) -> NDArray[np.int64]:
 
 
 @lru_cache(maxsize=64)
-def _widest(content: bytes, d: int) -> NDArray[np.int64]:
+def _widest(content: bytes, d: int) -> Integers:
     """Those of the points in `content`; a position is compared several times in each evaluation."""
     source = np.frombuffer(content).reshape(-1, d)
     m, size = len(source), min(d, len(source))

@@ -20,11 +20,17 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from ballplate.simulator.design import Design, Lengths, Priors, read_in_positions, seen_places
+from ballplate.simulator.design import (
+    Design,
+    Flags,
+    Lengths,
+    Priors,
+    read_in_positions,
+    seen_places,
+)
 from ballplate.simulator.estimation import initial_state
 from ballplate.simulator.geometry import fit_motion
 from ballplate.simulator.machines import Array, Integers
-from numpy.typing import NDArray
 
 from .consensus import consensus_motion, distances
 
@@ -78,7 +84,7 @@ class _Motions:
 
     rotations: Array
     origins: Array
-    agreeing: NDArray[np.bool_]
+    agreeing: Flags
 
 
 def find_gross_errors(design: Design, x: Array) -> tuple[list[WrongPosition], list[WrongReading]]:
@@ -196,8 +202,8 @@ def _against_readings(
     places_seen: Array,
     pitch: Array,
     motions_found: _Motions,
-    wrong: NDArray[np.bool_],
-) -> tuple[_Motions, Array, NDArray[np.bool_], list[tuple[int, int]]]:
+    wrong: Flags,
+) -> tuple[_Motions, Array, Flags, list[tuple[int, int]]]:
     """Compare readings of the same ball, after assembling each plate from its positions.
 
     Returns the motions of the assembled artefacts, their shapes (n, d), a mask of gross errors,
@@ -286,9 +292,7 @@ def _medians(local: Array, ball: Integers, otherwise: Array) -> tuple[Array, Int
     return result, count
 
 
-def _worst_of_each_ball(
-    ball: Integers, apart: Array, suspect: NDArray[np.bool_]
-) -> NDArray[np.bool_]:
+def _worst_of_each_ball(ball: Integers, apart: Array, suspect: Flags) -> Flags:
     """Return the reading of each ball that is furthest off."""
     worst = np.zeros(len(ball), bool)
     rows = np.flatnonzero(suspect)

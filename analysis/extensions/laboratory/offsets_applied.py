@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from ballplate.simulator.design import (
     Design,
+    Flags,
     Readings,
     locations,
     measured,
@@ -22,7 +23,6 @@ from ballplate.simulator.estimation import initial_state
 from ballplate.simulator.experiment import CompensationSettings, ReadingsSettings
 from ballplate.simulator.inputs import Mark, format_length
 from ballplate.simulator.machines import Array
-from numpy.typing import NDArray
 
 from .common_causes import TURNED, poses_found
 from .consensus import consensus_motion
@@ -121,7 +121,7 @@ def judge_offsets(
     )
 
 
-def _of_several_offsets(readings: Readings, offsets: Array) -> NDArray[np.bool_]:
+def _of_several_offsets(readings: Readings, offsets: Array) -> Flags:
     """Return a mask of readings in positions that were read with different offsets."""
     telling = np.zeros(len(readings), bool)
     for k in np.unique(readings.position):

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from ballplate.simulator.geometry import Array, fit_motion
+from ballplate.simulator.geometry import fit_motion
+from ballplate.simulator.machines import Array
 
 # Pairs of points that a turn may lead to, which are tried at most.
 MOST_PAIRS = 4000

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from ballplate.presentation import Columns, Result, number, table_lines
+from ballplate.presentation import MainTable, Result, number, table_lines
 from ballplate.results import ESTIMATE_COLUMNS, FRAMES, ParameterEstimate
 from ballplate.simulator.computing import single_threaded
 from ballplate.simulator.maps import CONVERSION, FittedMap, LeftOut, verdict_data, verdict_line
@@ -158,7 +157,7 @@ class ConvertedMap(Result):
             "parameters": self.rows(),
         }
 
-    def columns(self) -> tuple[Columns, Sequence[Any]]:
+    def columns(self) -> MainTable:
         """One row for each parameter of the new map."""
         return COLUMNS, self._parameters
 

@@ -2,12 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any, TextIO
 
 import numpy as np
-from ballplate.presentation import Columns, Result, by_axis, number, picked, records, table_lines
+from ballplate.presentation import (
+    MainTable,
+    Result,
+    by_axis,
+    number,
+    picked,
+    records,
+    table_lines,
+)
 from ballplate.results import few_degrees_of_freedom, freedom_words, left_out_words
 from ballplate.simulator.computing import single_threaded
 from ballplate.simulator.design import Flags, Tasks
@@ -279,7 +287,7 @@ class Correction(Result):
             "warnings": list(self.warnings),
         }
 
-    def columns(self) -> tuple[Columns, Sequence[Any]]:
+    def columns(self) -> MainTable:
         """One row for each point, in metres."""
         u = by_axis("u {}, µm", self.standard_uncertainties)
         return {**self._columns(), **u, "unit": ["m"] * len(self.points)}, ()

@@ -4,7 +4,7 @@ the points of a file, with their expanded uncertainties.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from ballplate.presentation import (
-    Columns,
+    MainTable,
     Result,
     by_axis,
     given,
@@ -146,7 +146,7 @@ class FittedErrorMap(Result):
             data["budget"] = budget_data(self.budget, k)
         return data | {"warnings": self.warnings}
 
-    def columns(self) -> tuple[Columns, Sequence[Any]]:
+    def columns(self) -> MainTable:
         """One row for each point, in metres."""
         errors, k = self.errors, self.fitted.coverage_factor
         columns = {

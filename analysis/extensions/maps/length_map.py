@@ -16,14 +16,13 @@ from ballplate.simulator.computing import (
     single_threaded,
     unreported,
 )
-from ballplate.simulator.design import Design
+from ballplate.simulator.design import Design, Flags
 from ballplate.simulator.estimation import MeasuredPoints, displacements, linearise
 from ballplate.simulator.experiment import Experiment, lay_out
 from ballplate.simulator.geometry import AXIS_NAMES, even_grid
 from ballplate.simulator.inputs import QuantityError, hint, parse_length_function
 from ballplate.simulator.machines import Array, Integers
 from ballplate.uncertainty import PairTile, expansion, pair_tiles
-from numpy.typing import NDArray
 
 from .length_groups import LengthGroups, LengthMapSettings
 from .length_tables import LengthMap
@@ -267,7 +266,7 @@ class _Tally:
         size = self.counts.shape[1]
         with np.errstate(invalid="ignore"):
             within = [factor * ratio <= 1.0 for factor in self.factors]
-        kinds: tuple[NDArray[np.bool_], ...] = (~is_open | is_open, is_open, *within)
+        kinds: tuple[Flags, ...] = (~is_open | is_open, is_open, *within)
         for k, chosen in enumerate(kinds):
             self.counts[k] += np.bincount(group[chosen], minlength=size)
         is_determined = ~is_open

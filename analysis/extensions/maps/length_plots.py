@@ -21,8 +21,8 @@ from ballplate.presentation import (
     placed_axes,
     save,
 )
+from ballplate.simulator.design import Flags
 from ballplate.simulator.machines import Array
-from numpy.typing import NDArray
 
 from .length_groups import GroupedLengths, target_words
 
@@ -103,7 +103,7 @@ def draw_lengths(lengths: GroupedLengths, path: str | Path | None = None) -> Fig
         return save(figure, path, f"{words}{k} u for {shares[1]}")
 
 
-def marks(ratios: Array) -> tuple[NDArray[np.bool_], str]:
+def marks(ratios: Array) -> tuple[Flags, str]:
     """Return the marked points by their ratios to the target, the smaller of both sets, and the
     meaning of marks.
 
@@ -134,7 +134,7 @@ def _slice(  # type: ignore[no-untyped-def]
     axes: Axes,
     lengths: GroupedLengths,
     ratios: Array,
-    marked: NDArray[np.bool_],
+    marked: Flags,
     limits: tuple[float, float],
 ):
     """Draw ratios (x, y) as colours, crosses where `marked`, dashes where undetermined."""

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from ballplate.presentation import (
-    Columns,
+    MainTable,
     Result,
     csv_lines,
     number,
@@ -132,7 +132,7 @@ class LengthMap(GroupedLengths, Result):
             "by_point": _group_data([{"point": point} for point in self.points], self.by_point),
         }
 
-    def columns(self) -> tuple[Columns, Sequence[Any]]:
+    def columns(self) -> MainTable:
         """One row for each class of length, direction and point of the grid."""
         data = self.to_dict()
         rows = []

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 from ballplate.simulator.computing import blank, comparable, single_threaded
+from ballplate.simulator.design import Flags
 from ballplate.simulator.machines import Array
-from numpy.typing import NDArray
 
 from .campaign_tests import (
     HELD,
@@ -48,7 +48,7 @@ class FigureGroup:
         return int(np.isnan(self.standard_uncertainties).sum())
 
     @property
-    def is_compared(self) -> NDArray[np.bool_]:
+    def is_compared(self) -> Flags:
         u = self.standard_uncertainties
         largest = np.nanmax(u, initial=0.0)
         return ~np.isnan(u) & (u > HELD * largest)
@@ -106,7 +106,7 @@ class ValueDifference:
         return ValueDifference(self.first.without(basis), self.second.without(basis), self.scatters)
 
     @property
-    def is_open(self) -> NDArray[np.bool_]:
+    def is_open(self) -> Flags:
         """Flags (m,) of undetermined functions of either map."""
         values = np.zeros(len(self.values))
         for mapped in (self.first, self.second):

@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
+from ballplate.simulator.design import Flags
 from ballplate.simulator.inputs import listing
 from ballplate.simulator.machines import Array
 from ballplate.simulator.maps import InCommon
 from ballplate.simulator.readings import ObservedReadings
-from numpy.typing import NDArray
-
-Flags = NDArray[np.bool_]
 
 # Readings no further apart than this (m) differ by rounding in the computer.
 NOTHING = 1e-12

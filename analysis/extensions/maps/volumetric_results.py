@@ -4,14 +4,14 @@ along its axis.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ballplate.presentation import (
-    Columns,
+    MainTable,
     Result,
     by_axis,
 )
@@ -138,7 +138,7 @@ class ErrorsAtPoints(MachineErrors):
             **self.more_data(),
         }
 
-    def columns(self) -> tuple[Columns, Sequence[Any]]:
+    def columns(self) -> MainTable:
         """One row for each point, in metres."""
         errors = self.errors
         columns = {

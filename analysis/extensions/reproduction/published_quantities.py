@@ -8,12 +8,11 @@ from __future__ import annotations
 
 import numpy as np
 from ballplate.simulator.computing import single_threaded
-from ballplate.simulator.design import Design, SharedLayout, rotation_sensitivity
+from ballplate.simulator.design import Design, Flags, SharedLayout, rotation_sensitivity
 from ballplate.simulator.estimation import BallPlaces, Linearisation, displacements, linearise
 from ballplate.simulator.geometry import pose_size
 from ballplate.simulator.machines import Array, KinematicModel
 from ballplate.uncertainty import Quantity, pairs_of, summarise
-from numpy.typing import NDArray
 
 
 @single_threaded
@@ -68,7 +67,7 @@ def coefficient_rows(design: Design, layout: SharedLayout) -> tuple[list[str], A
     """
     reported = design.model.reported()
     names, matrix = list(reported.names), reported.matrix.copy()
-    dropped: NDArray[np.bool_] = ~np.asarray(matrix.any(axis=1))
+    dropped: Flags = ~np.asarray(matrix.any(axis=1))
     if isinstance(design.model, KinematicModel):
         functions = [name.partition(" ")[0] for name in names]
         for function in design.model.functions:

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import numpy as np
 from ballplate.presentation import (
     INK,
     MARKERS,
@@ -19,8 +18,8 @@ from ballplate.presentation import (
     save,
     scaled_axis,
 )
+from ballplate.simulator.design import Flags
 from ballplate.simulator.machines import Array
-from numpy.typing import NDArray
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -39,7 +38,7 @@ class TriedValues:
     unit: str
     values: Array
     distances: Array
-    is_met: NDArray[np.bool_]
+    is_met: Flags
 
 
 def draw_tried(

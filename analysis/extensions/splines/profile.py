@@ -13,9 +13,9 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from ballplate.simulator.machines import Array
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
 # How much longer the way over a place may be than the way past it, for the place to lie on the

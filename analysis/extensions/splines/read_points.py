@@ -34,7 +34,7 @@ from ballplate.simulator.inputs import (
     table_lines,
     wrong_count,
 )
-from ballplate.simulator.splines import Array
+from ballplate.simulator.machines import Array
 
 EXAMPLE = "position_mm,error_um"
 PROFILES = (("nominal_x", "nominal_z"), ("x", "z"))

@@ -6,8 +6,8 @@ from abc import abstractmethod
 from typing import Self
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ...inputs.number_arrays import Flags
 from ...machines.protocol import Array, ErrorModel
 from ..arrays import Design, Observations, Replicates, Rows, State
 from .whitening import EXACT
@@ -25,7 +25,7 @@ class BallObservations(Observations):
         """
 
     @property
-    def is_exact(self) -> NDArray[np.bool_]:
+    def is_exact(self) -> Flags:
         return self.uncertainty <= EXACT
 
     def errors(self, generator: np.random.Generator, count: int) -> Array:

@@ -13,8 +13,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ...inputs.number_arrays import Flags
 from ...machines.protocol import Array, Integers
 from .whitening import Whitening, whitening
 
@@ -53,19 +53,19 @@ class LengthArrays:
     second: Integers
     value: Array
     uncertainty: Array
-    projected: NDArray[np.bool_]
+    projected: Flags
     direction: Array
-    with_repeatability: NDArray[np.bool_]
+    with_repeatability: Flags
     certificate: Integers
     free: Integers | None = None
 
     @property
-    def to_pivot(self) -> NDArray[np.bool_]:
+    def to_pivot(self) -> Flags:
         """Mask (m,) of lengths from a reading to a pivot."""
         return self.second < 0
 
     @property
-    def is_known(self) -> NDArray[np.bool_]:
+    def is_known(self) -> Flags:
         """Mask (m,) of lengths with a certificate."""
         return np.full(len(self.value), True) if self.free is None else self.free < 0
 
@@ -259,7 +259,7 @@ def length_whitening_of(
     return LengthWhitening(scatter, alone, single, tuple(joint))
 
 
-def _shares_readings(lengths: LengthArrays, standard: Integers) -> NDArray[np.bool_]:
+def _shares_readings(lengths: LengthArrays, standard: Integers) -> Flags:
     """Return a mask (m,) of lengths of standards with a reading at the end of several lengths."""
     chosen = np.flatnonzero(lengths.with_repeatability & ~lengths.to_pivot)
     ends = np.concatenate([lengths.first[chosen], lengths.second[chosen]])

@@ -11,8 +11,8 @@ from dataclasses import dataclass, replace
 from typing import ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ...inputs.number_arrays import Flags
 from ...machines.protocol import Array, Integers, Unit
 from ..arrays import Design, Replicates, Rows, State
 from .balls import BallObservations
@@ -79,7 +79,7 @@ class JointValues(BallObservations):
         return result
 
     @property
-    def is_exact(self) -> NDArray[np.bool_]:
+    def is_exact(self) -> Flags:
         return self.uncertainty <= EXACT
 
     def values(self, balls: Array) -> tuple[Array, Array]:

@@ -9,8 +9,8 @@ from dataclasses import dataclass, replace
 from typing import Any, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ...inputs.number_arrays import Flags
 from ...machines.protocol import Array, ErrorModel, Integers
 from ..arrays import Design, Observations, Rows, State, locations, reading_noise
 from ..parameters import SharedLayout, shared_layout
@@ -24,7 +24,7 @@ class Lengths(LengthArrays, Observations):
 
     word: ClassVar[str] = "length"
 
-    def select(self, chosen: NDArray[np.bool_] | Integers) -> Lengths:
+    def select(self, chosen: Flags | Integers) -> Lengths:
         """The lengths at the given indices."""
         values: dict[str, Any] = {
             name: None if v is None else v[chosen] for name, v in vars(self).items()

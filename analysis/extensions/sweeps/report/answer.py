@@ -9,19 +9,18 @@ from dataclasses import dataclass
 import numpy as np
 from ballplate.presentation import Block, Entry, Row, Table, number, percent
 from ballplate.simulator.computing import comparable
+from ballplate.simulator.design import Flags
 from ballplate.simulator.inputs import listing, number_of
-from numpy.typing import NDArray
+from ballplate.simulator.machines import Array, Integers
 
 from .axis_worth import AxisWorth, axis_worths
 from .measures import column_unit
-from .results import Integers, ReportedSweep, best_first, criterion, partly_open
+from .results import ReportedSweep, best_first, criterion, partly_open
 
 # Settings in the answer's table.
 LISTED = 8
 
 WITHIN = "U6_within_target"
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -72,9 +71,9 @@ def _sentences_with_target(
     results: ReportedSweep,
     done: Integers,
     column: str,
-    share: Floats,
-    observations: Floats,
-    value: Floats,
+    share: Array,
+    observations: Array,
+    value: Array,
 ) -> list[str]:
     """Return sentences on settings with a target, which may be an axis of the sweep."""
     meets, judged = share == 1.0, int(np.isfinite(share).sum())
@@ -108,8 +107,8 @@ def _cheapest_sentence(
     done: Integers,
     column: str,
     candidates: Integers,
-    observations: Floats,
-    value: Floats,
+    observations: Array,
+    value: Array,
 ) -> str:
     """Return a sentence on the setting with the fewest observations and, among those, the
     smallest average.
@@ -132,7 +131,7 @@ def _cheapest_sentence(
 
 
 def _sentences_without_target(
-    results: ReportedSweep, done: Integers, column: str, value: Floats, partly: NDArray[np.bool_]
+    results: ReportedSweep, done: Integers, column: str, value: Array, partly: Flags
 ) -> list[str]:
     """Return sentences on settings without a target."""
     if WITHIN.partition("_")[0] in results.definition["record"]:
@@ -149,7 +148,7 @@ def _sentences_without_target(
     ]
 
 
-def _first_of_best(value: Floats, places: Integers) -> tuple[int, int]:
+def _first_of_best(value: Array, places: Integers) -> tuple[int, int]:
     """Return the first of `places` with the smallest value, and the number of further ones."""
     values = comparable(value[places])
     best = best_first(values)[0]

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 from ballplate.presentation import number
-from numpy.typing import NDArray
+from ballplate.simulator.machines import Array, Integers
 
-from .results import Integers, ReportAxis, ReportedSweep
+from .results import ReportAxis, ReportedSweep
 
 # Averages with a smaller relative difference are equal, except for rounding.
 SAME = 1e-9
@@ -78,7 +78,7 @@ def axis_worths(results: ReportedSweep, column: str, rows: Integers) -> list[Axi
 
 def _worth_of_numbers(
     axis: ReportAxis,
-    value: NDArray[np.float64],
+    value: Array,
     group: Integers,
     place: Integers,
     planned: int,
@@ -102,7 +102,7 @@ def _worth_of_numbers(
 
 def _worth_of_texts(
     axis: ReportAxis,
-    value: NDArray[np.float64],
+    value: Array,
     group: Integers,
     place: Integers,
     planned: int,
@@ -134,7 +134,7 @@ def _grouped(group: Integers, place: Integers) -> tuple[Integers, Integers, Inte
 def _worth(
     axis: ReportAxis,
     ends: tuple[str, str] | None,
-    ratios: Sequence[float] | NDArray[np.float64],
+    ratios: Sequence[float] | Array,
     planned: int,
     between: int = 0,
     best: str = "",

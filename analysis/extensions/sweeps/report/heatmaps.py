@@ -7,7 +7,7 @@ from itertools import combinations
 
 import numpy as np
 from ballplate.presentation import Entry, number
-from numpy.typing import NDArray
+from ballplate.simulator.machines import Array, Integers
 
 from .measures import Measure, uncertainty_measures
 from .results import ReportAxis, ReportedSweep, criterion, partly_open, ranked
@@ -119,7 +119,7 @@ def _entry(results: ReportedSweep, row: int, measure: Measure, is_open: bool) ->
     return Entry(text, figure, cell, measure.figure), is_open
 
 
-def _shades(values: NDArray[np.float64]) -> NDArray[np.int64]:
+def _shades(values: Array) -> Integers:
     """Return shades by size, on a logarithmic scale if all values are positive."""
     finite = np.isfinite(values)
     shades = np.full(len(values), BLANK)

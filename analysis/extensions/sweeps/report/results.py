@@ -10,7 +10,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from ballplate.simulator.computing import comparable
+from ballplate.simulator.design import Flags
 from ballplate.simulator.inputs import QUANTITY, exact_number, in_one_line
+from ballplate.simulator.machines import Array, Integers
 from ballplate.uncertainty import RECORDED
 from numpy.typing import NDArray
 
@@ -22,7 +24,6 @@ from ..stored import StoredResults as Found
 if TYPE_CHECKING:
     import pandas
 
-Integers = NDArray[np.int64]
 
 # Quantities to judge cells by: the average of the first that is recorded.
 PREFERRED = ("U6", "U4", "U5", "U1", "U3_lengths", "U2_lengths", "U3", "U2")
@@ -111,11 +112,11 @@ class ReportedSweep:
         return [str(status) for status in self.frame["status"]]
 
     @cached_property
-    def done(self) -> NDArray[np.bool_]:
+    def done(self) -> Flags:
         """Mask (rows,) of finished cells."""
         return np.array([status == "done" for status in self.statuses], bool)
 
-    def figure(self, name: str) -> NDArray[np.float64]:
+    def figure(self, name: str) -> Array:
         """Return a column of the frame (rows,); NaN if it is not recorded."""
         return (
             np.asarray(self.frame[name], float)
@@ -161,7 +162,7 @@ def _axis(stored: dict[str, Any]) -> ReportAxis:
     return ReportAxis(in_one_line(stored["name"]), stored["column"], labels, numbers, unit)
 
 
-def partly_open(results: ReportedSweep, symbol: str) -> NDArray[np.bool_]:
+def partly_open(results: ReportedSweep, symbol: str) -> Flags:
     """Return the rows of the frame (rows,) in which some values of a quantity are undetermined."""
     column = f"{symbol_column(symbol.rstrip(MORE))}_undetermined"
     if column not in results.frame:

@@ -6,13 +6,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
+from ballplate.simulator.machines import Array, Integers
 
 from ..store_columns import symbol_column
 from .measures import Measure, trial_symbols, uncertainty_measures
 from .results import ReportAxis, ReportedSweep, criterion, partly_open, ranked
-
-Floats = NDArray[np.float64]
 
 # Limits: distinguishable lines, values along an axis, pictures of one quantity for settings of
 # further axes, cells drawn as points.
@@ -27,10 +25,10 @@ class SeriesLine:
     """
 
     label: str
-    x: Floats
-    y: Floats
-    actual: Floats
-    error: Floats
+    x: Array
+    y: Array
+    actual: Array
+    error: Array
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,7 +92,7 @@ def plots(results: ReportedSweep) -> list[Plot]:
 class _Picture:
     """Rows of the frame by line, with the lines' labels, and a note."""
 
-    lines: tuple[tuple[str, NDArray[np.int64]], ...]
+    lines: tuple[tuple[str, Integers], ...]
     note: str
     is_scattered: bool = False
 
@@ -159,7 +157,7 @@ def evenly(axis: ReportAxis, most: int) -> list[int]:
     return [int(i) for i in order[chosen]]
 
 
-def setting_words(results: ReportedSweep, axes: Sequence[int], values: NDArray[np.int64]) -> str:
+def setting_words(results: ReportedSweep, axes: Sequence[int], values: Integers) -> str:
     return ", ".join(
         f"{results.axes[i].name} {results.axes[i].labels[j]}"
         for i, j in zip(axes, values.tolist(), strict=True)
@@ -170,7 +168,7 @@ def _picture(
     results: ReportedSweep,
     k: int,
     axes: Sequence[int],
-    lines: Sequence[NDArray[np.int64]],
+    lines: Sequence[Integers],
     note: str,
 ) -> _Picture:
     """Return lines of rows, each sorted along the plotted axis."""
@@ -211,7 +209,7 @@ def _plot(
     return Plot(axis, symbol, measures[0].unit, tuple(panels), note, picture.is_scattered)
 
 
-def _actual(results: ReportedSweep, measure: Measure) -> tuple[Floats, Floats]:
+def _actual(results: ReportedSweep, measure: Measure) -> tuple[Array, Array]:
     """Return Monte Carlo's value of an average and its standard error; empty without trials."""
     name = symbol_column(measure.symbol)
     if measure.statistic != "average" or measure.symbol not in trial_symbols(results):
