@@ -11,8 +11,8 @@ from itertools import pairwise
 from typing import Literal
 
 import numpy as np
+from ballplate.simulator.machines import Array
 from ballplate.simulator.splines import (
-    Array,
     Constraint,
     SplineError,
     SplineFit,
@@ -293,12 +293,10 @@ def whole_profile(
 def _located(
     points: CurvePoints, settings: CurveSettings
 ) -> tuple[
-    Array,
     tuple[float, float],
     tuple[float, ...],
     tuple[float, ...],
     tuple[Constraint, ...],
-    Array,
     Profile | None,
 ]:
     """Abscissae of points, ends, boundaries, corners and prescribed values, the places among them
