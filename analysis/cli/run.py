@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from argparse import ArgumentParser, ArgumentTypeError, Namespace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
+
+from ballplate.presentation.formatting import Data
 
 from .common import add_file, add_json, add_page, add_workers, percentage, trial_count, whole
 from .notes import complain
@@ -74,7 +76,7 @@ def run(options: Namespace) -> int:
             _write_page(options, plans[-1])
         if not options.json:
             print_lines([*([""] if len(plans) > 1 else []), *plans[-1].lines()])
-        data: dict[str, Any] = plans[-1].to_dict()
+        data: Data = plans[-1].to_dict()
         if with_trials:
             from ..montecarlo.comparison_tables import trials_data, trials_lines
 

@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 from typing import Any, Literal
 
 import numpy as np
+from ballplate.presentation.formatting import Data
 from ballplate.simulator.computing.steps import ProgressStep, Report, unreported
 from ballplate.simulator.design.arrays import Design, State
 from ballplate.simulator.design.observations.lengths import Lengths
@@ -122,7 +123,7 @@ class AlternativeFit(FitResult):
         columns = {"parameter": "name", "value": ("value", 6), "unit": "unit"}
         return [*lines, *iteration_lines(record), "", *table_lines(columns, self.estimates)]
 
-    def data(self) -> dict[str, Any]:
+    def data(self) -> Data:
         """The fit as plain data in metres and radians; None if undetermined."""
         return {
             **self.named,
@@ -222,9 +223,9 @@ class EstimatorComparison(Result):
         }
         return [*lines, "", *table_lines(columns, list(self.of_truth.values()))]
 
-    def data(self) -> dict[str, Any]:
+    def data(self) -> Data:
         """The comparison as plain data in metres."""
-        data: dict[str, Any] = {
+        data: Data = {
             **self.named,
             **picked(self, "estimator", "trials", "pairs", "lengths"),
             **picked(self, "across_probes", "points"),

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
+from ballplate.presentation.formatting import Data
 from ballplate.simulator.design.arrays import Design
 from ballplate.simulator.design.observations.lengths import Lengths
 from ballplate.simulator.design.observations.priors import Priors
@@ -112,7 +113,7 @@ class LengthFit(FitResult):
         )
         return lines + [f"{name}: {_millimetres(value, 5)} mm" for name, value in self.lengths]
 
-    def data(self) -> dict[str, Any]:
+    def data(self) -> Data:
         """Solved length equations as plain data in metres and radians; None if undetermined."""
         solution = self.solution
         return {

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
+from ballplate.presentation.formatting import Data
 from ballplate.simulator.estimation.reversal import Reversal
 from ballplate.simulator.geometry.axes import PlateAxes, axes_words, in_plate_axes
 from ballplate.simulator.inputs.settings import listing
@@ -156,7 +157,7 @@ class ReversalFit(FitResult):
         ]
         return [*lines, *table_lines(COLUMNS, self.rows()), "", *_ball_lines(self)]
 
-    def data(self) -> dict[str, Any]:
+    def data(self) -> Data:
         """The reversal as plain data in metres and radians; `multiple_redundancy` has the full
         fit.
         """

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from typing import Any
 
+from ballplate.presentation.formatting import Data
 from ballplate.simulator.inputs.settings import listing
 
 from ..presentation.formatting import aligned, number, picked, shown_unit
@@ -149,13 +149,13 @@ def _misfit_lines(result: Trials, outcome: MonteCarloOutcome) -> list[str]:
     return lines
 
 
-def trials_data(result: Trials) -> dict[str, Any]:
+def trials_data(result: Trials) -> Data:
     """Return replicates as plain data in metres and radians at full precision."""
     outcome = result.outcome
     if outcome is None:
         return {"reason": result.reason}
     misfit = outcome.misfit
-    data: dict[str, Any] = {
+    data: Data = {
         **({"reason": outcome.reason} if outcome.reason else {}),
         "trials": outcome.trials,
         "seed": result.seed,
@@ -189,7 +189,7 @@ def trials_data(result: Trials) -> dict[str, Any]:
     return data
 
 
-def _comparison_data(comparison: MonteCarloComparison) -> dict[str, Any]:
+def _comparison_data(comparison: MonteCarloComparison) -> Data:
     return {
         **picked(comparison, "unit", "count", "sampled"),
         "linear": {"maximum": comparison.linear_maximum, "average": comparison.linear_average},

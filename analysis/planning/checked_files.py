@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Protocol
 
+from ballplate.presentation.formatting import Data
 from ballplate.simulator.computing.steps import Report, counted, unreported
 from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.experiment.model import Experiment
@@ -31,7 +32,7 @@ class SuggestedChanges(Protocol):
 
     def lines(self, judged: Verdict) -> list[str]: ...
 
-    def data(self) -> dict[str, Any]: ...
+    def data(self) -> Data: ...
 
 
 @dataclass(frozen=True)
@@ -174,7 +175,7 @@ def advised(design: CheckedDesign) -> CheckedDesign:
     """Return a design with the goals its prediction meets, and suggestions."""
     prediction = design.prediction
     lines = [*design.goals]
-    data: dict[str, Any] = {"goals": list(design.goals), "missed": list(design.missed)}
+    data: Data = {"goals": list(design.goals), "missed": list(design.missed)}
     if design.suggestions is not None:
         lines += design.suggestions.lines(prediction.verdict)
         data |= design.suggestions.data()

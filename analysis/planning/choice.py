@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from typing import Any, Protocol
 
 import numpy as np
+from ballplate.presentation.formatting import Data
 from ballplate.simulator.experiment.model import Candidate, Experiment, Pool
 from ballplate.simulator.inputs.messages import ExperimentError
 
@@ -26,7 +27,7 @@ class DriftInOrders(Protocol):
 
     def lines(self, campaign: Any) -> list[str]: ...
 
-    def data(self) -> dict[str, Any]: ...
+    def data(self) -> Data: ...
 
 
 class OpenPool(Protocol):
@@ -38,7 +39,7 @@ class OpenPool(Protocol):
     @property
     def remedy(self) -> str: ...
 
-    def to_dict(self) -> dict[str, Any]: ...
+    def to_dict(self) -> Data: ...
 
     def refusing(self, error: ExperimentError) -> ExperimentError: ...
 

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
-
+from ballplate.presentation.formatting import Data
 from ballplate.simulator.inputs.messages import in_one_line
 from ballplate.simulator.inputs.quantities import format_duration
 from ballplate.simulator.inputs.settings import number_of
@@ -40,7 +39,7 @@ def sheet_lines(sheet: RunSheet) -> list[str]:
     return [in_one_line(line) for line in (*lines, summary(sheet))]
 
 
-def sheet_data(sheet: RunSheet) -> dict[str, Any]:
+def sheet_data(sheet: RunSheet) -> Data:
     """The run sheet as plain data, times in seconds."""
     return {
         "steps": [

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from ballplate.presentation.formatting import Data
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.inputs.extensions import service
 from ballplate.simulator.inputs.settings import number_of
@@ -150,7 +151,7 @@ class Campaign(Selection, Result):
         lines += ["", *orders] if orders else []
         return [*lines, "", *self.prediction.lines()[1:], "", *sheet_lines(self.sheet)]
 
-    def data(self) -> dict[str, Any]:
+    def data(self) -> Data:
         """The campaign as data, in metres and seconds."""
         return {
             "experiment": self.prediction.label,
@@ -182,7 +183,7 @@ class Campaign(Selection, Result):
             "plan": self.prediction.to_dict(),
         }
 
-    def rows(self) -> list[dict[str, Any]]:
+    def rows(self) -> list[Data]:
         """One row for each step of the run sheet, times in seconds."""
         return list(sheet_data(self.sheet)["steps"])
 
@@ -304,7 +305,7 @@ def _curve_table(campaign: Campaign) -> list[str]:
     return aligned(rows, [False, True, False, True, True, True, True])
 
 
-def _gain_data(gain: Gain) -> dict[str, Any]:
+def _gain_data(gain: Gain) -> Data:
     return {
         "name": gain.candidate.name,
         "without": gain.without,

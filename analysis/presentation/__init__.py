@@ -12,6 +12,7 @@ if TYPE_CHECKING:
     from .formats import FORMATS
     from .formatting import (
         SHOWN,
+        Data,
         aligned,
         amount_of,
         as_data,

@@ -11,6 +11,9 @@ from typing import Any
 import numpy as np
 from ballplate.simulator.computing.rounding import printable
 
+# Plain data, as JSON has it once `as_data` has made it so.
+Data = dict[str, Any]
+
 # Unit of small values → unit in which tables show them, 1e-6 as large.
 SHOWN = {
     "m": "µm",
@@ -171,7 +174,7 @@ def as_data(value: Any) -> Any:
     return finite(value) if isinstance(value, float) else value
 
 
-def records(**columns: Any) -> list[dict[str, Any]]:
+def records(**columns: Any) -> list[Data]:
     """Return columns of equal length as one mapping per row.
 
     >>> records(x=(1, 2), y="ab")
@@ -187,12 +190,12 @@ def csv_lines(heads: Iterable[str], *columns: np.ndarray) -> Iterator[str]:
         yield ",".join("" if value != value else f"{value + 0.0:.12g}" for value in row)
 
 
-def by_name(items: Iterable[Any], *names: str) -> dict[str, dict[str, Any]]:
+def by_name(items: Iterable[Any], *names: str) -> dict[str, Data]:
     """Return some attributes of objects, by the objects' names."""
     return {item.name: picked(item, *names) for item in items}
 
 
-def given(**values: Any) -> dict[str, Any]:
+def given(**values: Any) -> Data:
     """Return the values that are not empty.
 
     >>> given(tasks=[], title="plate")
@@ -201,7 +204,7 @@ def given(**values: Any) -> dict[str, Any]:
     return {name: value for name, value in values.items() if value}
 
 
-def picked(source: object, *names: str) -> dict[str, Any]:
+def picked(source: object, *names: str) -> Data:
     """Return some attributes of an object by their names.
 
     >>> picked(1 + 2j, "real", "imag")

@@ -11,7 +11,7 @@ from ballplate.simulator.inputs.settings import number_of
 
 from .files import write_file
 from .formats import as_html, as_latex, as_markdown
-from .formatting import as_data
+from .formatting import Data, as_data
 from .table import Block, Entry, Row, Table
 from .table_columns import MainTable, table_rows
 
@@ -43,11 +43,11 @@ class Result:
         """The result as lines of text, as the command prints it."""
         raise NotImplementedError
 
-    def data(self) -> dict[str, Any]:
+    def data(self) -> Data:
         """The content of `to_dict`, of any objects; NaN if undetermined."""
         raise NotImplementedError
 
-    def to_dict(self) -> dict[str, Any]:
+    def to_dict(self) -> Data:
         """The result as plain data, as the command's --json prints it; None if undetermined."""
         return dict(as_data(self.data()))
 
@@ -57,7 +57,7 @@ class Result:
         return f"{self.label}: {self.title}"
 
     @property
-    def named(self) -> dict[str, Any]:
+    def named(self) -> Data:
         """Label and title as plain data."""
         return {"experiment": self.label, "title": self.title}
 
@@ -71,7 +71,7 @@ class Result:
         """Notes below tables: remarks, warnings, reasons for an unexpected result."""
         return tuple(f"warning: {warning}" for warning in self.warnings)
 
-    def rows(self) -> list[dict[str, Any]]:
+    def rows(self) -> list[Data]:
         """The rows of its main table in metres, radians and ratios, by the names of the columns;
         units have a separate column.
         """
@@ -86,7 +86,7 @@ class Result:
         """
         return None
 
-    def _shown_rows(self) -> list[dict[str, Any]]:
+    def _shown_rows(self) -> list[Data]:
         """The rows in the units of text."""
         columns = self.columns()
         return self.rows() if columns is None else table_rows(*columns, in_units=True)
@@ -193,7 +193,7 @@ class FitResult(Result):
     def notes(self) -> tuple[str, ...]:
         return (*self.remarks, *super().notes, *filter(None, [self.complaint]))
 
-    def notes_data(self) -> dict[str, Any]:
+    def notes_data(self) -> Data:
         """Notes, warnings and failure reason as plain data."""
         return {
             "planned_but_not_read": list(self.observed.missing),

@@ -17,7 +17,7 @@ from typing import Any
 
 from ballplate.simulator.machines.protocol import Array
 
-from .formatting import aligned, amount_of, number, to_uncertainty, unit_of
+from .formatting import Data, aligned, amount_of, number, to_uncertainty, unit_of
 
 FACTORS = {"mm": 1e3, "µm": 1e6, "µrad": 1e6, "ppm": 1e6, "arcsec": math.degrees(3600.0)}
 
@@ -46,9 +46,7 @@ def table_lines(
     return aligned(list(zip(*texts, strict=True)), right)
 
 
-def by_axis(
-    heading: str, values: Array, form: Any = 4, letters: Sequence[str] = "xyz"
-) -> dict[str, Any]:
+def by_axis(heading: str, values: Array, form: Any = 4, letters: Sequence[str] = "xyz") -> Data:
     """Return a column for each axis of vectors (n, d), whose letter replaces `heading`'s braces."""
     forms = form.T if hasattr(form, "T") else repeat(form)
     # Three letters, any number of forms.
@@ -59,9 +57,7 @@ def by_axis(
     }
 
 
-def table_rows(
-    columns: Columns, items: Sequence[Any] = (), in_units: bool = False
-) -> list[dict[str, Any]]:
+def table_rows(columns: Columns, items: Sequence[Any] = (), in_units: bool = False) -> list[Data]:
     """Return a table as one mapping per row: in metres, radians and ratios, without units in the
     names, or in the units of the headings and of the column "unit".
     """

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any, Protocol
+from typing import Protocol
 
+from ballplate.presentation.formatting import Data
 from ballplate.simulator.design.arrays import Design
 from ballplate.simulator.estimation.linearisation import Linearisation
 from ballplate.simulator.inputs.extensions import MissingExtensionError, service
@@ -32,7 +33,7 @@ class Suspicion(Protocol):
 
     def lines(self, marks: Sequence[Mark] = ()) -> list[str]: ...
 
-    def data(self, marks: Sequence[Mark] = ()) -> list[dict[str, Any]]: ...
+    def data(self, marks: Sequence[Mark] = ()) -> list[Data]: ...
 
 
 def diagnosed(

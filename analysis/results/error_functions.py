@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
+from ballplate.presentation.formatting import Data
 from ballplate.simulator.computing.threads import single_threaded
 from ballplate.simulator.estimation.linearisation import Linearisation
 from ballplate.simulator.machines.error_names import AXIS_ERRORS
@@ -39,9 +39,9 @@ class EstimatedCurve:
     values: Array
     standard_uncertainties: Array
 
-    def to_dict(self) -> dict[str, Any]:
+    def to_dict(self) -> Data:
         """Return the curve as plain data in metres, radians and ratios; None if undetermined."""
-        data: dict[str, Any] = as_data(self)
+        data: Data = as_data(self)
         return data
 
 

@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, Protocol
 
+from ballplate.presentation.formatting import Data
 from ballplate.simulator.design.arrays import Design
 from ballplate.simulator.inputs.extensions import function, optional_function
 
@@ -23,7 +24,7 @@ class AskedResult(Protocol):
 
     def lines(self) -> list[str]: ...
 
-    def to_dict(self) -> dict[str, Any]: ...
+    def to_dict(self) -> Data: ...
 
 
 class GroupVariances(AskedResult, Protocol):

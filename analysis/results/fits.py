@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from ballplate.presentation.files import write_file
 from ballplate.presentation.formats import as_html
-from ballplate.presentation.formatting import given, picked
+from ballplate.presentation.formatting import Data, given, picked
 from ballplate.presentation.result import FitResult
 from ballplate.presentation.scenes import box_edges, projection
 from ballplate.presentation.table_columns import MainTable, table_lines
@@ -193,7 +193,7 @@ class Fit(FitResult):
             lines += ["", *self.bootstrap.lines()]
         return lines
 
-    def data(self) -> dict[str, Any]:
+    def data(self) -> Data:
         estimates = zip(labels(self.estimates), self.estimates, strict=True)
         components = self.variance_components
         curves = self.error_functions if self.converged else ()

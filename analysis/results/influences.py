@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from ballplate.presentation.formatting import Data
 from ballplate.simulator.estimation.linearisation import Linearisation
 from ballplate.simulator.machines.protocol import Unit
 
@@ -57,7 +58,7 @@ def influence_table(influences: Sequence[InfluenceUncertainty]) -> list[str]:
     return [*table_lines(COLUMNS, influences[:MOST_LINES]), *more]
 
 
-def influence_data(influences: Sequence[InfluenceUncertainty]) -> dict[str, Any]:
+def influence_data(influences: Sequence[InfluenceUncertainty]) -> Data:
     """Return uncertainties of influence quantities as plain data, by name."""
     return {
         influence.name: {

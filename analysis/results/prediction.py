@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
+from ballplate.presentation.formatting import Data
 from ballplate.simulator.design.arrays import Design
 from ballplate.simulator.inputs.settings import hint, number_of
 
@@ -105,7 +106,7 @@ class Prediction(Result):
         lines += ["", *influence_table(self.influences)] if self.influences else []
         return lines + ["", *task_table(self.tasks)] if self.tasks else lines
 
-    def data(self) -> dict[str, Any]:
+    def data(self) -> Data:
         data = {
             **self.named,
             **verdict_data(self.verdict),

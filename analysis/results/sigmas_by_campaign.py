@@ -5,10 +5,9 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
-from ballplate.presentation.formatting import finite, number, picked
+from ballplate.presentation.formatting import Data, finite, number, picked
 from ballplate.results.adjustments import freedom_words
 from ballplate.simulator.design.arrays import Design
 from ballplate.simulator.design.observations.priors import Priors
@@ -91,7 +90,7 @@ class CampaignSigmas:
         words = (scaled.words for scaled in self.maps)
         return [f"sigma of the readings without maps: {sigma}", *words]
 
-    def to_dict(self) -> dict[str, Any]:
+    def to_dict(self) -> Data:
         return {
             "sigma_without_maps": finite(self.own),
             "degrees_of_freedom_without_maps": self.own_freedom,

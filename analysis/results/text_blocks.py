@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from ballplate.presentation.formatting import (
+    Data,
     by_name,
     given,
     number,
@@ -107,7 +108,7 @@ def _judged(task: TaskUncertainty) -> str:
     return "" if task.is_within is None else "yes" if task.is_within else "no"
 
 
-def task_data(tasks: Sequence[TaskUncertainty]) -> dict[str, Any]:
+def task_data(tasks: Sequence[TaskUncertainty]) -> Data:
     """Return measuring tasks as plain data in metres."""
     return {
         task.name: {
@@ -264,7 +265,7 @@ def scale_warnings(scale: Scale | None) -> list[str]:
     return [f"{warning}; calibrate a distance, or state the standard uncertainty of the offsets"]
 
 
-def scale_data(scale: Scale | None) -> dict[str, Any] | None:
+def scale_data(scale: Scale | None) -> Data | None:
     """Return the sources of scale as plain data, relative standard uncertainties, and U6 in
     metres.
     """
@@ -336,13 +337,13 @@ def adjustment_lines(adjustments: Sequence[Adjustment]) -> list[str]:
     ]
 
 
-def adjustment_data(adjustments: Sequence[Adjustment]) -> dict[str, Any]:
+def adjustment_data(adjustments: Sequence[Adjustment]) -> Data:
     """Return adjustments as plain data."""
     names = "what", "value", "standard_uncertainty", "expanded_uncertainty", "unit", "words"
     return by_name(adjustments, *names)
 
 
-def plate_data(plate: PlateCoordinates) -> dict[str, Any]:
+def plate_data(plate: PlateCoordinates) -> Data:
     """Return a plate's co-ordinates in its own axes as plain data in metres."""
     axes = plate.axes
     return {
@@ -351,7 +352,7 @@ def plate_data(plate: PlateCoordinates) -> dict[str, Any]:
     }
 
 
-def coordinates_data(names: Sequence[str], values: Array, u: Array | None = None) -> dict[str, Any]:
+def coordinates_data(names: Sequence[str], values: Array, u: Array | None = None) -> Data:
     """Return co-ordinates (n, 2) by balls and axes, with their standard uncertainties."""
     keys = ("value",) if u is None else ("value", "standard_uncertainty")
     rows = np.stack([array for array in (values, u) if array is not None], axis=2)
@@ -364,11 +365,11 @@ def coordinates_data(names: Sequence[str], values: Array, u: Array | None = None
     }
 
 
-def quantities_data(quantities: dict[str, Quantity]) -> dict[str, Any]:
+def quantities_data(quantities: dict[str, Quantity]) -> Data:
     return {symbol: quantity_data(quantity) for symbol, quantity in quantities.items()}
 
 
-def quantity_data(q: Quantity) -> dict[str, Any]:
+def quantity_data(q: Quantity) -> Data:
     compared: dict[str, Any] = {}
     if q.within_target is not None:
         compared = {"within_target": q.within_target, "target_coverage_factor": q.coverage_factor}
@@ -382,7 +383,7 @@ def quantity_data(q: Quantity) -> dict[str, Any]:
     }
 
 
-def verdict_data(judged: Verdict) -> dict[str, Any]:
+def verdict_data(judged: Verdict) -> Data:
     return {
         **picked(judged, "parameters", "observations"),
         "rank_deficiency": judged.deficiency,

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
-from typing import Any
 
 from ballplate.planning import (
     HOUR,
@@ -15,7 +14,7 @@ from ballplate.planning import (
     Request,
     run_sheet,
 )
-from ballplate.presentation import finite, number, table_lines
+from ballplate.presentation import Data, finite, number, table_lines
 from ballplate.simulator.experiment import Candidate, Experiment, Pool, Position
 from ballplate.simulator.inputs import ExperimentError, refused
 
@@ -79,7 +78,7 @@ class DriftOrders:
         )
         return cls(order, size, effects)
 
-    def data(self) -> dict[str, Any]:
+    def data(self) -> Data:
         """The size of the drift and its effects as plain data."""
         return {
             "drift": asdict(self.size),
@@ -171,7 +170,7 @@ def _chosen_without_drift(campaign: Campaign) -> list[str]:
     ]
 
 
-def _order_data(effect: DriftEffect) -> dict[str, Any]:
+def _order_data(effect: DriftEffect) -> Data:
     return {
         key: finite(value) if isinstance(value, float) else value
         for key, value in asdict(effect).items()

@@ -5,10 +5,9 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any
 
 from ballplate.extensions.requirements.goals import Goal, Judgement
-from ballplate.presentation import MainTable, Result, number
+from ballplate.presentation import Data, MainTable, Result, number
 from ballplate.results import Fit, PlannedUncertainty, freedom_words
 from ballplate.simulator.computing import comparable
 from ballplate.simulator.inputs import listing, number_of
@@ -161,7 +160,7 @@ class NextStep(Result):
         )
         return (*self.observed.table_notes, *doubts)
 
-    def data(self) -> dict[str, Any]:
+    def data(self) -> Data:
         fit = self.fit
         lengths = None if fit is None else fit.quantities.get("U6")
         times = 1.0 if fit is None else self.sigma / fit.sigma

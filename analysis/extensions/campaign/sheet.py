@@ -17,7 +17,7 @@ from ballplate.planning import (
     sheet_lines,
     summary,
 )
-from ballplate.presentation import Result
+from ballplate.presentation import Data, Result
 from ballplate.simulator.experiment import Candidate, ChangeTimes, Experiment, Position
 from ballplate.simulator.inputs import length_text, refused, to_python
 
@@ -50,10 +50,10 @@ class Sheet(Result):
     def lines(self) -> list[str]:
         return [self.heading, "", *sheet_lines(self.sheet)]
 
-    def data(self) -> dict[str, Any]:
+    def data(self) -> Data:
         return {"experiment": self.label, **sheet_data(self.sheet)}
 
-    def rows(self) -> list[dict[str, Any]]:
+    def rows(self) -> list[Data]:
         """One row for each position, times in seconds."""
         return list(sheet_data(self.sheet)["steps"])
 

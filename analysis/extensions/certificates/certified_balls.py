@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from importlib.metadata import version
-from typing import Any
 
 import numpy as np
 from ballplate.presentation import (
+    Data,
     MainTable,
     Result,
     aligned,
@@ -177,7 +177,7 @@ class CertifiedBalls(Result):
         lengths = aligned(self.distance_table(), [False, False, True, True])
         return [*facts, "", *table, "", *lengths, "", *self.notes]
 
-    def data(self) -> dict[str, Any]:
+    def data(self) -> Data:
         u = self.standard_uncertainties.tolist()
         axes = "xyz"[: self.dimension]
         return {

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from ballplate.presentation import MainTable, Result, aligned, given, picked, table_lines
+from ballplate.presentation import Data, MainTable, Result, aligned, given, picked, table_lines
 from ballplate.simulator.experiment import BINARY, load_machine, read_map
 from ballplate.simulator.geometry import grid_points
 from ballplate.simulator.inputs import (
@@ -91,8 +91,8 @@ class CompensationTable(Result):
         parts = {f"{name}, {unit}": name for name, unit in _UNITS.items()}
         return {"axis": "axis", "position, mm": "position", **parts}, rows
 
-    def data(self) -> dict[str, Any]:
-        result_data: dict[str, Any] = {
+    def data(self) -> Data:
+        result_data: Data = {
             "title": self.title,
             "format": self.format.name,
             "states": self.sense,
@@ -207,7 +207,7 @@ class MadeCompensation(CompensationTable):
             NOT_LOADED,
         ]
 
-    def data(self) -> dict[str, Any]:
+    def data(self) -> Data:
         made = self.made
         return super().data() | {
             **given(fit=self.verdict),

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
-from ballplate.presentation import MainTable, Result, picked, table_lines
+from ballplate.presentation import Data, MainTable, Result, picked, table_lines
 from ballplate.results import EstimatedFunctions, Function, estimated_functions
 from ballplate.simulator.computing import (
     ProgressStep,
@@ -158,7 +157,7 @@ class Bootstrap(Result):
         count = len(differing)
         return [*lines, f"{count} standard deviations are not {comparison}: {names}"]
 
-    def data(self) -> dict[str, Any]:
+    def data(self) -> Data:
         return {
             **picked(self, "trials", "seed"),
             "not_converged": {str(k): words for k, words in self.failed},

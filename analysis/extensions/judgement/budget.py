@@ -8,7 +8,7 @@ from itertools import chain
 from typing import Any
 
 import numpy as np
-from ballplate.presentation import MainTable, Result, aligned, number, picked
+from ballplate.presentation import Data, MainTable, Result, aligned, number, picked
 from ballplate.results import Fit, Grouping, few_degrees_of_freedom
 from ballplate.simulator.computing import comparable, single_threaded
 from ballplate.simulator.estimation import (
@@ -105,7 +105,7 @@ class UncertaintyBudget(Result):
         }
         return columns, ()
 
-    def data(self) -> dict[str, Any]:
+    def data(self) -> Data:
         return {
             **self.named,
             "of": "fit" if self.of_fit else "design",

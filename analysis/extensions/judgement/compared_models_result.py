@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from ballplate.presentation import FitResult, number, picked, table_lines
+from ballplate.presentation import Data, FitResult, number, picked, table_lines
 from ballplate.results import freedom_words
 from ballplate.simulator.readings import ObservedReadings
 from ballplate.uncertainty import Quantity
@@ -227,7 +227,7 @@ class ComparedModels(FitResult):
             f" {chance_words(self.lack_of_fit)}"
         ]
 
-    def data(self) -> dict[str, Any]:
+    def data(self) -> Data:
         return {
             **self.named,
             "recommended": None if self.is_none else self.recommended,
@@ -243,7 +243,7 @@ class ComparedModels(FitResult):
             **self.notes_data(),
         }
 
-    def rows(self) -> list[dict[str, Any]]:
+    def rows(self) -> list[Data]:
         """One row for each error model."""
         lengths_are_open = self.lengths.undetermined > 0
         names = ("model", "parameters", "degrees_of_freedom", "sum_of_squares")

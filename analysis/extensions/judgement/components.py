@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from ballplate.extensions.reliability.remainders import leftover, too_many_entries
-from ballplate.presentation import Result, picked, table_lines
+from ballplate.presentation import Data, Result, picked, table_lines
 from ballplate.results import Grouping
 from ballplate.simulator.computing import single_threaded
 from ballplate.simulator.design import Design
@@ -105,12 +104,12 @@ class VarianceComponents(Result):
         columns = {f"variance by {self.by}": "name", **COLUMNS, "": "verdict"}
         return table_lines(columns, self.groups)
 
-    def rows(self) -> list[dict[str, Any]]:
+    def rows(self) -> list[Data]:
         """One row for each group."""
         names = ("observations", "redundancy", *RATIO, "verdict")
         return [{"group": group.name, **picked(group, *names)} for group in self.groups]
 
-    def data(self) -> dict[str, Any]:
+    def data(self) -> Data:
         return {"by": self.by, "false_alarm": FALSE_ALARM, "groups": self.rows()}
 
 

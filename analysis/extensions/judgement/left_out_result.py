@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
-from ballplate.presentation import FitResult, MainTable, aligned, number, picked
+from ballplate.presentation import Data, FitResult, MainTable, aligned, number, picked
 from ballplate.simulator.readings import ObservedReadings
 
 from .lack_of_fit import chance_words
@@ -144,7 +143,7 @@ class Validation(FitResult):
             ),
         ]
 
-    def data(self) -> dict[str, Any]:
+    def data(self) -> Data:
         return {
             **self.named,
             **picked(self, "sigma_is_given"),
@@ -191,7 +190,7 @@ def _cells(group: PredictedGroup, k: float) -> list[str]:
     return [*cells, number(1e6 * lengths.change, 3), number(1e6 * u, 3)]
 
 
-def _data(group: PredictedGroup) -> dict[str, Any]:
+def _data(group: PredictedGroup) -> Data:
     return {
         **picked(group, "kind", "name", "converged", "predicted"),
         "mean_square_error": group.mean_square,

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
-from ballplate.presentation import Result, picked
+from ballplate.presentation import Data, Result, picked
 
 from .imported import ImportedReadings
 
@@ -39,11 +38,11 @@ class ReadReport(Result):
     def notes(self) -> tuple[str, ...]:
         return self.remarks
 
-    def rows(self) -> list[dict[str, Any]]:
+    def rows(self) -> list[Data]:
         columns = self.imported.columns()
         return [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
 
-    def data(self) -> dict[str, Any]:
+    def data(self) -> Data:
         return {
             "experiment": self.label,
             "coordinates": self.imported.coordinates,

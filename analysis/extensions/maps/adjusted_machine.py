@@ -12,7 +12,7 @@ from itertools import combinations, product
 from typing import Any, Literal
 
 import numpy as np
-from ballplate.presentation import Result, aligned, number
+from ballplate.presentation import Data, Result, aligned, number
 from ballplate.results import ARCSECOND, coverage_factor, few_degrees_of_freedom
 from ballplate.simulator.computing import single_threaded
 from ballplate.simulator.geometry import AXIS_NAMES, rigid_motions
@@ -257,7 +257,7 @@ class AdjustedMachine(Result):
         changes = [change.words for change in self.changes]
         return [*changes, *self.verdicts, "", *table, *legend, "", self.headline()]
 
-    def data(self) -> dict[str, Any]:
+    def data(self) -> Data:
         errors = self.normalised_errors
         return {
             "title": self.title,
@@ -288,7 +288,7 @@ class AdjustedMachine(Result):
             "notes": self.notes,
         }
 
-    def rows(self) -> list[dict[str, Any]]:
+    def rows(self) -> list[Data]:
         """One row for each quantity."""
         nothing, errors = LineValue(np.nan, np.nan), self.normalised_errors
         return [

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
-from ballplate.presentation import MainTable, Result, number, table_lines
+from ballplate.presentation import Data, MainTable, Result, number, table_lines
 from ballplate.results import ESTIMATE_COLUMNS, FRAMES, ParameterEstimate
 from ballplate.simulator.computing import single_threaded
 from ballplate.simulator.maps import CONVERSION, FittedMap, LeftOut, verdict_data, verdict_line
@@ -140,7 +139,7 @@ class ConvertedMap(Result):
             )
         return [*lines, "", *table_lines(COLUMNS, self._parameters)]
 
-    def data(self) -> dict[str, Any]:
+    def data(self) -> Data:
         return {
             "map": self.label,
             "title": self.title,

@@ -8,6 +8,7 @@ from typing import Any, TextIO
 
 import numpy as np
 from ballplate.presentation import (
+    Data,
     MainTable,
     Result,
     by_axis,
@@ -260,7 +261,7 @@ class Correction(Result):
         for name, row in zip(names, _cells(1e12 * self.covariance()), strict=True):
             yield [name, *row]
 
-    def data(self) -> dict[str, Any]:
+    def data(self) -> Data:
         fitted, names = self.fitted, self._columns()
         return {
             **picked(fitted, "title", "sigma", "sigma_is_estimated", "degrees_of_freedom"),

@@ -9,7 +9,16 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from ballplate.presentation import SHOWN, Result, aligned, ascii_units, number, picked, table_lines
+from ballplate.presentation import (
+    SHOWN,
+    Data,
+    Result,
+    aligned,
+    ascii_units,
+    number,
+    picked,
+    table_lines,
+)
 from ballplate.simulator.geometry import AXIS_NAMES
 from ballplate.simulator.inputs import CsvWriter
 from ballplate.simulator.maps import FittedMap
@@ -71,7 +80,7 @@ class ErrorCurves(Result):
             lines += ["", *_number_table(functions.numbers, self.k)]
         return lines
 
-    def data(self) -> dict[str, Any]:
+    def data(self) -> Data:
         data = map_data(self.label, self.fitted)
         data["functions"] = [
             {
@@ -97,7 +106,7 @@ class ErrorCurves(Result):
             ]
         return data | {"warnings": self.warnings}
 
-    def rows(self) -> list[dict[str, Any]]:
+    def rows(self) -> list[Data]:
         """One row for each position of each curve, then one for each number; in metres, radians and
         ratios.
         """
@@ -171,7 +180,7 @@ def error_curves(
 
 def _row(
     name: str, line: str, position: float, value: float, u: float, k: float, unit: str
-) -> dict[str, Any]:
+) -> Data:
     keys = ("error", "line", "position", "value", "U", "k", "unit")
     return dict(zip(keys, (name, line, position, value, u, k, unit), strict=True))
 

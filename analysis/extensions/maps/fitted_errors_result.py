@@ -8,10 +8,11 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from ballplate.presentation import (
+    Data,
     MainTable,
     Result,
     by_axis,
@@ -122,7 +123,7 @@ class FittedErrorMap(Result):
             lines += ["", *budget_lines(self.budget, fitted.coverage_factor)]
         return lines
 
-    def data(self) -> dict[str, Any]:
+    def data(self) -> Data:
         fitted, k = self.fitted, self.fitted.coverage_factor
         data = map_data(self.label, fitted, self.probe)
         ends, errors = self.lengths, self.errors

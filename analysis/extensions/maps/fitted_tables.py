@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
-from ballplate.presentation import ROUNDING, by_axis, number, picked, table_lines
+from ballplate.presentation import ROUNDING, Data, by_axis, number, picked, table_lines
 from ballplate.simulator.computing import comparable
 from ballplate.simulator.maps import FittedMap, verdict_data, verdict_line
 
@@ -29,9 +29,9 @@ def head_lines(label: str, fitted: FittedMap, probe: int | None = None) -> list[
     return [*lines, f"U: expanded uncertainty, k = {fitted.coverage_factor:g}"]
 
 
-def map_data(label: str, fitted: FittedMap, probe: int | None = None) -> dict[str, Any]:
+def map_data(label: str, fitted: FittedMap, probe: int | None = None) -> Data:
     """The same as plain data."""
-    data: dict[str, Any] = {
+    data: Data = {
         "map": label,
         "title": fitted.title,
         "convention": CONVENTION,

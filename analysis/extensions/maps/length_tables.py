@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from ballplate.presentation import (
+    Data,
     MainTable,
     Result,
     csv_lines,
@@ -114,7 +115,7 @@ class LengthMap(GroupedLengths, Result):
             ),
         ]
 
-    def data(self) -> dict[str, Any]:
+    def data(self) -> Data:
         """Plain data in metres; None where undetermined."""
         settings, edges = self.settings, self.edges.tolist()
         classes = [{"from": low, "to": high} for low, high in zip(edges, edges[1:], strict=False)]
@@ -252,7 +253,7 @@ def point_csv(lengths: LengthMap) -> Iterator[str]:
     )
 
 
-def _group_data(heads: list[dict[str, Any]], groups: LengthGroups) -> list[dict[str, Any]]:
+def _group_data(heads: list[dict[str, Any]], groups: LengthGroups) -> list[Data]:
     rows = records(
         lengths=groups.count,
         **picked(groups, "undetermined", "average", "maximum", "average_ratio", "maximum_ratio"),

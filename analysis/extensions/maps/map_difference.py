@@ -8,10 +8,10 @@ from dataclasses import dataclass
 from datetime import date
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
-from ballplate.presentation import Result, aligned, number, picked, records
+from ballplate.presentation import Data, Result, aligned, number, picked, records
 from ballplate.results import FEW
 from ballplate.simulator.computing import comparable
 from ballplate.simulator.maps import InCommon, verdict_data, verdict_line
@@ -300,7 +300,7 @@ class MapDifference(Result):
         )
         return [*aligned(rows, [False, True, False, True, True, True]), remark]
 
-    def data(self) -> dict[str, Any]:
+    def data(self) -> Data:
         comparison, motion = self.comparison, self.comparison.motion
         tested = (
             *self.tests,
@@ -335,7 +335,7 @@ class MapDifference(Result):
             "figures": self.rows(),
         }
 
-    def rows(self) -> list[dict[str, Any]]:
+    def rows(self) -> list[Data]:
         """Return one row per compared or undetermined value."""
         table = []
         for group in self.comparison.groups:
@@ -444,7 +444,7 @@ def _group_table(groups: Sequence[FigureGroup]) -> list[str]:
     return aligned(rows, [False, True, True, True, True, False])
 
 
-def _map_data(side: ComparedMap) -> dict[str, Any]:
+def _map_data(side: ComparedMap) -> Data:
     return {
         **picked(side, "label", "title", "date"),
         "expected": side.is_expected,
@@ -454,7 +454,7 @@ def _map_data(side: ComparedMap) -> dict[str, Any]:
     }
 
 
-def _test_data(test: JointTest) -> dict[str, Any]:
+def _test_data(test: JointTest) -> Data:
     return {
         "what": test.what,
         "chi_squared": test.statistic,

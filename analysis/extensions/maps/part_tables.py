@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
-from ballplate.presentation import ROUNDING, aligned, number, picked, table_lines
+from ballplate.presentation import ROUNDING, Data, aligned, number, picked, table_lines
 
 from .fitted_tables import UNDETERMINED
 from .part_budget import REST, PartBudget
@@ -79,7 +78,7 @@ def _is_shown(budget: PartBudget, k: int) -> bool:
     return bool(sizes.max() > NOTHING)
 
 
-def budget_data(figures: Sequence[PartBudget], factor: float = 1.0) -> list[dict[str, Any]]:
+def budget_data(figures: Sequence[PartBudget], factor: float = 1.0) -> list[Data]:
     """The same in metres."""
     return [
         {

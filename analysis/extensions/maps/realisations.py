@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
-from ballplate.presentation import as_data
+from ballplate.presentation import Data, as_data
 from ballplate.simulator.machines import Array
 
 # Realisations that are drawn at most, and co-ordinates of all of them, of eight bytes each.
@@ -45,7 +44,7 @@ class Realisations:
     errors: Array
     lengths: Array
 
-    def to_dict(self) -> dict[str, Any]:
+    def to_dict(self) -> Data:
         """Return plain data, None where undetermined."""
         return {
             "seed": self.draws.seed,

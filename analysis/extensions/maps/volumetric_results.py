@@ -8,9 +8,10 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from ballplate.presentation import (
+    Data,
     MainTable,
     Result,
     by_axis,
@@ -116,9 +117,9 @@ class ErrorsAtPoints(MachineErrors):
             lines += ["", *budget_lines(self.budget, correlated=False)]
         return lines
 
-    def more_data(self) -> dict[str, Any]:
+    def more_data(self) -> Data:
         """Return requested realisations and budget as plain data."""
-        data: dict[str, Any] = {}
+        data: Data = {}
         if self.realisations is not None:
             data["realisations"] = self.realisations.to_dict()
         if self.with_budget:
@@ -130,7 +131,7 @@ class ErrorsAtPoints(MachineErrors):
         points = error_lines(self.errors)
         return [*machine_lines(self.machine), "", *diagonals, "", *points, *self.more_lines()]
 
-    def data(self) -> dict[str, Any]:
+    def data(self) -> Data:
         return {
             **machine_data(self.machine),
             "diagonals": diagonal_data(self.lengths),
@@ -174,7 +175,7 @@ class ErrorsOnLine(ErrorsAtPoints):
     def lines(self) -> list[str]:
         return [*error_lines(self.errors), length_line(self.lengths), *self.more_lines()]
 
-    def data(self) -> dict[str, Any]:
+    def data(self) -> Data:
         return {
             **machine_data(self.machine),
             "length": length_data(self.lengths)[0],
@@ -199,10 +200,10 @@ class ErrorAlongAxis(MachineErrors):
     def lines(self) -> list[str]:
         return along_lines(self.along)
 
-    def data(self) -> dict[str, Any]:
+    def data(self) -> Data:
         return along_data(self.along)
 
-    def rows(self) -> list[dict[str, Any]]:
+    def rows(self) -> list[Data]:
         """Return one row per position along the axis, in metres and radians."""
         data = self.to_dict()
         names = [name for name in ("position", "stated", "value", "random") if data[name]]

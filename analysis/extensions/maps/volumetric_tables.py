@@ -5,11 +5,11 @@ from __future__ import annotations
 import io
 from collections.abc import Iterator, Sequence
 from itertools import islice
-from typing import Any
 
 import numpy as np
 from ballplate.presentation import (
     SHOWN,
+    Data,
     aligned,
     ascii_units,
     by_axis,
@@ -317,7 +317,7 @@ def _unit(along: AlongAxis) -> str:
     return SHOWN[along.unit]
 
 
-def machine_data(built: Volumetric) -> dict[str, Any]:
+def machine_data(built: Volumetric) -> Data:
     """Return the machine and its parametric errors, in metres and radians."""
     machine = built.machine
     functions = {
@@ -346,18 +346,18 @@ def machine_data(built: Volumetric) -> dict[str, Any]:
     }
 
 
-def diagonal_data(errors: LengthErrors) -> list[dict[str, Any]]:
+def diagonal_data(errors: LengthErrors) -> list[Data]:
     """Length errors of the body diagonals, in metres."""
     return [{"diagonal": k + 1, **row} for k, row in enumerate(length_data(errors))]
 
 
-def length_data(errors: LengthErrors) -> list[dict[str, Any]]:
+def length_data(errors: LengthErrors) -> list[Data]:
     """Length errors, in metres."""
     ends = {"from": errors.starts, "to": errors.ends}
     return records(**ends, length=errors.nominal, error=errors.errors, random=errors.uncertainties)
 
 
-def error_data(errors: VolumetricErrors) -> list[dict[str, Any]]:
+def error_data(errors: VolumetricErrors) -> list[Data]:
     """Errors point by point, in metres."""
     return records(
         position=errors.points,
@@ -367,7 +367,7 @@ def error_data(errors: VolumetricErrors) -> list[dict[str, Any]]:
     )
 
 
-def along_data(along: AlongAxis) -> dict[str, Any]:
+def along_data(along: AlongAxis) -> Data:
     """A parametric error along its axis, in metres and radians."""
     return {
         "error": along.error.name,

@@ -7,11 +7,12 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TextIO
+from typing import TYPE_CHECKING, TextIO
 
 import numpy as np
 from ballplate.presentation import (
     SHOWN,
+    Data,
     Result,
     aligned,
     ascii_units,
@@ -129,7 +130,7 @@ class Reliability(Result):
             lines += ["", *_table(self, "events", events, with_redundancy=False)]
         return lines + _closing(self, with_all)
 
-    def data(self) -> dict[str, Any]:
+    def data(self) -> Data:
         """Return plain data in metres, radians and ratios; None if undetectable or undetermined."""
         is_single = np.isin(self.patterns.kind, single_kinds(self.design))
         return {
@@ -150,7 +151,7 @@ class Reliability(Result):
             "events": [_pattern_data(self, k) for k in np.flatnonzero(~is_single).tolist()],
         }
 
-    def rows(self) -> list[dict[str, Any]]:
+    def rows(self) -> list[Data]:
         """Return one row per bias: of an observation, a probe, a position, a certificate."""
         data = self.to_dict()
         rows = []
@@ -462,7 +463,7 @@ def _location(result: Reliability, symbol: str, k: int) -> str:
     return function_name(design, effects.functions[0], first, second)
 
 
-def _pattern_data(result: Reliability, k: int) -> dict[str, Any]:
+def _pattern_data(result: Reliability, k: int) -> Data:
     hidden = math.isinf(result.minimal_detectable[k])
     return {
         "name": name(result.patterns, k),
@@ -496,7 +497,7 @@ def write_observations(stream: TextIO, result: Reliability) -> None:
         writer.writerow(list(row.values()))
 
 
-def _observation_row(result: Reliability, k: int) -> dict[str, Any]:
+def _observation_row(result: Reliability, k: int) -> Data:
     design, subject, data = result.design, result.patterns.subject[k], _pattern_data(result, k)
     place = ("", "", "", "")
     if data["kind"] in ("reading", "end"):

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
+from ballplate.presentation import Data
 from ballplate.simulator.estimation import Linearisation
 from ballplate.simulator.inputs import Mark
 from ballplate.simulator.machines import Array
@@ -30,7 +30,7 @@ class DiagnosisInWords(Diagnosis):
     def lines(self, marks: Sequence[Mark] = ()) -> list[str]:
         return diagnosis_lines(self, marks)
 
-    def data(self, marks: Sequence[Mark] = ()) -> list[dict[str, Any]]:
+    def data(self, marks: Sequence[Mark] = ()) -> list[Data]:
         return diagnosis_data(self, marks)
 
 

@@ -5,10 +5,9 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 import numpy as np
-from ballplate.presentation import SHOWN, number, picked
+from ballplate.presentation import SHOWN, Data, number, picked
 from ballplate.simulator.design import CalibratedDistances, Lengths
 from ballplate.simulator.geometry import AXIS_NAMES
 from ballplate.simulator.inputs import Mark, listed, listing
@@ -296,7 +295,7 @@ def _lines(readings: Sequence[int], marks: Sequence[Mark]) -> str:
     return f"line{'s' * (len(numbers) > 1)} {listed(numbers)} of {file}"
 
 
-def diagnosis_data(diagnosis: Diagnosis, marks: Sequence[Mark] = ()) -> list[dict[str, Any]]:
+def diagnosis_data(diagnosis: Diagnosis, marks: Sequence[Mark] = ()) -> list[Data]:
     """Return all causes as plain data in metres, radians and ratios."""
     items = []
     if diagnosis.refit:
@@ -319,7 +318,7 @@ def diagnosis_data(diagnosis: Diagnosis, marks: Sequence[Mark] = ()) -> list[dic
     return items
 
 
-def _suspect_data(suspect: Suspect, marks: Sequence[Mark]) -> dict[str, Any]:
+def _suspect_data(suspect: Suspect, marks: Sequence[Mark]) -> Data:
     biases = suspect.patterns
     return {
         "name": name(biases, suspect.pattern),
@@ -350,7 +349,7 @@ def _suspect_data(suspect: Suspect, marks: Sequence[Mark]) -> dict[str, Any]:
 
 def _other_data(
     subject: str, kind: str, cause: MoreScatter | Unexplained | Refit, words: str
-) -> dict[str, Any]:
+) -> Data:
     return {
         "name": subject,
         "kind": kind,

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
-from ballplate.presentation import finite, number, picked
+from ballplate.presentation import Data, finite, number, picked
 from ballplate.rank import Verdict, changed_names, length
 from ballplate.simulator.inputs import listed
 from ballplate.uncertainty import OFFSET_TRIAL, exact_offsets
@@ -133,7 +133,7 @@ def certificate_lines(certificate: ScaleCertificate | None) -> list[str]:
     return [words, *(f"scale, in the file: {edit}" for edit in certificate.edits)]
 
 
-def certificate_data(certificate: ScaleCertificate | None) -> dict[str, Any] | None:
+def certificate_data(certificate: ScaleCertificate | None) -> Data | None:
     """Return that certificate as plain data in metres, if one is needed; without a text if the
     search failed.
     """
@@ -150,7 +150,7 @@ def certificate_data(certificate: ScaleCertificate | None) -> dict[str, Any] | N
     }
 
 
-def repair_data(repairs: Repairs | None) -> dict[str, Any] | None:
+def repair_data(repairs: Repairs | None) -> Data | None:
     """Return repairs as plain data in metres at full precision, if any are needed."""
     if repairs is None:
         return None
@@ -162,7 +162,7 @@ def repair_data(repairs: Repairs | None) -> dict[str, Any] | None:
     }
 
 
-def _data(repair: Repair) -> dict[str, Any]:
+def _data(repair: Repair) -> Data:
     u6 = None if repair.prediction is None else repair.prediction.quantities.get("U6")
     loose = repair.loosened
     return {

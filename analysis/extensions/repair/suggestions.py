@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
+from ballplate.presentation import Data
 from ballplate.rank import Verdict
 from ballplate.results import Prediction
 from ballplate.simulator.computing import Report
@@ -26,7 +26,7 @@ class Suggestions:
         """Return lines of suggestions for a design with this verdict."""
         return [*certificate_lines(self.certificate), *repair_lines(self.repairs, judged)]
 
-    def data(self) -> dict[str, Any]:
+    def data(self) -> Data:
         """The same as plain data in metres."""
         return {
             "repairs": repair_data(self.repairs),

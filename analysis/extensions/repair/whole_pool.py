@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 from ballplate.planning import Information
+from ballplate.presentation import Data
 from ballplate.rank import Verdict, changed_names
 from ballplate.results import check
 from ballplate.simulator.computing import Report, comparable, unreported
@@ -79,7 +79,7 @@ class PoolGap:
             f" {remedies}"
         )
 
-    def to_dict(self) -> dict[str, Any]:
+    def to_dict(self) -> Data:
         return {
             "deficiency": self.verdict.deficiency,
             "undetermined": [str(direction) for direction in self.verdict.null],

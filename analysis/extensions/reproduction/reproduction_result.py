@@ -5,10 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 from ballplate.designs import shipped
-from ballplate.presentation import Result
+from ballplate.presentation import Data, Result
 from ballplate.simulator.computing import Report, unreported
 from ballplate.simulator.inputs import hint, number_of
 
@@ -45,14 +44,14 @@ class ReproducedDocument(Result):
     def lines(self) -> list[str]:
         return reproduction_lines(self.reproduction)
 
-    def data(self) -> dict[str, Any]:
+    def data(self) -> Data:
         return reproduction_data(self.reproduction)
 
     def to_markdown(self) -> str:
         """Return all comparisons in Markdown, with the assumptions of each value."""
         return reproduction_markdown(self.reproduction)
 
-    def rows(self) -> list[dict[str, Any]]:
+    def rows(self) -> list[Data]:
         """Return one row per published value of the tables."""
         names = ("design", "table", "quantity", "statistic", "published", "ours", "ratio")
         return [

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from ballplate.presentation import aligned, number, picked
+from ballplate.presentation import Data, aligned, number, picked
 from ballplate.simulator.inputs import number_of
 
 from .compare import (
@@ -496,7 +496,7 @@ def _summary(reproduction: Reproduction) -> list[Block]:
     return blocks
 
 
-def reproduction_data(reproduction: Reproduction) -> dict[str, Any]:
+def reproduction_data(reproduction: Reproduction) -> Data:
     """Return a reproduction as plain data in metres and radians; None if undetermined."""
     statements = reproduction.document.statements
     keys = {key for section in reproduction.sections for key in section.rests_on}
@@ -530,7 +530,7 @@ def reproduction_data(reproduction: Reproduction) -> dict[str, Any]:
 
 
 # In one piece: one mapping, in the form in which the JSON has it.
-def _section_data(section: Section) -> dict[str, Any]:
+def _section_data(section: Section) -> Data:
     return {
         "section": section.name,
         **picked(section, "title", "agrees"),
@@ -604,7 +604,7 @@ def _section_data(section: Section) -> dict[str, Any]:
     }
 
 
-def _figure_data(column: ComparedColumn, figure: ComparedFigure) -> dict[str, Any]:
+def _figure_data(column: ComparedColumn, figure: ComparedFigure) -> Data:
     return {
         **picked(column.column, "table", "statistic", "case", "design"),
         **picked(figure, "quantity", "unit", "published", "ours", "ratio", "within", "agrees"),
@@ -614,7 +614,7 @@ def _figure_data(column: ComparedColumn, figure: ComparedFigure) -> dict[str, An
     }
 
 
-def _placed_data(part: PlacedFigure) -> dict[str, Any]:
+def _placed_data(part: PlacedFigure) -> Data:
     return {
         **picked(part, "published", "median", "agrees"),
         "quantiles": {str(q): v for q, v in _quantiles(part)},

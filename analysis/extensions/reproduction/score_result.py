@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from ballplate.designs import shipped
-from ballplate.presentation import Result
+from ballplate.presentation import Data, Result
 from ballplate.simulator.computing import Report, counted, unreported
 from ballplate.simulator.inputs import number_of
 
@@ -47,10 +47,10 @@ class CertifiedScores(Result):
     def lines(self) -> list[str]:
         return score_lines(self.problems, self.scores)
 
-    def data(self) -> dict[str, Any]:
+    def data(self) -> Data:
         return score_data(self.scores, self.answers)
 
-    def rows(self) -> list[dict[str, Any]]:
+    def rows(self) -> list[Data]:
         """Return one row per quantity of each problem."""
         return [dict(score) for score in self.to_dict()["scores"]]
 

@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 from typing import Any
 
-from ballplate.presentation import aligned
+from ballplate.presentation import Data, aligned
 
 from .certified_problems import CertifiedProblem
 from .score import Score
@@ -65,6 +65,6 @@ def _cell(score: Score | None) -> str:
     return f"{score.digits:.1f}"
 
 
-def score_data(scores: Sequence[Score], results: dict[str, Any]) -> dict[str, Any]:
+def score_data(scores: Sequence[Score], results: dict[str, Any]) -> Data:
     """Return scores, with their answers."""
     return {"scores": scores, "problems": results}

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
-from ballplate.presentation import Result, table_lines
+from ballplate.presentation import Data, Result, table_lines
 
 from .goals import Goal, Judgement
 from .tried_values_picture import TriedValues, draw_tried
@@ -87,10 +87,10 @@ class Reach(Result):
             notes += [f"{answer.name}: {remark}" for remark in answer.remarks]
         return lines + ["", *notes] if notes else lines
 
-    def data(self) -> dict[str, Any]:
+    def data(self) -> Data:
         """The same as plain data, values in metres or as numbers."""
         goal = self.goal
-        goal_data: dict[str, Any] = {"kind": goal.kind}
+        goal_data: Data = {"kind": goal.kind}
         if goal.kind == "lengths":
             goal_data["share"] = goal.share
         if goal.kind == "quantity":
@@ -105,7 +105,7 @@ class Reach(Result):
             "answers": {answer.name: _answer_data(answer) for answer in self.answers},
         }
 
-    def rows(self) -> list[dict[str, Any]]:
+    def rows(self) -> list[Data]:
         """One row for each unknown."""
         return [{"unknown": answer.name, **_answer_data(answer)} for answer in self.answers]
 
@@ -140,7 +140,7 @@ def _panel(answer: Answer) -> TriedValues:
     return TriedValues(answer.title, unit, factor * values, distances, is_met)
 
 
-def _answer_data(answer: Answer) -> dict[str, Any]:
+def _answer_data(answer: Answer) -> Data:
     return {
         "status": {"varied": "cannot be varied"}.get(answer.status, answer.status),
         "as_drawn": answer.present or None,

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
-from ballplate.presentation import Result
+from ballplate.presentation import Data, Result
 from ballplate.simulator.inputs import ExperimentError, Message
 from ballplate.simulator.machines import Array
 from ballplate.simulator.splines import Powers, SplineError
@@ -54,10 +54,10 @@ class FittedCurve(Result):
     def lines(self) -> list[str]:
         return curve_lines(self.curve, self.file.name, self.powers, self.at)
 
-    def data(self) -> dict[str, Any]:
+    def data(self) -> Data:
         return curve_data(self.curve, str(self.file), self.powers, self.at)
 
-    def rows(self) -> list[dict[str, Any]]:
+    def rows(self) -> list[Data]:
         """One row for each point, in metres and radians."""
         points = self.curve.points
         units = {"x unit": _unit(points.x_column.kind), "y unit": _unit(points.y_column.kind)}

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import io
 import math
-from typing import Any
 
 import numpy as np
 from ballplate.presentation import (
+    Data,
     aligned,
     ascii_units,
     micro,
@@ -212,7 +212,7 @@ def _value_lines(curve: ErrorCurve, places: np.ndarray) -> list[str]:
 
 
 # In one piece: one mapping, in the form in which the JSON has it.
-def curve_data(curve: ErrorCurve, file: str, powers: Powers, places: np.ndarray) -> dict[str, Any]:
+def curve_data(curve: ErrorCurve, file: str, powers: Powers, places: np.ndarray) -> Data:
     """The curve as plain data in metres and radians; what is not known is None."""
     fitted, points, space = curve.fit, curve.points, curve.fit.space
     pieces_found = pieces(fitted, powers)

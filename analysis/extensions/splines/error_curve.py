@@ -293,10 +293,12 @@ def whole_profile(
 def _located(
     points: CurvePoints, settings: CurveSettings
 ) -> tuple[
+    Array,
     tuple[float, float],
     tuple[float, ...],
     tuple[float, ...],
     tuple[Constraint, ...],
+    Array,
     Profile | None,
 ]:
     """Abscissae of points, ends, boundaries, corners and prescribed values, the places among them

@@ -16,7 +16,7 @@ from ballplate.extensions.pages.motions import (
 )
 from ballplate.extensions.repair.written import plane_of
 from ballplate.extensions.sweeps.error_map_uncertainty import point_map
-from ballplate.presentation import finite, picked
+from ballplate.presentation import Data, finite, picked
 from ballplate.rank import Verdict, verdict
 from ballplate.results import length_headline, rank_words, scale_lines, scale_warnings, target_lines
 from ballplate.simulator.computing import single_threaded
@@ -76,7 +76,7 @@ def scale_answer(experiment: Experiment) -> list[str]:
     return [*scale_lines(scale), *scale_warnings(scale)]
 
 
-def _row(quantity: Quantity) -> dict[str, Any]:
+def _row(quantity: Quantity) -> Data:
     return {
         **picked(quantity, "symbol", "description"),
         "maximum": finite(quantity.maximum),
@@ -97,7 +97,7 @@ def _scene(experiment: Experiment) -> dict[str, Any]:
     }
 
 
-def place_data(experiment: Experiment, place: Position) -> dict[str, Any]:
+def place_data(experiment: Experiment, place: Position) -> Data:
     """Return the pose of a position, as plain data in metres."""
     layout = experiment.layouts[place.artefact]
     plane = plane_of(place.pose.rotation)

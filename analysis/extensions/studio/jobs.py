@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from ballplate.presentation import picked
+from ballplate.presentation import Data, picked
 from ballplate.simulator.computing import ProgressStep, Report, begin_worker, interruptions_blocked
 from ballplate.simulator.experiment import lay_out
 from ballplate.simulator.inputs import ExperimentError
@@ -85,7 +85,7 @@ def _fit(document: DesignDocument, settings: Mapping[str, Any], report: Report) 
         file.write_bytes(base64.b64decode(str(settings["content"])))
         observed = read_readings([file], lay_out(experiment), settings=experiment.readings)
     result = fit(experiment, observed)
-    data: dict[str, Any] = {"lines": result.lines(), "notes": list(result.notes)}
+    data: Data = {"lines": result.lines(), "notes": list(result.notes)}
     if result.converged:
         design = result.design
         readings, residuals, standardised = reading_residuals(
@@ -156,7 +156,7 @@ class Job:
         self.connection.close()
         shutil.rmtree(self.folder, ignore_errors=True)
 
-    def to_dict(self, number: int) -> dict[str, Any]:
+    def to_dict(self, number: int) -> Data:
         return {
             "id": number,
             "job": self.name,

@@ -10,7 +10,7 @@ from pathlib import Path
 from threading import RLock
 from typing import Any
 
-from ballplate.presentation import picked
+from ballplate.presentation import Data, picked
 from ballplate.simulator.inputs import OPENED, UNKNOWN, ExperimentError, Message, refused
 
 from .actions import ActionError, done, settings_of
@@ -159,7 +159,7 @@ class Session:
         with self._lock:
             self._ensure_seen(action)
             document = self._document
-        data: dict[str, Any] = self._computed(figures, done(document, action))
+        data: Data = self._computed(figures, done(document, action))
         return data
 
     def scale(self) -> dict[str, Any]:
@@ -398,7 +398,7 @@ def _with_first_variant(document: DesignDocument) -> DesignDocument:
     return replace(document, variant=names[0] if names else None)
 
 
-def _message_data(message: Message) -> dict[str, Any]:
+def _message_data(message: Message) -> Data:
     return {
         **picked(message, "line", "column", "path", "text"),
     }

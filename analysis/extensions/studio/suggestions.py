@@ -12,6 +12,7 @@ from ballplate.extensions.repair.offers import offers
 from ballplate.extensions.repair.repair_search import Repair, repairs
 from ballplate.extensions.repair.repair_tables import caveat, changes_in_words
 from ballplate.extensions.repair.written import Edit, position_settings
+from ballplate.presentation import Data
 from ballplate.results import planned_uncertainty
 from ballplate.simulator.computing import Report, counted, unreported
 from ballplate.simulator.experiment import Experiment, Position
@@ -37,7 +38,7 @@ def suggested_repairs(
     return [_repair_data(experiment, repair) for repair in complete]
 
 
-def _repair_data(experiment: Experiment, repair: Repair) -> dict[str, Any]:
+def _repair_data(experiment: Experiment, repair: Repair) -> Data:
     after = apply_all(repair.changes, experiment)
     before = {position.name: position for position in experiment.positions}
     places = [position for position in after.positions if before.get(position.name) is not position]
@@ -59,7 +60,7 @@ def _expectation(experiment: Experiment) -> tuple[Edit, ...]:
     return (Edit(("expected_rank_deficiency",), 0),) if expected_deficiency else ()
 
 
-def _edit_data(edit: Edit) -> dict[str, Any]:
+def _edit_data(edit: Edit) -> Data:
     return {"path": list(edit.steps), "value": edit.value, "is_new": edit.is_new}
 
 

@@ -7,9 +7,9 @@ from collections.abc import Iterator, Sequence
 from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
-from ballplate.presentation import Result
+from ballplate.presentation import Data, Result
 from ballplate.simulator.computing import Report, unreported
 from ballplate.simulator.inputs import UnusableError, in_one_line
 from filelock import FileLock, Timeout
@@ -100,7 +100,7 @@ class SweepResult(Result):
         table = self.table[shown].to_string(index=False).splitlines()
         return [self.heading, self.headline(), *self.remarks, "", *table]
 
-    def data(self) -> dict[str, Any]:
+    def data(self) -> Data:
         summary = self.summary
         counts = {name: getattr(summary, name) for name in ("cells", "done", "failed", "left")}
         return {
@@ -112,7 +112,7 @@ class SweepResult(Result):
             "rows": self.rows(),
         }
 
-    def rows(self) -> list[dict[str, Any]]:
+    def rows(self) -> list[Data]:
         """Return one mapping per cell, with its axes' values and its results; None for missing
         ones.
         """
