@@ -42,6 +42,11 @@ def add_options(parser: ArgumentParser) -> None:
     )
     group.add_argument("--seed", type=whole, help="seed of the data sets, instead of the file's")
     add_workers(group)
+    parser.add_argument(
+        "--assumptions",
+        action="store_true",
+        help="print all that is taken for granted, U6 without it, and the entries that state it",
+    )
     add_page(parser, "write the design as a page of HTML that needs no other file and no network")
     add_force(parser)
     add_json(parser)
@@ -76,6 +81,8 @@ def run(options: Namespace) -> int:
             _write_page(options, plans[-1])
         if not options.json:
             print_lines([*([""] if len(plans) > 1 else []), *plans[-1].lines()])
+            if options.assumptions and plans[-1].assumptions is not None:
+                print_lines(["", *plans[-1].assumptions.lines()])
         data: Data = plans[-1].to_dict()
         if with_trials:
             from ..montecarlo.comparison_tables import trials_data, trials_lines

@@ -21,6 +21,12 @@ def _from(module: str, *names: str) -> dict[str, str]:
 
 SHIPPED = (
     _here(
+        "assumptions",
+        functions=_from("interface", "assumptions"),
+        services=_from("effects", "assumption_effects"),
+        sections={"assumptions": "sections"},
+    ),
+    _here(
         "requirements",
         commands={
             "reach": Command(

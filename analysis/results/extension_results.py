@@ -27,6 +27,15 @@ class AskedResult(Protocol):
     def to_dict(self) -> Data: ...
 
 
+class PredictedAssumptions(AskedResult, Protocol):
+    """Assumptions of a prediction; `warning` names one that more than doubles U6, if any."""
+
+    @property
+    def warning(self) -> str: ...
+
+    def summary(self) -> list[str]: ...
+
+
 class GroupVariances(AskedResult, Protocol):
     """Estimated variances of `groups` of observations."""
 

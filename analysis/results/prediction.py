@@ -5,12 +5,14 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 from ballplate.presentation.formatting import Data
 from ballplate.simulator.design.arrays import Design
+from ballplate.simulator.inputs.extensions import optional_service
 from ballplate.simulator.inputs.settings import hint, number_of
 
 from ..presentation.formatting import given
@@ -20,7 +22,7 @@ from ..rank.verdicts import Verdict
 from ..uncertainty.scale import Scale
 from ..uncertainty.summaries import Quantity, tasks_of
 from ..uncertainty.tasks import TaskUncertainty
-from .extension_results import SpaceView, picture_in_space, shown_in_space
+from .extension_results import PredictedAssumptions, SpaceView, picture_in_space, shown_in_space
 from .influences import InfluenceUncertainty, influence_data, influence_table
 from .text_blocks import (
     QUANTITY_COLUMNS,
@@ -78,6 +80,20 @@ class Prediction(Result):
     influences: tuple[InfluenceUncertainty, ...] = ()
     experiment: Experiment | None = None
 
+    @cached_property
+    def assumptions(self) -> PredictedAssumptions | None:
+        """What the prediction takes for granted, with U6 without it; None if U6 is undetermined or
+        was not computed, or without the extension.
+        """
+        lengths = self.quantities.get("U6")
+        effects = optional_service("assumption_effects")
+        if lengths is None or effects is None or self.experiment is None:
+            return None
+        if np.isnan(lengths.average):
+            return None
+        found: PredictedAssumptions = effects(self.experiment, lengths)
+        return found
+
     @property
     def tasks(self) -> tuple[TaskUncertainty, ...]:
         """The measuring tasks."""
@@ -86,7 +102,9 @@ class Prediction(Result):
     def headline(self) -> str:
         count = 0 if self.advice is None else len(self.advice.missed)
         missed = [f"{number_of(count, 'goal')} missed"] if count else []
-        return ", ".join([rank_words(self.verdict), *length_headline(self.quantities), *missed])
+        doubled = [] if self.assumptions is None else filter(None, [self.assumptions.warning])
+        lengths = length_headline(self.quantities)
+        return ", ".join([rank_words(self.verdict), *lengths, *doubled, *missed])
 
     def lines(self) -> list[str]:
         lines = [*self.table_lines(), *(() if self.advice is None else self.advice.lines)]
@@ -104,7 +122,8 @@ class Prediction(Result):
         lines += [*map_lines(self.experiment), *scale_lines(self.scale)]
         lines += ["", *uncertainty_table(self.quantities)] if self.quantities else []
         lines += ["", *influence_table(self.influences)] if self.influences else []
-        return lines + ["", *task_table(self.tasks)] if self.tasks else lines
+        lines += ["", *task_table(self.tasks)] if self.tasks else []
+        return lines if self.assumptions is None else [*lines, "", *self.assumptions.summary()]
 
     def data(self) -> Data:
         data = {
@@ -118,6 +137,7 @@ class Prediction(Result):
                 influences=influence_data(self.influences),
             ),
             "scale": scale_data(self.scale),
+            **given(assumptions=self.assumptions and self.assumptions.to_dict()),
             **({} if self.advice is None else self.advice.data),
         }
         if self.monte_carlo is None:

@@ -512,6 +512,21 @@ def parse_uncertainty_function(value: object) -> LengthFunction:
     return parse_length_function(value)
 
 
+def parse_common_part(value: object) -> LengthFunction:
+    """Read the part of standard uncertainties that lengths have in common: a ratio, or as for
+    `parse_length_function`.
+
+    :raises QuantityError: as for `parse_length_function`.
+
+    >>> parse_common_part("0.5 um/m")
+    LengthFunction(constant=0.0, slope=5e-07)
+    """
+    with suppress(QuantityError):
+        parse_ratio(value)
+        return parse_length_function(f"0 um + {value}")
+    return parse_length_function(value)
+
+
 def exact_ratio(value: str) -> Fraction:
     """Read a ratio exactly.
 
@@ -688,6 +703,15 @@ def _pattern(kind: str) -> str:
     return f"^ *{NUMBER} *({'|'.join(_unit_patterns(kind))})$"
 
 
+def _common_part_schema() -> dict[str, Any]:
+    schema = _length_function_schema("0.1 um + 0.5 um/m")
+    return {
+        **schema,
+        "pattern": f"{schema['pattern']}|{_pattern('ratio')}",
+        "examples": ["0.5 um/m", *schema["examples"]],
+    }
+
+
 def _length_function_schema(*examples: str) -> dict[str, Any]:
     constant, ratio = _pattern("length")[1:-1], _pattern("ratio")[1:-1]
     units = f"({'|'.join(_unit_patterns('length'))})"
@@ -722,6 +746,11 @@ UncertaintyFunction = Annotated[
     LengthFunction,
     PlainValidator(parse_uncertainty_function),
     WithJsonSchema(_length_function_schema("0.2 um", "0 um")),
+]
+CommonPart = Annotated[
+    LengthFunction,
+    PlainValidator(parse_common_part),
+    WithJsonSchema(_common_part_schema()),
 ]
 Angle = Annotated[
     float, PlainValidator(parse_angle), _schema("angle", "90 deg", "2 arcsec", "5 urad")

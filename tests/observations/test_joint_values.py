@@ -163,6 +163,54 @@ def test_a_correlation_is_a_covariance(correlated: tuple[Experiment, Real], tmp_
     agree(other, of, dense.spread(stacked(of, lengths, inverse_root(covariance))), 1e-9)
 
 
+@pytest.mark.parametrize("kind", ["distances", "coordinates"])
+@pytest.mark.parametrize(
+    "part", [{"common": "0.5 um/m"}, {"common": "0.1 um + 0.5 um/m"}, {"correlation": 0.9}]
+)
+def test_a_part_in_common_is_that_covariance(
+    tmp_path: Path, kind: str, part: dict[str, Any]
+) -> None:
+    item = {"standard_uncertainty": "0.2 um", **part}
+    item = distances(**item) if kind == "distances" else {"kind": kind, **item}
+    of = problem(written(tmp_path, item))
+    values = lengths if kind == "distances" else coordinates
+    at = values(of, np.zeros(of.parameters))
+    constant = 1e-7 if "+" in str(part.get("common")) else 0.0
+    shared = constant * np.sign(at) + 0.5e-6 * at
+    own, share = 4e-14 * np.ones(len(at)), np.outer(shared, shared)
+    if "correlation" in part:
+        own, share = 0.1 * own, 0.9 * np.full((len(at), len(at)), 4e-14)
+    covariance = np.diag(own) + share
+    spread = dense.spread(stacked(of, values, inverse_root(covariance)))
+    agree(written(tmp_path, item), of, spread, 1e-9)
+
+
+@pytest.mark.parametrize(
+    ("item", "fault"),
+    [
+        (distances(standard_uncertainty="1 um", common="1 um/m", correlation=0.5), "correlation"),
+        (distances(standard_uncertainty="1 um", correlation=1), "correlation"),
+        (distances(standard_uncertainty="1 um", common="-1 um/m"), "common"),
+        (distances(common="1 um/m"), "standard_uncertainty"),
+    ],
+)
+def test_a_wrong_part_in_common_is_refused(
+    tmp_path: Path, item: dict[str, Any], fault: str
+) -> None:
+    with pytest.raises(bp.ExperimentError, match=rf"calibration\[0\]\.{fault}:"):
+        written(tmp_path, item)
+
+
+def test_simulated_certificates_share_the_part_in_common(tmp_path: Path) -> None:
+    """Of lengths with nothing but one common ratio, all differ from nominal by the same ratio."""
+    item = distances(standard_uncertainty="0.0001 um", common="10 um/m")
+    design = lay_out(written(tmp_path, item))
+    joint = design.of(JointValues)
+    errors = joint.errors(np.random.default_rng(3), 400) / joint.value
+    assert np.ptp(errors, axis=1).max() < 1e-8
+    assert errors[:, 0].std() == pytest.approx(1e-5, rel=0.15)
+
+
 @pytest.mark.parametrize("how", ["stated", "table"])
 def test_exact_distances_are_constraints(tmp_path: Path, how: str) -> None:
     if how == "stated":

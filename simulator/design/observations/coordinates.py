@@ -21,9 +21,10 @@ from .balls import BallObservations
 from .calibration import FAR_FROM_DRAWING, MOST_TIED_BALLS, Calibration
 from .certificate_tables import read_rows
 from .stated_values import (
-    CertificateSettings,
+    CommonPartSettings,
     check_keys,
     is_digital,
+    joint_key,
     read_digital,
     uncertainties_of,
 )
@@ -125,7 +126,7 @@ class SomeAxisLengthsSettings(Settings):
     z: LengthUncertainty | None = Field(None, description="along z; omitted: z is not calibrated")
 
 
-class CoordinatesSettings(CertificateSettings):
+class CoordinatesSettings(CommonPartSettings):
     """Calibrated co-ordinates of balls in their artefact's frame."""
 
     kind: Literal["coordinates"] = Field(description="calibrated co-ordinates of balls")
@@ -181,17 +182,25 @@ def read_coordinates(
     names = [(layout.names[ball], axis) for ball in balls for axis in axes]
     of_item = None if of_axes is None else np.tile(of_axes, len(balls))
     uncertainties = uncertainties_of(
-        settings, names, False, of_item, in_file.ravel(), covariance, steps, references
+        settings,
+        names,
+        False,
+        of_item,
+        in_file.ravel(),
+        covariance,
+        values.ravel(),
+        steps,
+        references,
     )
     if uncertainties is None:
         return None
     of_balls = len(np.unique(balls))
     text = (
         f"co-ordinates tie {of_balls} balls together, at most {MOST_TIED_BALLS} are possible; leave"
-        " the covariance out"
+        f" {joint_key(settings)} out"
     )
     if uncertainties.root is not None and not references.require(
-        of_balls <= MOST_TIED_BALLS, (*steps, "covariance"), text
+        of_balls <= MOST_TIED_BALLS, (*steps, joint_key(settings)), text
     ):
         return None
     is_common = of_axes is not None and uncertainties.root is None

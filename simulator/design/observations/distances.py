@@ -22,10 +22,11 @@ from .calibration import FAR_FROM_DRAWING, MOST_TIED_BALLS, Calibration, far_fro
 from .certificate_tables import read_rows
 from .stated_values import (
     CertificateEntry,
-    CertificateSettings,
+    CommonPartSettings,
     FileValues,
     check_keys,
     is_digital,
+    joint_key,
     read_digital,
     uncertainties_of,
 )
@@ -134,7 +135,7 @@ class CertifiedDistance(Settings):
 CertifiedDistances = NonEmpty[CertifiedDistance]
 
 
-class DistancesSettings(CertificateSettings):
+class DistancesSettings(CommonPartSettings):
     """Calibrated distances between balls of an artefact."""
 
     kind: Literal["distances"] = Field(description="calibrated distances between balls")
@@ -210,16 +211,16 @@ def read_distances(
     uncertainty = settings.standard_uncertainty
     of_item = None if uncertainty is None else uncertainty.at(nominal)
     uncertainties = uncertainties_of(
-        settings, names, True, of_item, in_file, covariance, steps, references
+        settings, names, True, of_item, in_file, covariance, nominal, steps, references
     )
     if uncertainties is None:
         return None
     if uncertainties.root is not None and references.artefacts[artefact].role == "length_standard":
         text = (
-            "a length standard's lengths are read as independent; leave the covariance out, or give"
+            "a length standard's lengths are read as independent; leave this out, or give"
             f' "{artefact}" the role of a plate'
         )
-        references.problems.add((*steps, "covariance"), text)
+        references.problems.add((*steps, joint_key(settings)), text)
         return None
     indices.setflags(write=False)
     return DistanceCalibration(

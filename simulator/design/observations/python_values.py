@@ -199,7 +199,15 @@ def read_python_values(
     if stated_uncertainty is not None and np.isnan(stated_uncertainty).any():
         return None
     uncertainties = uncertainties_of(
-        settings, functions.names, False, stated_uncertainty, in_file, covariance, steps, references
+        settings,
+        functions.names,
+        False,
+        stated_uncertainty,
+        in_file,
+        covariance,
+        values,
+        steps,
+        references,
     )
     if uncertainties is None:
         return None

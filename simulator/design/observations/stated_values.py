@@ -8,13 +8,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 from pydantic import Field
 
 from ...inputs.extensions import optional_service
 from ...inputs.messages import ExperimentError, Message, Steps
+from ...inputs.quantities import CommonPart
 from ...inputs.settings import Settings, Text, hint, listing, shorten
 from ...inputs.yamltree import Mark
 from ...machines.protocol import Array, Integers
@@ -24,6 +25,10 @@ from .whitening import CovarianceRoot, IndefiniteError, covariance_root
 
 # An uncertainty and the variance beside it agree to their last digits, this being a generous share.
 AGREE = 0.02
+
+# Keys of an item that state how its values are correlated.
+JOINT_KEYS = ("covariance", "common", "correlation")
+OWN_COVARIANCE = "is for values that are no DCC, which has its own covariance"
 
 
 class CertificateSettings(Settings):
@@ -41,6 +46,21 @@ class CertificateSettings(Settings):
     )
     coverage_factor: float | None = Field(
         None, gt=0, description="k of the expanded uncertainties of a CSV file without a column k"
+    )
+
+
+class CommonPartSettings(CertificateSettings):
+    """Keys of an item of lengths, whose uncertainties may have a part in common."""
+
+    common: CommonPart | None = Field(
+        None,
+        description=(
+            "standard uncertainty that all values have in common, beside that of each, such as"
+            " 0.5 um/m of one wavelength and one temperature; of co-ordinates it grows from 0"
+        ),
+    )
+    correlation: Annotated[float, Field(ge=0, lt=1)] | None = Field(
+        None, description="correlation of every two values' errors, in place of common"
     )
 
 
@@ -90,12 +110,24 @@ def check_keys(settings: Any, steps: Steps, references: References) -> bool:
     for key, fits, instead in (
         ("result", digital, "goes with values in a DCC (XML)"),
         ("coverage_factor", of_file and not digital, "goes with values in a CSV file"),
-        ("covariance", not digital, "is for values that are no DCC, which has its own"),
+        ("covariance", not digital, OWN_COVARIANCE),
+        ("common", not digital, OWN_COVARIANCE),
+        ("correlation", not digital, OWN_COVARIANCE),
     ):
-        if getattr(settings, key) is not None and not fits:
+        if getattr(settings, key, None) is not None and not fits:
             references.problems.add((*steps, key), f"{instead}; remove it", of_key=True)
             is_right = False
+    joint = [key for key in JOINT_KEYS if getattr(settings, key, None) is not None]
+    for key in joint[1:]:
+        text = f"{joint[0]} states how values are correlated already; remove one of the two"
+        references.problems.add((*steps, key), text, of_key=True)
+        is_right = False
     return is_right
+
+
+def joint_key(settings: Any) -> str:
+    """Return the key of an item that states how its values are correlated, or "values"."""
+    return next((key for key in JOINT_KEYS if getattr(settings, key, None) is not None), "values")
 
 
 def value_name(names: tuple[str, str], is_pair: bool) -> str:
@@ -110,11 +142,15 @@ def uncertainties_of(
     stated_uncertainty: Array | None,
     uncertainties_read: Array,
     covariance: tuple[Array, Array] | None,
+    lengths: Array,
     steps: Steps,
     references: References,
 ) -> Uncertainties | None:
     """Return uncertainties of values with `names`: those stated (m,) with the item, or those read
     (m,) from its file, and those of a covariance; or report faults.
+
+    A part that they have in common is that at the nominal `lengths` (m,), with signs for
+    co-ordinates.
     """
     problems, path = references.problems, (*steps, "standard_uncertainty")
     in_file = not np.isnan(uncertainties_read).any()
@@ -147,11 +183,13 @@ def uncertainties_of(
         text = 'missing; add "standard_uncertainty", or values with their uncertainties'
         problems.add(path, text)
         return None
+    place = (*steps, joint_key(settings))
     if matrix is None:
-        return Uncertainties(
-            _frozen(uncertainties_read if stated_uncertainty is None else stated_uncertainty)
-        )
-    place = (*steps, "covariance") if settings.covariance is not None else (*steps, "values")
+        of_values = uncertainties_read if stated_uncertainty is None else stated_uncertainty
+        common = _common(settings, of_values, lengths)
+        if common is None:
+            return Uncertainties(_frozen(of_values))
+        matrix = common, np.zeros_like(common)
     size = np.sqrt(np.diag(matrix[0]))
     if in_file and not is_correlation:
         wrong = np.flatnonzero(
@@ -174,6 +212,22 @@ def uncertainties_of(
         )
         return None
     return Uncertainties(_frozen(size), root)
+
+
+def _common(settings: Any, of_values: Array, lengths: Array) -> Array | None:
+    """Return the covariance (m, m) of values that have a part of their errors in common, or None
+    if an item states none.
+    """
+    if not isinstance(settings, CommonPartSettings):
+        return None
+    if settings.correlation is not None:
+        own, common = (1.0 - settings.correlation) * of_values**2, of_values
+        return np.asarray(np.diag(own) + settings.correlation * np.outer(common, common))
+    if settings.common is None:
+        return None
+    # Co-ordinates on both sides of the origin move apart.
+    common = settings.common.at(np.abs(lengths)) * np.sign(lengths)
+    return np.asarray(np.diag(of_values**2) + np.outer(common, common))
 
 
 def _disagreement(

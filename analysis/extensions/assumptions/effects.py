@@ -1,0 +1,232 @@
+"""What U6 becomes where an assumption of a prediction does not hold."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import yaml
+from ballplate.presentation import Columns, Result, aligned, given, number, picked
+from ballplate.simulator.computing import single_threaded
+from ballplate.simulator.design import Design, State
+from ballplate.simulator.estimation import corrected_points, estimate, linearise
+from ballplate.simulator.experiment import Experiment, lay_out
+from ballplate.simulator.inputs import ExperimentError
+from ballplate.simulator.machines import Array
+from ballplate.simulator.readings import simulated_readings
+from ballplate.uncertainty import Quantity, evaluation_points, uncertainties
+
+from .assumed import Assumption, assumptions_of
+
+# Rows that a prediction shows, and the ratio of U6 from which its headline names the first.
+SHOWN_ROWS = 3
+LARGE = 2.0
+
+# Points between which systematic errors of lengths are computed.
+MOST_POINTS = 100
+
+
+class _WithoutAliases(yaml.SafeDumper):
+    def ignore_aliases(self, data: Any) -> bool:
+        return True
+
+
+@dataclass(frozen=True)
+class AssumptionEffect:
+    """An assumption with the average and the maximum of U6 without it, standard uncertainties in
+    metres, and the number of distances that are then `undetermined`.
+
+    `bias` of a systematic one is the root mean square and the largest error of lengths in metres,
+    with which `average` and `maximum` are combined. `ratio` is that of the average to the present
+    one.
+    """
+
+    assumption: Assumption
+    average: float
+    maximum: float
+    undetermined: int
+    ratio: float
+    bias: tuple[float, float] | None = None
+
+    @property
+    def entries(self) -> str:
+        """The entries of the file that state it, as YAML; each replaces that of its key."""
+        return yaml.dump(
+            dict(self.assumption.changes),
+            Dumper=_WithoutAliases,
+            sort_keys=False,
+            default_flow_style=None,
+            allow_unicode=True,
+            width=100,
+        )
+
+
+@dataclass(frozen=True, repr=False)
+class Assumptions(Result):
+    """Assumptions of a prediction with their effects on U6, largest first.
+
+    `average` and `maximum` are those of the prediction in metres; `left_out` are names of
+    assumptions without a result and the reasons.
+    """
+
+    label: str
+    title: str
+    average: float
+    maximum: float
+    effects: tuple[AssumptionEffect, ...]
+    left_out: tuple[tuple[str, str], ...] = ()
+
+    def headline(self) -> str:
+        if not self.effects:
+            return "no assumptions"
+        effect = self.effects[0]
+        times = number(effect.ratio, 2)
+        return f"assumed: {effect.assumption.assumed}; otherwise U6 is {times} times as large"
+
+    @property
+    def warning(self) -> str:
+        """The first assumption, if it more than doubles U6; otherwise empty."""
+        return self.headline() if self.effects and self.effects[0].ratio > LARGE else ""
+
+    def summary(self) -> list[str]:
+        """Return the first rows as lines of text."""
+        more = len(self.effects) - SHOWN_ROWS
+        further = [f"{more} further: --assumptions"] if more > 0 else []
+        return [*self._table(self.effects[:SHOWN_ROWS]), *further]
+
+    def lines(self) -> list[str]:
+        lines = [self.heading, *self._table(self.effects)]
+        for name, reason in self.left_out:
+            lines.append(f"{name}: not computed, {reason}")
+        for effect in self.effects:
+            assumption = effect.assumption
+            lines += ["", f"{assumption.name}: {assumption.instead} ({assumption.source})"]
+            lines += [f"  {line}" for line in effect.entries.splitlines()]
+        return lines
+
+    def _table(self, effects: Sequence[AssumptionEffect]) -> list[str]:
+        rows = [["assumed", "if instead", "U6 average, µm", "U6 maximum, µm", "times"]]
+        rows.append(["all of these", "", *_micrometres(self.average, self.maximum), "1"])
+        for effect in effects:
+            assumption = effect.assumption
+            values = _micrometres(effect.average, effect.maximum)
+            rows.append([assumption.assumed, assumption.instead, *values, number(effect.ratio, 3)])
+        return aligned(rows, [False, False, True, True, True])
+
+    def columns(self) -> tuple[Columns, Sequence[Any]]:
+        """Columns with one row per assumption."""
+        columns: Columns = {
+            "assumption": "assumption.name",
+            "assumed": "assumption.assumed",
+            "instead": "assumption.instead",
+            "U6 average, µm": "average",
+            "U6 maximum, µm": "maximum",
+            "undetermined": "undetermined",
+            "ratio": "ratio",
+            "entries": "entries",
+            "unit": ["m"] * len(self.effects),
+        }
+        return columns, self.effects
+
+    def data(self) -> dict[str, Any]:
+        return {
+            **self.named,
+            **picked(self, "average", "maximum"),
+            "unit": "m",
+            "assumptions": [_data(effect) for effect in self.effects],
+            "left_out": [{"assumption": name, "reason": why} for name, why in self.left_out],
+        }
+
+
+def _data(effect: AssumptionEffect) -> dict[str, Any]:
+    bias = None
+    if effect.bias is not None:
+        bias = dict(zip(("average", "maximum"), effect.bias, strict=True))
+    return {
+        "assumption": effect.assumption.name,
+        **picked(effect.assumption, "assumed", "instead", "source", "changes"),
+        **picked(effect, "average", "maximum", "undetermined", "ratio"),
+        **given(bias=bias),
+    }
+
+
+def _micrometres(*values: float) -> list[str]:
+    return ["undetermined" if np.isnan(value) else number(1e6 * value, 3) for value in values]
+
+
+def predicted_assumptions(experiment: Experiment) -> Assumptions:
+    """Return the effects of all assumptions of an experiment on the U6 of its design.
+
+    :raises ValueError: U6 is undetermined, or has no two evaluation points.
+    """
+    lengths = uncertainties(linearise(lay_out(experiment)), symbols=("U6",)).get("U6")
+    if lengths is None or np.isnan(lengths.average):
+        raise ValueError("U6 is undetermined, or has no two evaluation points; mend the design")
+    return assumption_effects(experiment, lengths)
+
+
+@single_threaded
+def assumption_effects(experiment: Experiment, lengths: Quantity) -> Assumptions:
+    """Return the effects of all assumptions of a prediction on its U6, `lengths`."""
+    effects, left_out = [], []
+    for assumption in assumptions_of(experiment):
+        try:
+            effects.append(_effect(experiment, assumption, lengths))
+        except ExperimentError as error:
+            left_out.append((assumption.name, error.messages[0].text))
+    # Undetermined distances cost more than any uncertainty.
+    effects.sort(key=lambda effect: (effect.undetermined, effect.ratio), reverse=True)
+    return Assumptions(
+        experiment.label,
+        experiment.title,
+        lengths.average,
+        lengths.maximum,
+        tuple(effects),
+        tuple(left_out),
+    )
+
+
+def _effect(experiment: Experiment, assumption: Assumption, lengths: Quantity) -> AssumptionEffect:
+    """Return the effect of an assumption.
+
+    :raises ExperimentError: the experiment cannot be changed so.
+    """
+    changed = experiment.with_(assumption.changes)
+    if assumption.is_systematic:
+        bias = _bias(experiment, changed)
+        average, maximum = (
+            float(np.hypot(value, part))
+            for value, part in zip((lengths.average, lengths.maximum), bias, strict=True)
+        )
+        ratio = average / lengths.average
+        return AssumptionEffect(assumption, average, maximum, lengths.undetermined, ratio, bias)
+    found = uncertainties(linearise(lay_out(changed)), symbols=("U6",))["U6"]
+    return AssumptionEffect(
+        assumption,
+        found.average,
+        found.maximum,
+        found.undetermined,
+        found.average / lengths.average,
+    )
+
+
+def _bias(experiment: Experiment, changed: Experiment) -> tuple[float, float]:
+    """Return the root mean square and the largest error of lengths between corrected points where
+    error-free readings of the `changed` experiment's machine are evaluated.
+    """
+    read, design = simulated_readings(changed, exact=True), lay_out(experiment)
+    solution = estimate(design, read.x)
+    errors = _lengths(design, solution.state) - _lengths(read.design, read.truth)
+    return float(np.sqrt((errors**2).mean())), float(np.abs(errors).max())
+
+
+def _lengths(design: Design, state: State) -> Array:
+    """Return the distances between corrected evaluation points, evenly chosen ones of many."""
+    places = evaluation_points(design)
+    count = len(places.points)
+    some = np.unique(np.linspace(0, count - 1, min(count, MOST_POINTS)).round().astype(int))
+    points = corrected_points(design, state, places.points[some], places.probes[some])
+    first, second = np.triu_indices(len(points), 1)
+    return np.asarray(np.linalg.norm(points[first] - points[second], axis=1))
