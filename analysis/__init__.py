@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     )
     from ballplate.arguments import load, load_all
     from ballplate.estimators.estimator_choice import ESTIMATORS
+    from ballplate.extensions.assumptions.interface import assumptions
     from ballplate.extensions.campaign.interface import sheet
     from ballplate.extensions.certificates.interface import certificate
     from ballplate.extensions.compensation.interface import compensation, read_compensation
@@ -118,6 +119,7 @@ __all__ = [
     "Target",
     "Trust",
     "adjust",
+    "assumptions",
     "budget",
     "certificate",
     "check",

@@ -140,8 +140,9 @@ def run(
     At most `trials` data sets are estimated, or as many as give ratios of spread to uncertainty as
     accurate as `until`.
 
-    >>> run(quickstart())
-    <Prediction of quickstart: full rank, U6 0.143 µm on average, 0.325 µm at most>
+    >>> print(*run(quickstart()).headline().split(", assumed: "), sep=chr(10))
+    full rank, U6 0.143 µm on average, 0.325 µm at most
+    chain of axes MB2; otherwise U6 is 11 times as large
     """
     from dataclasses import replace
 

@@ -24,7 +24,15 @@ if TYPE_CHECKING:
         function_name,
         linear_functions,
     )
-    from .gauss_newton import Solution, Status, as_drawn, estimate, linearised_fit
+    from .gauss_newton import (
+        Solution,
+        Status,
+        as_drawn,
+        estimate,
+        linearised_fit,
+        moved,
+        newton_step,
+    )
     from .initial import initial_state
     from .linearisation import LinearFunctions, Linearisation, linearise
     from .spheres import FEWEST_POINTS, FLAT, SphereFit, closest_sphere, fit_sphere

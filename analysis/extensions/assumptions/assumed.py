@@ -25,7 +25,7 @@ EXCHANGED = {
 
 
 @dataclass(frozen=True)
-class Assumption:
+class PredictionAssumption:
     """What an experiment takes for granted, in words, and what may hold `instead`, with its
     `source`.
 
@@ -41,7 +41,7 @@ class Assumption:
     is_systematic: bool = False
 
 
-def assumptions_of(experiment: Experiment) -> list[Assumption]:
+def assumptions_of(experiment: Experiment) -> list[PredictionAssumption]:
     """Return the assumptions that an experiment makes."""
     stated = _section(experiment, "assumptions") or {}
     found = (find(experiment, stated) for find in _FINDERS)
@@ -54,7 +54,7 @@ def _section(experiment: Experiment, key: str) -> Any:
     return None if node is None else to_python(node)
 
 
-def _tips(experiment: Experiment, stated: Mapping[str, Any]) -> Assumption | None:
+def _tips(experiment: Experiment, stated: Mapping[str, Any]) -> PredictionAssumption | None:
     u = stated.get("tips", "0.5 um")
     in_stars = {name for star in experiment.stars for name in star.probes}
     before = _section(experiment, "probes") or {}
@@ -68,12 +68,12 @@ def _tips(experiment: Experiment, stated: Mapping[str, Any]) -> Assumption | Non
     if len(probes) < 2 or probes == before:
         return None
     source = "qualification of styli on a reference sphere"
-    return Assumption(
+    return PredictionAssumption(
         "tips", "offsets of tips exact", f"known to {u} each", source, {"probes": probes}
     )
 
 
-def _certificates(experiment: Experiment, stated: Mapping[str, Any]) -> Assumption | None:
+def _certificates(experiment: Experiment, stated: Mapping[str, Any]) -> PredictionAssumption | None:
     items = _section(experiment, "calibration") or []
     changed = []
     used = list(experiment.calibration)
@@ -93,7 +93,7 @@ def _certificates(experiment: Experiment, stated: Mapping[str, Any]) -> Assumpti
             for new in differing
         }
     )
-    return Assumption(
+    return PredictionAssumption(
         "certificates",
         "values of a certificate independent",
         ", ".join(parts),
@@ -137,7 +137,7 @@ def _influence(experiment: Experiment, *added: dict[str, Any]) -> dict[str, Any]
     return None if kinds & {entry["kind"] for entry in added} else {"influences": [*before, *added]}
 
 
-def _temperature(experiment: Experiment, stated: Mapping[str, Any]) -> Assumption | None:
+def _temperature(experiment: Experiment, stated: Mapping[str, Any]) -> PredictionAssumption | None:
     u = stated.get("temperature", "0.1 K")
     measured = {"value": "20 degC", "standard_uncertainty": u, "sensor_uncertainty": u}
     expansion = {"value": STEEL, "standard_uncertainty": "0 um/m/K"}
@@ -151,7 +151,7 @@ def _temperature(experiment: Experiment, stated: Mapping[str, Any]) -> Assumptio
     changes = _influence(experiment, added)
     if changes is None:
         return None
-    return Assumption(
+    return PredictionAssumption(
         "temperature",
         "artefacts and scales at 20 degC",
         f"each known to {u} in all positions, and to {u} in each",
@@ -160,7 +160,7 @@ def _temperature(experiment: Experiment, stated: Mapping[str, Any]) -> Assumptio
     )
 
 
-def _sag(experiment: Experiment, stated: Mapping[str, Any]) -> Assumption | None:
+def _sag(experiment: Experiment, stated: Mapping[str, Any]) -> PredictionAssumption | None:
     u = stated.get("sag", "0.3 um")
     plates = [name for name, entry in experiment.artefacts.items() if entry.role == "plate"]
     added = [{"kind": "sag", "artefact": name, "standard_uncertainty": u} for name in plates]
@@ -168,34 +168,36 @@ def _sag(experiment: Experiment, stated: Mapping[str, Any]) -> Assumption | None
     if changes is None:
         return None
     source = "a steel plate of half a metre on three supports"
-    return Assumption("sag", "plates rigid", f"largest sag known to {u}", source, changes)
+    return PredictionAssumption("sag", "plates rigid", f"largest sag known to {u}", source, changes)
 
 
-def _drift(experiment: Experiment, stated: Mapping[str, Any]) -> Assumption | None:
+def _drift(experiment: Experiment, stated: Mapping[str, Any]) -> PredictionAssumption | None:
     u = stated.get("drift", "0.3 um/h")
     changes = _influence(experiment, {"kind": "drift", "axes": {"standard_uncertainty": u}})
     if changes is None:
         return None
     source = "test of environmental drift, ISO 230-3"
-    return Assumption("drift", "no drift", f"of each axis known to {u}", source, changes)
+    return PredictionAssumption("drift", "no drift", f"of each axis known to {u}", source, changes)
 
 
-def _reindexing(experiment: Experiment, stated: Mapping[str, Any]) -> Assumption | None:
+def _reindexing(experiment: Experiment, stated: Mapping[str, Any]) -> PredictionAssumption | None:
     u = stated.get("reindexing", "0.3 um")
     added = {"kind": "re-indexing", "standard_uncertainty": u}
     changes = _influence(experiment, added)
     if changes is None or _section(experiment, "head") is None:
         return None
     source = "data sheets of indexing heads"
-    return Assumption("re-indexing", "a head without error", f"{u} each time", source, changes)
+    return PredictionAssumption(
+        "re-indexing", "a head without error", f"{u} each time", source, changes
+    )
 
 
-def _scatter(experiment: Experiment, stated: Mapping[str, Any]) -> Assumption | None:
+def _scatter(experiment: Experiment, stated: Mapping[str, Any]) -> PredictionAssumption | None:
     factor = float(stated.get("scatter", 1.5))
     machine = _section(experiment, "machine")
     values = [length_text(factor * value) for value in experiment.machine.repeatability.tolist()]
     repeatability = values if len(set(values)) > 1 else values[0]
-    return Assumption(
+    return PredictionAssumption(
         "scatter",
         "readings scatter by the repeatability alone",
         f"by {factor:g} times as much",
@@ -204,13 +206,13 @@ def _scatter(experiment: Experiment, stated: Mapping[str, Any]) -> Assumption | 
     )
 
 
-def _degrees(experiment: Experiment, _: Mapping[str, Any]) -> Assumption | None:
+def _degrees(experiment: Experiment, _: Mapping[str, Any]) -> PredictionAssumption | None:
     model = _section(experiment, "error_model")
     counts = {key: model.get(key) for key in ("position_coefficients", "rotation_coefficients")}
     if not all(isinstance(count, int) for count in counts.values()):
         return None
     richer = {**model, **{key: count + 1 for key, count in counts.items()}}
-    return Assumption(
+    return PredictionAssumption(
         "model",
         "the error model has all terms",
         "one more coefficient of each error",
@@ -219,7 +221,7 @@ def _degrees(experiment: Experiment, _: Mapping[str, Any]) -> Assumption | None:
     )
 
 
-def _chain(experiment: Experiment, _: Mapping[str, Any]) -> Assumption | None:
+def _chain(experiment: Experiment, _: Mapping[str, Any]) -> PredictionAssumption | None:
     model = _section(experiment, "error_model")
     arrangement = str(getattr(experiment.error_model, "arrangement", None))
     if arrangement not in EXCHANGED:
@@ -228,7 +230,7 @@ def _chain(experiment: Experiment, _: Mapping[str, Any]) -> Assumption | None:
     machine = _section(experiment, "true_machine") or {}
     if machine.get("kind") != "random":
         machine = {"kind": "random", "position": "2 um", "rotation": "4 urad", "seed": 1}
-    return Assumption(
+    return PredictionAssumption(
         "chain",
         f"chain of axes {arrangement}",
         f"{other}, evaluated as {arrangement}",
@@ -238,7 +240,7 @@ def _chain(experiment: Experiment, _: Mapping[str, Any]) -> Assumption | None:
     )
 
 
-_FINDERS: tuple[Callable[[Experiment, Mapping[str, Any]], Assumption | None], ...] = (
+_FINDERS: tuple[Callable[[Experiment, Mapping[str, Any]], PredictionAssumption | None], ...] = (
     _tips,
     _certificates,
     _temperature,

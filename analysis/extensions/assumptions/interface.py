@@ -19,7 +19,7 @@ def assumptions(experiment: Experiment | PathLike) -> Assumptions:
 
     >>> import ballplate as bp
     >>> [effect.assumption.name for effect in bp.assumptions(bp.quickstart()).effects[:2]]
-    ['temperature', 'scatter']
+    ['chain', 'temperature']
     """
     from .effects import predicted_assumptions
 
