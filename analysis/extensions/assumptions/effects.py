@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -12,7 +12,7 @@ from ballplate.presentation import Columns, Result, aligned, given, number, pick
 from ballplate.simulator.computing import single_threaded
 from ballplate.simulator.design import Design, State
 from ballplate.simulator.estimation import corrected_points, linearise, moved, newton_step
-from ballplate.simulator.experiment import Experiment, lay_out
+from ballplate.simulator.experiment import Experiment, lay_out, placed_only
 from ballplate.simulator.inputs import ExperimentError
 from ballplate.simulator.machines import Array
 from ballplate.simulator.readings import simulated_readings
@@ -195,7 +195,7 @@ def _effect(
 
     :raises ExperimentError: the experiment cannot be changed so.
     """
-    changed = experiment.with_(assumption.changes)
+    changed = _with_choice(experiment, experiment.with_(assumption.changes))
     if assumption.is_systematic:
         bias = _bias(experiment, changed)
         average, maximum = (
@@ -212,6 +212,16 @@ def _effect(
         found.undetermined,
         found.average / lengths.average,
     )
+
+
+def _with_choice(experiment: Experiment, changed: Experiment) -> Experiment:
+    """Return a changed experiment with the positions and the calibration that a plan chose."""
+    names = [[position.name for position in each.positions] for each in (experiment, changed)]
+    if names[0] == names[1] and changed.pool is None:
+        return changed
+    placed = placed_only(replace(changed, positions=experiment.positions))
+    bought = experiment.calibration[len(placed.calibration) :]
+    return replace(placed, calibration=(*placed.calibration, *bought))
 
 
 def _bias(experiment: Experiment, changed: Experiment) -> tuple[float, float]:

@@ -87,6 +87,25 @@ def test_rows_of_designs_that_determine_some_lengths(tmp_path: Path) -> None:
     assert rows > 8
 
 
+def test_a_plan_has_the_table_of_its_choice(tmp_path: Path) -> None:
+    corners = {"x": ["50 mm"], "y": ["50 mm"]}
+    places = {"planes": ["z"], "levels": ["100 mm", "400 mm"], "corners": corners}
+    better = {"kind": "distances", "pairs": "corner diagonals", "standard_uncertainty": "0.1 um"}
+    pool = {
+        "candidates": [places | {"probes": ["down"]}],
+        "calibration": [better | {"name": "diagonals", "price": "1 min"}],
+    }
+    plan = bp.plan(bp.experiment(small_sections(pool=pool)), hours=20)
+    assert len(plan.chosen) > 7
+    chosen = tmp_path / "chosen.yaml"
+    chosen.write_text(plan.to_yaml(tmp_path), encoding="utf-8")
+    planned, own = (by_name(each) for each in (plan.prediction.assumptions, bp.assumptions(chosen)))
+    assert planned.keys() == own.keys()
+    # What is bought stays as it is offered; the file has it among its own.
+    for name in set(own) - {"certificates"}:
+        assert planned[name].average == pytest.approx(own[name].average, rel=1e-9), name
+
+
 def by_name(table: Assumptions) -> dict[str, Any]:
     return {effect.assumption.name: effect for effect in table.effects}
 
