@@ -101,10 +101,17 @@ def hint(word: str, choices: Iterable[str]) -> str:
 
 
 def nearest(word: str, choices: Iterable[str]) -> str | None:
-    """Return the nearest known word, or None."""
+    """Return the nearest known word, or None.
+
+    >>> nearest("--exprot", ["--report", "--export"])
+    '--export'
+    """
     folded = {candidate.casefold(): candidate for candidate in reversed(list(choices))}
     # Comparing longer words would take long, and none is a typing error.
-    matches = difflib.get_close_matches(word.casefold(), folded, n=1) if len(word) <= 100 else []
+    typed = word.casefold()
+    matches = difflib.get_close_matches(typed, folded) if len(word) <= 100 else []
+    # Letters that are exchanged are the most frequent mistake.
+    matches.sort(key=lambda match: sorted(match) != sorted(typed))
     return folded[matches[0]] if matches else None
 
 

@@ -69,7 +69,7 @@ def _tips(experiment: Experiment, stated: Mapping[str, Any]) -> PredictionAssump
         return None
     source = "qualification of styli on a reference sphere"
     return PredictionAssumption(
-        "tips", "offsets of tips exact", f"known to {u} each", source, {"probes": probes}
+        "tips", "exact offsets of tips", f"known to {u} each", source, {"probes": probes}
     )
 
 
@@ -95,7 +95,7 @@ def _certificates(experiment: Experiment, stated: Mapping[str, Any]) -> Predicti
     )
     return PredictionAssumption(
         "certificates",
-        "values of a certificate independent",
+        "independent values of certificates",
         ", ".join(parts),
         "one wavelength, one temperature for all values",
         {"calibration": changed},
@@ -153,8 +153,8 @@ def _temperature(experiment: Experiment, stated: Mapping[str, Any]) -> Predictio
         return None
     return PredictionAssumption(
         "temperature",
-        "artefacts and scales at 20 degC",
-        f"each known to {u} in all positions, and to {u} in each",
+        "temperatures exactly known",
+        f"known to {u}, in all positions alike and in each",
         "thermometers of a measuring room; both of steel",
         changes,
     )
@@ -168,7 +168,7 @@ def _sag(experiment: Experiment, stated: Mapping[str, Any]) -> PredictionAssumpt
     if changes is None:
         return None
     source = "a steel plate of half a metre on three supports"
-    return PredictionAssumption("sag", "plates rigid", f"largest sag known to {u}", source, changes)
+    return PredictionAssumption("sag", "rigid plates", f"largest sag known to {u}", source, changes)
 
 
 def _drift(experiment: Experiment, stated: Mapping[str, Any]) -> PredictionAssumption | None:
@@ -177,7 +177,9 @@ def _drift(experiment: Experiment, stated: Mapping[str, Any]) -> PredictionAssum
     if changes is None:
         return None
     source = "test of environmental drift, ISO 230-3"
-    return PredictionAssumption("drift", "no drift", f"of each axis known to {u}", source, changes)
+    return PredictionAssumption(
+        "drift", "no drift", f"known to {u} along each axis", source, changes
+    )
 
 
 def _reindexing(experiment: Experiment, stated: Mapping[str, Any]) -> PredictionAssumption | None:
@@ -188,7 +190,7 @@ def _reindexing(experiment: Experiment, stated: Mapping[str, Any]) -> Prediction
         return None
     source = "data sheets of indexing heads"
     return PredictionAssumption(
-        "re-indexing", "a head without error", f"{u} each time", source, changes
+        "re-indexing", "exact re-indexing", f"known to {u} each time", source, changes
     )
 
 
@@ -199,8 +201,8 @@ def _scatter(experiment: Experiment, stated: Mapping[str, Any]) -> PredictionAss
     repeatability = values if len(set(values)) > 1 else values[0]
     return PredictionAssumption(
         "scatter",
-        "readings scatter by the repeatability alone",
-        f"by {factor:g} times as much",
+        "repeatability of the data sheet",
+        f"{factor:g} times as large",
         "readings of other days and other probing",
         {"machine": {**machine, "repeatability": repeatability}},
     )
@@ -214,7 +216,7 @@ def _degrees(experiment: Experiment, _: Mapping[str, Any]) -> PredictionAssumpti
     richer = {**model, **{key: count + 1 for key, count in counts.items()}}
     return PredictionAssumption(
         "model",
-        "the error model has all terms",
+        "no further terms of the error model",
         "one more coefficient of each error",
         "one degree more",
         {"error_model": richer},
@@ -230,10 +232,12 @@ def _chain(experiment: Experiment, _: Mapping[str, Any]) -> PredictionAssumption
     machine = _section(experiment, "true_machine") or {}
     if machine.get("kind") != "random":
         machine = {"kind": "random", "position": "2 um", "rotation": "4 urad", "seed": 1}
+    # A model of its own would not have the other chain.
+    machine = {key: value for key, value in machine.items() if key != "error_model"}
     return PredictionAssumption(
         "chain",
         f"chain of axes {arrangement}",
-        f"{other}, evaluated as {arrangement}",
+        other,
         "the random errors of true_machine",
         {"error_model": {**model, "arrangement": other}, "true_machine": machine},
         is_systematic=True,

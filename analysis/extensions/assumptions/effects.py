@@ -11,10 +11,10 @@ import yaml
 from ballplate.presentation import Columns, Result, aligned, given, number, picked
 from ballplate.simulator.computing import single_threaded
 from ballplate.simulator.design import Design, State
-from ballplate.simulator.estimation import corrected_points, linearise, moved, newton_step
+from ballplate.simulator.estimation import linearise, moved, newton_step
 from ballplate.simulator.experiment import Experiment, lay_out, placed_only
 from ballplate.simulator.inputs import ExperimentError
-from ballplate.simulator.machines import Array
+from ballplate.simulator.machines import Array, ErrorModel
 from ballplate.simulator.readings import simulated_readings
 from ballplate.uncertainty import Quantity, evaluation_points, uncertainties
 
@@ -107,7 +107,7 @@ class Assumptions(Result):
         return lines
 
     def _table(self, effects: Sequence[AssumptionEffect]) -> list[str]:
-        rows = [["assumed", "if instead", "U6 average, µm", "U6 maximum, µm", "times"]]
+        rows = [["assumed", "U6 in µm if instead", "average", "maximum", "times"]]
         rows.append(["all of these", "", *_micrometres(self.average, self.maximum), "1"])
         for effect in effects:
             assumption = effect.assumption
@@ -233,15 +233,18 @@ def _bias(experiment: Experiment, changed: Experiment) -> tuple[float, float]:
     at = linearise(design, x=read.x)
     shared, balls = newton_step(design, at.factor, at.spectrum)
     state = moved(at.state, at.layout, shared, balls)
-    errors = _lengths(design, state) - _lengths(read.design, read.truth)
+    errors = _lengths(design, design.model, state) - _lengths(design, read.model, read.truth)
     return float(np.sqrt((errors**2).mean())), float(np.abs(errors).max())
 
 
-def _lengths(design: Design, state: State) -> Array:
-    """Return the distances between corrected evaluation points, evenly chosen ones of many."""
+def _lengths(design: Design, model: ErrorModel, state: State) -> Array:
+    """Return the distances between evaluation points that a model corrects, evenly chosen ones of
+    many.
+    """
     places = evaluation_points(design)
     count = len(places.points)
     some = np.unique(np.linspace(0, count - 1, min(count, MOST_POINTS)).round().astype(int))
-    points = corrected_points(design, state, places.points[some], places.probes[some])
+    points = places.points[some]
+    points = points + model.error(points, state.a, state.probes[places.probes[some]])
     first, second = np.triu_indices(len(points), 1)
     return np.asarray(np.linalg.norm(points[first] - points[second], axis=1))
