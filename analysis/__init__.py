@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from ballplate.extensions.campaign.interface import sheet
     from ballplate.extensions.certificates.interface import certificate
     from ballplate.extensions.compensation.interface import compensation, read_compensation
+    from ballplate.extensions.drafting.interface import design
     from ballplate.extensions.judgement.interface import budget, compare_models, validate
     from ballplate.extensions.laboratory.interface import read_report
     from ballplate.extensions.maps.interface import (
@@ -129,6 +130,7 @@ __all__ = [
     "convert",
     "correct",
     "curves",
+    "design",
     "diff",
     "experiment",
     "fit",

@@ -49,6 +49,11 @@ SHIPPED = (
         },
     ),
     _here(
+        "drafting",
+        functions=_from("interface", "design"),
+        services=_from("init_command", "add_data_sheet", "drafted"),
+    ),
+    _here(
         "campaign",
         commands={
             "sheet": Command(

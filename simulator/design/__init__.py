@@ -49,7 +49,11 @@ if TYPE_CHECKING:
         far_from_drawing,
     )
     from .observations.coordinates import CalibratedCoordinates, CoordinateCalibration
-    from .observations.distances import CalibratedDistances, DistanceCalibration
+    from .observations.distances import (
+        CalibratedDistances,
+        DistanceCalibration,
+        DistancesSettings,
+    )
     from .observations.joint_values import JointValues
     from .observations.lengths import (
         Lengths,

@@ -31,5 +31,6 @@ if TYPE_CHECKING:
         ball_coordinates,
         plane_rotation,
     )
+    from .rotations import rotation_matrix
 
 __getattr__, __dir__ = lazily(__name__, __file__)

@@ -61,6 +61,7 @@ if TYPE_CHECKING:
         length_text,
         metres_or_radians,
         parse_angle,
+        parse_duration,
         parse_length,
         parse_length_drift,
         parse_length_function,

@@ -1,0 +1,1 @@
+"""Experiment files drafted from the data sheet of a machine."""

@@ -1,0 +1,68 @@
+"""The data sheet of a machine with its plate and tips, and the places of the plate."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from ballplate.simulator.inputs import LengthFunction, Target
+from ballplate.simulator.machines import ARRANGEMENTS
+
+from .places import Settings, Tips, places_of, tips_of
+from .sheet_values import Plate, expanded, growing_length, hours, lengths, plate, target
+from .tables import arrangement_of, machine_kind, table, tips_form
+
+# How each entry is read, in the order of the questions; the first five have to be stated.
+READERS: dict[str, Callable[[str], Any]] = {
+    "machine_type": machine_kind,
+    "volume": lengths,
+    "mpe": growing_length,
+    "plate": plate,
+    "certificate": expanded,
+    "tips": tips_form,
+    "target": target,
+    "hours": hours,
+}
+NEEDED = tuple(READERS)[:5]
+
+
+@dataclass(frozen=True)
+class DataSheet:
+    """Values by the names of `READERS`, in metres; ``target`` is None for the usual one."""
+
+    machine_type: str
+    volume: tuple[float, ...]
+    mpe: LengthFunction
+    plate: Plate
+    certificate: Target
+    tips: str
+    hours: float
+    target: Target | None = None
+
+    @property
+    def arrangement(self) -> str:
+        """Return the name of the machine's arrangement."""
+        return arrangement_of(self.machine_type, self.volume)
+
+    @property
+    def tips_there(self) -> Tips:
+        """Return the tips of this machine."""
+        return tips_of(self.tips, ARRANGEMENTS[self.arrangement].probe_side[-1], self.volume)
+
+    @property
+    def places(self) -> list[Settings]:
+        """Return the places of the plate.
+
+        :raises ValueError: there is none.
+        """
+        return list(places_of(self.plate, self.tips_there, self.volume))
+
+
+def data_sheet(texts: Mapping[str, str]) -> DataSheet:
+    """Return a data sheet of texts by the names of `READERS`, with defaults for others.
+
+    :raises ValueError: a text cannot be read.
+    """
+    stated = {name: texts.get(name) or table("entries")[name]["default"] for name in READERS}
+    return DataSheet(**{name: READERS[name](text) for name, text in stated.items() if text})

@@ -1,0 +1,104 @@
+"""The commented experiment file of a data sheet."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from importlib.resources import files
+from string import Template
+from typing import Any
+
+import numpy as np
+import yaml
+from ballplate.simulator.design import DistancesSettings
+from ballplate.simulator.inputs import LengthFunction, Target, typed_length
+
+from .data_sheet import DataSheet
+from .places import Settings, Tips, starts_of
+from .sheet_values import function_text, rounded
+from .tables import chain_words, table
+
+# The standard uncertainty of a reading, as a share of the constant part of the MPE.
+REPEATABILITY = 1 / 3
+# The target of U (k = 2), as a share of the MPE.
+TARGET = 1 / 2
+# Errors of the simulated machine, as a share of the MPE at the space diagonal: with it the errors
+# of lengths have a standard deviation of about half the MPE, found from simulated machines.
+ERRORS = 1 / 8
+# Standard uncertainty of the offset of a tip, from its qualification on a reference sphere.
+QUALIFICATION = "0.5 um"
+
+
+def draft(sheet: DataSheet, texts: Mapping[str, str], next_command: str) -> str:
+    """Return the text of an experiment file; `texts` as stated and `next_command` go into its
+    comments.
+
+    :raises ValueError: the plate, the tips and the volume do not go together.
+    """
+    places, tips, mpe = sheet.places, sheet.tips_there, sheet.mpe
+    starts = list(starts_of(places))
+    error = ERRORS * float(mpe.at(np.linalg.norm(sheet.volume)))
+    usual = LengthFunction(TARGET * mpe.constant, TARGET * mpe.slope)
+    target = sheet.target or Target(usual, 2.0)
+    balls = [sheet.plate.columns, sheet.plate.rows]
+    plate = {"kind": "grid", "balls": balls, "size": [*map(typed_length, sheet.plate.size)]}
+    functions = _flow(dict.fromkeys(table("unseen")[sheet.arrangement], 1))
+    left_out = f"\n  # A single tip does not show these rotations.\n  functions: {functions}"
+    text = files(__package__).joinpath("draft.yaml").read_text(encoding="utf-8")
+    return Template(text).substitute(
+        stated="\n#   ".join(
+            f"{name}: {' '.join(said.split())}" for name, said in texts.items() if said
+        ),
+        next_command=next_command,
+        kind=sheet.machine_type,
+        volume=_flow([*map(typed_length, sheet.volume)]),
+        mpe=function_text(mpe),
+        repeatability=rounded(REPEATABILITY * mpe.constant, 2),
+        arrangement=sheet.arrangement,
+        chain=chain_words(sheet.arrangement),
+        functions=left_out if tips.form == "one" else "",
+        position=rounded(error, 2),
+        rotation=f"{1e6 * error / max(sheet.volume):.2g} urad",
+        probes=_tips(tips),
+        plate=_flow(plate | {"role": "plate"}),
+        positions=_entries(starts),
+        certificate=function_text(sheet.certificate.stated),
+        factor=f"{sheet.certificate.coverage_factor:g}",
+        calibration=_certificate(sheet.certificate.standard),
+        candidates=_entries(place for place in places if place not in starts),
+        first=next(iter(tips.offsets)),
+        target=function_text(target.stated),
+        target_words="as stated" if sheet.target else "half the MPE",
+        coverage_factor=f"{target.coverage_factor:g}",
+    )
+
+
+def _tips(tips: Tips) -> str:
+    """Return the probes as a file has them; all but the reference have an uncertainty."""
+    probes, uncertainty = dict[str, Settings](), dict[str, str]()
+    for name, offset in tips.offsets.items():
+        where = {"offset": [*map(typed_length, offset)]}
+        probes[name] = (table("angles")[name] if tips.form == "head" else where) | uncertainty
+        uncertainty = {"standard_uncertainty": QUALIFICATION}
+    head = f"head: {{tip: [0 mm, 0 mm, {typed_length(-2 * tips.length)}]}}\n"
+    lines = "".join(f"\n  {name}: {_flow(probe)}" for name, probe in probes.items())
+    return f"{head if tips.form == 'head' else ''}probes:{lines}"
+
+
+def _certificate(standard: LengthFunction) -> str:
+    """Return the uncertainties of the distances: the part that grows with length is an error of
+    scale, common to all, if the file format has that.
+    """
+    if standard.slope and "common" in DistancesSettings.model_fields:
+        common = function_text(LengthFunction(0.0, standard.slope)).rpartition("+ ")[2]
+        return f"standard_uncertainty: {rounded(standard.constant)}\n    common: {common}"
+    return f"standard_uncertainty: {function_text(standard)}"
+
+
+def _flow(content: Any) -> str:
+    """Return content of a file in one line."""
+    text: str = yaml.safe_dump(content, default_flow_style=True, sort_keys=False, width=10**6)
+    return text.strip()
+
+
+def _entries(items: Iterable[Settings]) -> str:
+    return "".join(f"\n    - {_flow(item)}" for item in items)

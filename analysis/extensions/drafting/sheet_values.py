@@ -1,0 +1,155 @@
+"""Values as data sheets and certificates write them."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+
+from ballplate.simulator.inputs import (
+    LengthFunction,
+    Target,
+    parse_duration,
+    parse_length_function,
+    parse_positive_length,
+    typed_length,
+)
+
+NUMBER = r"((?:[0-9]+\.?[0-9]*|\.[0-9]+))"
+# Between lengths: a cross, a comma, or a space before the next number.
+BETWEEN = re.compile(r"\s*[x×*,;]\s*|\s+(?=[-+.0-9])")
+# A um + L/K and (A + B L/K) um, or A um + B L, perhaps after a name such as MPE.
+GROWING = re.compile(
+    rf"(?:[A-Za-z0-9_,:. ]*=)?\s*±?\s*\(?\s*{NUMBER}\s*([uµμ]m)?\s*\+\s*{NUMBER}?\s*[*·]?\s*L\s*"
+    r"(?:/\s*([1-9][0-9]{0,3}))?\s*\)?\s*([uµμ]m)?"
+)
+COVERAGE = re.compile(r"\s*[,;(]?\s*k\s*=\s*([1-9](?:\.[0-9]*)?)(?![0-9])\s*\)?\s*")
+PLATE = re.compile(
+    r"\s*([0-9]{1,4})\s*[x×*]\s*([0-9]{1,4})(?:\s*balls)?\s*[,;]?\s+(pitch\s)?\s*(.+)"
+)
+
+
+@dataclass(frozen=True)
+class Plate:
+    """A plate with ``columns`` and ``rows`` of balls; ``size`` in metres between outer balls."""
+
+    columns: int
+    rows: int
+    size: tuple[float, float]
+
+
+def lengths(text: str, count: int = 3) -> tuple[float, ...]:
+    """Return lengths above zero in metres; those without a unit have that of the last.
+
+    :raises ValueError: another number of lengths, or no lengths.
+
+    >>> lengths("900 x 1200 x 700 mm")
+    (0.9, 1.2, 0.7)
+    """
+    words = BETWEEN.split(text.strip())
+    if len(words) != count:
+        example = " ".join(["900", "1200", "700"][:count])
+        raise ValueError(
+            f'"{text}" has {len(words)} lengths, not {count}; write for example "{example} mm"'
+        )
+    unit = words[-1].lstrip("-+.0123456789 ")
+    return tuple(
+        parse_positive_length(word if word[-1:].isalpha() else f"{word} {unit}") for word in words
+    )
+
+
+def growing_length(text: str) -> LengthFunction:
+    """Return A + B L as a data sheet or a certificate states it.
+
+    Of ``A um + L/K``, L is in millimetres and the result in micrometres; of ``A um + B L``, L is in
+    metres. Other texts are those of experiment files, which have K of 10 000 or more for L in
+    metres.
+
+    :raises ValueError: written otherwise, without a unit, or growing by 100 um/m or more.
+
+    >>> growing_length("MPE = 0.9 um + L/400")
+    LengthFunction(constant=9e-07, slope=2.5e-06)
+    >>> growing_length("0.4 um + 0.5 L") == growing_length("0.4 um + 0.5 um/m")
+    True
+    """
+    match = GROWING.fullmatch(text.strip())
+    if match is None or not (match[2] or match[5]) or not (match[3] or match[4]):
+        return parse_length_function(text.rpartition("=")[2].strip())
+    slope = 1000 * float(match[3] or 1) / float(match[4] or 1000)
+    return parse_length_function(f"{match[1]} um + {slope:.9f} um/m")
+
+
+def expanded(text: str, usual_factor: str = "") -> Target:
+    """Return an expanded uncertainty with its coverage factor, the usual one if none is stated.
+
+    :raises ValueError: no coverage factor of 1 to below 10.
+
+    >>> expanded("U = 0.4 um + 0.5 L, k = 2").standard
+    LengthFunction(constant=2e-07, slope=2.5e-07)
+    """
+    match = COVERAGE.search(text)
+    stated = match[1] if match else usual_factor
+    if not stated:
+        raise ValueError(f'"{text}" has no k of 1 to 10; add that of the certificate: "…, k=2"')
+    return Target(growing_length(COVERAGE.sub("", text)), float(stated))
+
+
+def target(text: str) -> Target:
+    """Return a target of the expanded uncertainty; k is 2 if none is stated."""
+    return expanded(text, "" if "k" in text else "2")
+
+
+def plate(text: str) -> Plate:
+    """Return a plate by its columns, rows, and size between outer balls or pitch.
+
+    :raises ValueError: written otherwise, fewer than two columns or rows, or one length for a plate
+        that is not square.
+
+    >>> plate("6 x 6, 420 mm") == plate("6x6 pitch 84 mm")
+    True
+    """
+    match = PLATE.fullmatch(text)
+    if match is None or min(int(match[1]), int(match[2])) < 2:
+        raise ValueError(
+            f'"{text}" is no plate of 2 x 2 balls or more; write columns x rows, and the size'
+            ' between the outer balls or the pitch: "6 x 6, 420 mm" or "6 x 6, pitch 84 mm"'
+        )
+    columns, rows = int(match[1]), int(match[2])
+    sides = lengths(match[4], len(BETWEEN.split(match[4].strip(), 1)))
+    if match[3]:
+        sides = (sides[0] * (columns - 1), sides[-1] * (rows - 1))
+    elif len(sides) == 1 and columns != rows:
+        raise ValueError(f'"{text}" has one size for two sides; give both, such as 420 x 252 mm')
+    return Plate(columns, rows, (round(sides[0], 9), round(sides[-1], 9)))
+
+
+def hours(text: str) -> float:
+    """Return a number of hours, stated with or without a unit.
+
+    :raises ValueError: no duration above zero.
+
+    >>> hours("6"), hours("90 min")
+    (6.0, 1.5)
+    """
+    found = parse_duration(text if text[-1:].isalpha() else f"{text} h") / 3600
+    if found == 0.0:
+        raise ValueError(f'"{text}" leaves no time for measuring; give for example "6 h"')
+    return found
+
+
+def rounded(length: float, digits: int = 6) -> str:
+    """Return a length as a file states it.
+
+    >>> rounded(3e-7 / 0.9, 2)
+    '0.33 um'
+    """
+    return typed_length(float(f"{length:.{digits}g}"))
+
+
+def function_text(function: LengthFunction) -> str:
+    """Return a length that may grow as a file states it.
+
+    >>> function_text(LengthFunction(9e-7, 2.5e-6))
+    '0.9 um + 2.5 um/m'
+    """
+    grows = f" + {1e6 * function.slope:.6g} um/m" if function.slope else ""
+    return rounded(function.constant) + grows
