@@ -9,9 +9,9 @@ from typing import Any
 from ballplate.simulator.inputs import LengthFunction, Target
 from ballplate.simulator.machines import ARRANGEMENTS
 
+from .machine_tables import arrangement_of, machine_kind, table, tips_form
 from .places import Settings, Tips, places_of, tips_of
 from .sheet_values import Plate, expanded, growing_length, hours, lengths, plate, target
-from .tables import arrangement_of, machine_kind, table, tips_form
 
 # How each entry is read, in the order of the questions; the first five have to be stated.
 READERS: dict[str, Callable[[str], Any]] = {

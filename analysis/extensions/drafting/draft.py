@@ -13,9 +13,9 @@ from ballplate.simulator.design import DistancesSettings
 from ballplate.simulator.inputs import LengthFunction, Target, typed_length
 
 from .data_sheet import DataSheet
+from .machine_tables import chain_words, table
 from .places import Settings, Tips, starts_of
 from .sheet_values import function_text, rounded
-from .tables import chain_words, table
 
 # The standard uncertainty of a reading, as a share of the constant part of the MPE.
 REPEATABILITY = 1 / 3

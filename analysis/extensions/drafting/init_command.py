@@ -14,7 +14,7 @@ from ballplate.simulator.experiment import load
 
 from .data_sheet import NEEDED, READERS, data_sheet
 from .draft import draft
-from .tables import table
+from .machine_tables import table
 
 
 def add_data_sheet(parser: ArgumentParser) -> None:

@@ -12,8 +12,8 @@ from ballplate.simulator.geometry import AXIS_INDEX, IN_PLANE_AXES, rotation_mat
 from ballplate.simulator.inputs import format_length, typed_length
 from numpy.typing import NDArray
 
+from .machine_tables import table
 from .sheet_values import Plate
-from .tables import table
 
 Array = NDArray[np.float64]
 Settings = dict[str, Any]
@@ -126,9 +126,11 @@ def _inclined(pointing: str, plate: Plate, ends: Array) -> Iterator[Settings]:
     for angles in table("inclined")[pointing]:
         # The other two corner balls are between these along every axis.
         turned = balls @ rotation_matrix([*np.radians(angles)]).T
-        first, last = ends - [turned.min(axis=0), turned.max(axis=0)]
+        # Whole tenths of a millimetre, which are not beyond the range.
+        first, last = ends - [turned.min(axis=0) - 1e-4, turned.max(axis=0) + 1e-4]
         for share, word in enumerate(("low", "middle", "high") if (first <= last).all() else ()):
-            pose = {"origin": [*map(typed_length, first + share / 2 * (last - first))]}
+            origin = np.round(first + share / 2 * (last - first), 4)
+            pose = {"origin": [*map(typed_length, origin)]}
             pose["rotation"] = [f"{angle} deg" for angle in angles]
             yield {"name": f"inclined {' '.join(map(str, angles))} {word}", "pose": pose}
 

@@ -1,0 +1,169 @@
+"""Options of data sheets: what is refused by name, and questions at a terminal."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import ballplate as bp
+import pytest
+from ballplate.cli import main
+from ballplate.extensions.drafting.sheet_values import expanded, growing_length, plate
+from ballplate.simulator.inputs.quantities import LengthFunction
+
+from tests.extensions.drafting import wording
+from tests.extensions.drafting.sheets import BRIDGE, options
+
+EXAMPLE = Path("designs/quickstart.yaml")
+
+
+@pytest.mark.parametrize(
+    ("changed", "told"),
+    [
+        ({"machine_type": "bridge"}, wording.UNKNOWN_MACHINE),
+        ({"tips": "two"}, wording.UNKNOWN_TIPS),
+        ({"volume": "900 1200 mm"}, wording.TWO_LENGTHS),
+        ({"volume": "900 1200 700"}, wording.NO_UNIT_OF_VOLUME),
+        ({"volume": "900 1200 0 mm"}, wording.NOTHING_HIGH),
+        ({"mpe": "0.9 + L/400"}, wording.NO_UNIT_OF_MPE),
+        ({"mpe": "0.9 um + L/1"}, wording.STEEP),
+        ({"mpe": "0.9 um + L/0"}, wording.DIVIDES_BY_ZERO),
+        ({"certificate": "0.4 um + 0.5 um/m"}, wording.NO_COVERAGE_FACTOR),
+        ({"certificate": "0.4 um, k=0.5"}, wording.SMALL_COVERAGE_FACTOR),
+        ({"plate": "1 x 6, 420 mm"}, wording.SINGLE_LINE),
+        ({"plate": "6 x 4, 420 mm"}, wording.ONE_SIZE),
+        ({"hours": "0"}, wording.NO_TIME),
+        ({"plate": "6 x 6, 1300 mm"}, wording.LARGER_THAN_THE_VOLUME),
+        ({"plate": "6 x 6, 650 mm"}, wording.OUT_OF_REACH),
+        ({"plate": "6 x 6, 900 mm", "tips": "one"}, wording.OUT_OF_REACH_OF_ONE),
+    ],
+)
+def test_refusals(
+    changed: dict[str, str], told: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """By the command with status 2, and the same by the function."""
+    path = tmp_path / "m.yaml"
+    command = ["init", str(path), *options(BRIDGE | changed)]
+    try:
+        status = main(command)
+    except SystemExit as ended:
+        status = int(str(ended.code))
+    assert status == 2 and told in capsys.readouterr().err
+    assert not path.exists()
+    if "hours" not in changed:
+        with pytest.raises(ValueError) as error:
+            bp.design(**BRIDGE | changed)
+        assert told in str(error.value)
+
+
+def test_values_that_are_missing(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    stated = {name: BRIDGE[name] for name in ("machine_type", "mpe", "certificate")}
+    assert main(["init", str(tmp_path / "m.yaml"), *options(stated)]) == 2
+    assert wording.LACKS_VALUES in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("option", ["--machine", "--example"])
+def test_an_example_takes_no_data_sheet(
+    option: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "m.yaml"
+    assert main(["init", str(path), option, *options(BRIDGE)]) == 2
+    assert wording.NO_DATA_SHEET in capsys.readouterr().err
+    assert main(["init", str(path), option]) == 0
+    assert (path.read_bytes() == EXAMPLE.read_bytes()) == (option == "--example")
+
+
+def test_arguments_of_another_type() -> None:
+    with pytest.raises(TypeError, match="volume=700"):
+        bp.design(**BRIDGE | {"volume": 700})  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
+    ("text", "constant", "slope"),
+    [
+        ("0.9 um + L/400", 0.9e-6, 2.5e-6),
+        ("0.9 µm+L/400", 0.9e-6, 2.5e-6),
+        ("(0.9 + L/400) um", 0.9e-6, 2.5e-6),
+        ("(0.9 + L/400) um with L in mm", 0.9e-6, 2.5e-6),
+        ("E0,MPE = ±(1.7 + 3 L/1000) um", 1.7e-6, 3e-6),
+        ("1.7 + 3L/1000 µm", 1.7e-6, 3e-6),
+        ("0.5 um + L/1000000", 0.5e-6, 1e-6),
+        ("0.4 um + 0.5 L", 0.4e-6, 0.5e-6),
+        ("0.4 um + 0.5 ppm", 0.4e-6, 0.5e-6),
+        ("3 um", 3e-6, 0.0),
+    ],
+)
+def test_forms_of_data_sheets(text: str, constant: float, slope: float) -> None:
+    found = growing_length(text)
+    assert found.constant == pytest.approx(constant, rel=1e-12)
+    assert found.slope == pytest.approx(slope, rel=1e-9)
+
+
+def test_forms_of_certificates_and_plates() -> None:
+    for text in ("U = 0.4 um + 0.5 L, k = 2", "0.4 um + 0.5 um/m (k=2)", "0.4 um + L/2000; k=2.0"):
+        assert expanded(text).standard == LengthFunction(0.2e-6, 0.25e-6), text
+    for text in ("6x4 420 x 252 mm", "6 x 4 balls, pitch 84 mm", "6 × 4, pitch 8.4 cm"):
+        assert plate(text).size == (0.42, 0.252), text
+
+
+def test_the_help_names_all(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit):
+        main(["init", "--help"])
+    told = " ".join(capsys.readouterr().out.split())
+    for option in options(dict.fromkeys((*BRIDGE, "tips", "target", "hours"), "")):
+        assert option in told
+    assert "MB1: y carries x carries z" in told and "--example" in told
+
+
+pty = pytest.importorskip("pty", reason="there is no pseudo-terminal")
+
+
+def at_terminal(folder: Path, *words: str, typed: str) -> tuple[int, str]:
+    """The status of `init` at a pseudo-terminal where all this is typed, and what it prints."""
+    ours, theirs = pty.openpty()
+    os.write(ours, typed.encode())
+    ended = subprocess.run(
+        [sys.executable, "-m", "ballplate", "init", *words],
+        stdin=theirs,
+        stdout=theirs,
+        stderr=subprocess.PIPE,
+        cwd=folder,
+        timeout=60,
+    )
+    os.close(theirs)
+    os.close(ours)
+    return ended.returncode, ended.stderr.decode()
+
+
+def test_questions_at_a_terminal(tmp_path: Path) -> None:
+    """Nonsense is answered at once and asked again; nothing typed is the default."""
+    answers = ["bridge", "gantry", "", "", "6 x 6, 1300 mm", "5 x 5, 400 mm", "0.4 um", ""]
+    typed = "\n".join([*answers, "star", "", "4", ""])
+    status, told = at_terminal(tmp_path, "m.yaml", typed=typed)
+    assert status == 0, told
+    assert wording.UNKNOWN_MACHINE in told and wording.LARGER_THAN_THE_VOLUME in told
+    assert "measuring volume, x y z [900 1200 700 mm]: " in told
+    assert told.count("columns x rows of balls") == 2 and " has no k of 1 to 10" in told
+    assert "next: ballplate plan m.yaml --hours 4 -o m-chosen.yaml" in told
+    assert bp.load(tmp_path / "m.yaml").layouts["plate"].names[-1] == "r5c5"
+
+
+def test_missing_values_are_asked_for_at_a_terminal(tmp_path: Path) -> None:
+    stated = {name: text for name, text in BRIDGE.items() if name != "mpe"}
+    status, told = at_terminal(tmp_path, "m.yaml", *options(stated), typed="1 um + L/300\n")
+    assert status == 0 and told.count("]: ") == 1
+    assert "1 um + 3.33333 um/m" in (tmp_path / "m.yaml").read_text(encoding="utf-8")
+
+
+def test_the_end_of_the_answers(tmp_path: Path) -> None:
+    status, told = at_terminal(tmp_path, "m.yaml", typed="\x04")
+    assert status == 2 and wording.NO_ANSWER in told
+    assert not list(tmp_path.iterdir())
+
+
+def test_the_example_at_a_terminal(tmp_path: Path) -> None:
+    status, _ = at_terminal(tmp_path, "m.yaml", "--example", typed="")
+    assert status == 0
+    assert (tmp_path / "m.yaml").read_bytes() == EXAMPLE.read_bytes()

@@ -1,0 +1,174 @@
+"""Files that `init` drafts: valid at once, full rank, and within the volume."""
+
+from __future__ import annotations
+
+import shlex
+from pathlib import Path
+
+import ballplate as bp
+import numpy as np
+import pytest
+from ballplate.cli import main
+from ballplate.extensions.drafting.data_sheet import data_sheet
+from ballplate.extensions.drafting.draft import draft
+from ballplate.extensions.drafting.machine_tables import chain_words, table
+from ballplate.simulator.design.observations.distances import DistancesSettings
+from ballplate.simulator.experiment.loading import load
+from ballplate.simulator.machines.arrangement import ARRANGEMENTS
+from ballplate.simulator.machines.settings import build_error_model
+from ballplate.simulator.machines.true_machine_settings import RandomSettings
+from ballplate.simulator.machines.truth import true_parameters
+from hypothesis import Phase, given, settings
+from hypothesis import strategies as st
+
+from tests.extensions.drafting import wording
+from tests.extensions.drafting.sheets import BRIDGE, SHEETS, furthest, options, spans, whole
+
+SMALL = BRIDGE | {"plate": "4 x 4, 420 mm", "hours": "4"}
+
+
+def drafted(sheet: dict[str, str], **changed: str) -> str:
+    """The text of a file."""
+    stated = sheet | changed
+    return draft(data_sheet(stated), stated, "next")
+
+
+@pytest.mark.parametrize("name", SHEETS)
+def test_three_machines(name: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """The start and the whole pool determine everything, and the pool fills the volume."""
+    path = tmp_path / f"{name}.yaml"
+    assert main(["init", str(path), *options(SHEETS[name])]) == 0
+    chosen = path.with_name(f"{name}-chosen.yaml")
+    command = shlex.join(["ballplate", "plan", str(path), "--hours", "6", "-o", str(chosen)])
+    text = path.read_text(encoding="utf-8")
+    assert f"next: {command}" in capsys.readouterr().err and command in text
+    assert wording.HALF_THE_MPE in text
+    assert main(["check", str(path)]) == 0
+    every = whole(text)
+    assert bp.check(every).verdict.deficiency == 0
+    assert furthest(every) < 1e-9
+    assert (spans(every) > 0.8).all()
+
+
+@pytest.mark.slow
+def test_the_printed_command_runs(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert main(["init", "m.yaml", *options(SMALL)]) == 0
+    command = capsys.readouterr().err.strip().partition("next: ballplate ")[2]
+    assert main([*shlex.split(command), "--workers", "1"]) == 0
+    assert main(["check", "m-chosen.yaml"]) == 0
+
+
+@pytest.mark.parametrize("tips", ["one", "star", "head"])
+@pytest.mark.parametrize("arrangement", ARRANGEMENTS)
+def test_every_arrangement_has_full_rank(arrangement: str, tips: str) -> None:
+    text = drafted(BRIDGE, machine_type=arrangement, tips=tips)
+    (experiment,) = load(Path("drafted.yaml"), text=text)
+    assert bp.check(experiment).verdict.deficiency == 0
+    assert furthest(experiment) < 1e-9
+    if tips == "one":
+        # What is left out is not determined by a single tip.
+        every = whole(text).with_({"error_model.functions": None})
+        assert bp.check(every).verdict.deficiency > 0
+
+
+# Without shrinking, which takes minutes: each example is laid out as a whole.
+@settings(max_examples=8, deadline=None, phases=[Phase.generate])
+@given(
+    kind=st.sampled_from([*table("kinds"), *ARRANGEMENTS]),
+    edges=st.tuples(*[st.integers(200, 4000)] * 3),
+    shares=st.tuples(*[st.floats(0.3, 1.0)] * 2),
+    balls=st.tuples(*[st.integers(4, 7)] * 2),
+    tips=st.sampled_from(["one", "star", "head"]),
+)
+def test_any_machine(
+    kind: str,
+    edges: tuple[int, int, int],
+    shares: tuple[float, float],
+    balls: tuple[int, int],
+    tips: str,
+) -> None:
+    """Either refused by the plate's size, or valid, of full rank and within the volume."""
+    size = [f"{round(0.8 * min(edges) * share, 1)}" for share in shares]
+    stated = {
+        "machine_type": kind,
+        "volume": " x ".join(map(str, edges)) + " mm",
+        "plate": f"{balls[0]} x {balls[1]}, {' x '.join(size)} mm",
+        "tips": tips,
+    }
+    try:
+        text = drafted(BRIDGE, **stated)
+    except ValueError as error:
+        assert tips == "one" and "does not fit" in str(error)
+        return
+    (experiment,) = load(Path("drafted.yaml"), text=text)
+    assert bp.check(experiment).verdict.deficiency == 0
+    assert furthest(whole(text)) < 1e-9
+
+
+def test_what_a_file_states_is_the_data_sheet() -> None:
+    experiment = bp.design(**BRIDGE)
+    assert np.allclose(experiment.machine.volume.upper, [0.9, 1.2, 0.7])
+    assert np.allclose(experiment.machine.repeatability, 0.3e-6)
+    assert experiment.target_uncertainty is not None
+    assert experiment.target_uncertainty.coverage_factor == 2.0
+    assert np.isclose(experiment.target_uncertainty.at(1.0), 0.5 * (0.45e-6 + 1.25e-6))
+    (distances,) = experiment.calibration
+    at_side = distances.standard_uncertainties[0]
+    slope = 0.0 if "common" in DistancesSettings.model_fields else 0.25e-6 * 0.42
+    assert np.isclose(at_side, 0.2e-6 + slope)
+    uncertain = [probe.is_estimated for probe in experiment.probes.values()]
+    assert uncertain == [False, True, True, True, True]
+    assert experiment.layouts["plate"].names[-1] == "r6c6"
+
+
+def test_a_target_of_ones_own() -> None:
+    text = drafted(BRIDGE, target="1 um + L/500, k=3")
+    assert "target_uncertainty: 1 um + 2 um/m" in text and "coverage_factor: 3" in text
+    assert wording.HALF_THE_MPE not in text
+
+
+def test_a_plate_that_is_not_square() -> None:
+    """It is placed along both axes of each plane where it has room, and else along one."""
+    every = whole(drafted(BRIDGE, plate="7 x 4, 660 x 330 mm"))
+    assert furthest(every) < 1e-9 and bp.check(every).verdict.deficiency == 0
+    across = {name: sum(one.name.startswith(name) for one in every.positions) for name in "xyz"}
+    assert across["z"] > across["x"] > 0
+
+
+def test_long_rails_are_of_the_first_axis() -> None:
+    assert "arrangement: MB2 " in drafted(SHEETS["gantry"], volume="3 2 1 m")
+    assert "arrangement: MH2 " in drafted(SHEETS["arm"], volume="2500 1000 1500 mm")
+
+
+def test_the_help_states_the_arrangements_of_kinds() -> None:
+    """As the table has them."""
+    told = table("entries")["machine_type"]["help"]
+    for kind, names in table("kinds").items():
+        assert kind in told
+        for name in names:
+            chain = chain_words(name).removeprefix("z; ")
+            assert f"{name}: " in told and chain in told, name
+    assert all(name in told for name in ARRANGEMENTS)
+
+
+@pytest.mark.parametrize("name", SHEETS)
+def test_simulated_machines_have_errors_of_half_the_mpe(name: str) -> None:
+    """Standard deviation of errors of lengths between random points, of forty machines."""
+    sheet = data_sheet(SHEETS[name])
+    (experiment,) = load(Path("drafted.yaml"), text=drafted(SHEETS[name]))
+    edges, generator = np.array(sheet.volume), np.random.default_rng(1)
+    first, second = generator.uniform(size=(2, 200, 3)) * edges
+    length = np.linalg.norm(first - second, axis=1)
+    along = (first - second) / length[:, None]
+    model = build_error_model(experiment.error_model, (0.0, 0.0, 0.0), sheet.volume)
+    truth, offset = experiment.true_machine, np.zeros_like(first)
+    assert isinstance(truth, RandomSettings)
+    shares = []
+    for seed in range(40):
+        a = true_parameters(truth.model_copy(update={"seed": seed}), model)
+        difference = model.error(first, a, offset) - model.error(second, a, offset)
+        shares.append((difference * along).sum(axis=1) / sheet.mpe.at(length))
+    assert 0.35 < np.std(shares) < 0.65

@@ -1,0 +1,38 @@
+"""The wording that the tests of drafting expect: a rewording is entered here alone."""
+
+UNKNOWN_MACHINE = (
+    'unknown type of machine "bridge"; choose from moving bridge, fixed bridge, gantry, cantilever,'
+    " horizontal arm, column, MB1, MB2, FB1, FB2, FH1, FH2, MH1, MH2, CX1, CY1"
+)
+UNKNOWN_TIPS = 'unknown tips "two"; choose from one, star, head'
+TWO_LENGTHS = '"900 1200 mm" has 2 lengths, not 3; write for example "900 1200 700 mm"'
+NO_UNIT_OF_VOLUME = '"900" has no unit'
+NOTHING_HIGH = '"0 mm" must be above zero'
+NO_UNIT_OF_MPE = '"0.9" has no unit'
+STEEP = "grows by 1 mm per metre of length"
+DIVIDES_BY_ZERO = "divides by zero"
+NO_COVERAGE_FACTOR = (
+    '"0.4 um + 0.5 um/m" has no k of 1 to 10; add that of the certificate: "…, k=2"'
+)
+SMALL_COVERAGE_FACTOR = '"0.4 um, k=0.5" has no k of 1 to 10'
+SINGLE_LINE = '"1 x 6, 420 mm" is no plate of 2 x 2 balls or more'
+ONE_SIZE = '"6 x 4, 420 mm" has one size for two sides; give both, such as 420 x 252 mm'
+NO_TIME = '"0" leaves no time for measuring'
+LARGER_THAN_THE_VOLUME = (
+    "the plate of 1300 mm x 1300 mm is larger than the volume, 900 mm x 1200 mm x 700 mm"
+)
+OUT_OF_REACH = (
+    "the plate of 650 mm x 650 mm does not fit across x within the reach of the tips right, left,"
+    " 780 mm x 1200 mm x 640 mm"
+)
+OUT_OF_REACH_OF_ONE = (
+    "the plate of 900 mm x 900 mm does not fit across z and inclined by 45 degrees to it within the"
+    " reach of the tips down, 900 mm x 1200 mm x 580 mm"
+)
+LACKS_VALUES = (
+    'the data sheet lacks values; add for example --volume "900 1200 700 mm" --plate'
+    ' "6 x 6, 420 mm"'
+)
+NO_DATA_SHEET = "--machine and --example take no data sheet; leave one of them out"
+NO_ANSWER = "no answer about the type of machine; nothing is written"
+HALF_THE_MPE = "lengths of the corrected machine: half the MPE."
