@@ -75,6 +75,16 @@ def test_an_example_takes_no_data_sheet(
     assert (path.read_bytes() == EXAMPLE.read_bytes()) == (option == "--example")
 
 
+def test_without_the_extension_the_example_is_written(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("ballplate.cli.init.optional_service", lambda name: None)
+    assert main(["init", str(tmp_path / "m.yaml")]) == 0
+    assert (tmp_path / "m.yaml").read_bytes() == EXAMPLE.read_bytes()
+    with pytest.raises(SystemExit):
+        main(["init", str(tmp_path / "n.yaml"), *options(BRIDGE)])
+
+
 def test_arguments_of_another_type() -> None:
     with pytest.raises(TypeError, match="volume=700"):
         bp.design(**BRIDGE | {"volume": 700})  # type: ignore[arg-type]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shlex
 from pathlib import Path
+from types import SimpleNamespace
 
 import ballplate as bp
 import numpy as np
@@ -122,6 +123,21 @@ def test_what_a_file_states_is_the_data_sheet() -> None:
     uncertain = [probe.is_estimated for probe in experiment.probes.values()]
     assert uncertain == [False, True, True, True, True]
     assert experiment.layouts["plate"].names[-1] == "r6c6"
+
+
+@pytest.mark.parametrize("common", [True, False])
+def test_growth_of_a_certificate_is_common_where_the_format_has_that(
+    common: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    fields = {"common": None} if common else {}
+    monkeypatch.setattr(
+        "ballplate.extensions.drafting.draft.DistancesSettings",
+        SimpleNamespace(model_fields=fields),
+    )
+    lines = drafted(BRIDGE).splitlines()
+    assert ("    common: 0.25 um/m" in lines) == common
+    constant = "    standard_uncertainty: 0.2 um"
+    assert constant + ("" if common else " + 0.25 um/m") in lines
 
 
 def test_a_target_of_ones_own() -> None:
