@@ -11,13 +11,13 @@ from ballplate.simulator.machines import ARRANGEMENTS
 
 from .machine_tables import arrangement_of, machine_kind, table, tips_form
 from .places import Settings, Tips, places_of, tips_of
-from .sheet_values import Plate, expanded, growing_length, hours, lengths, plate, target
+from .sheet_values import Plate, expanded, hours, permissible_error, plate, target, volume
 
 # How each entry is read, in the order of the questions; the first five have to be stated.
 READERS: dict[str, Callable[[str], Any]] = {
     "machine_type": machine_kind,
-    "volume": lengths,
-    "mpe": growing_length,
+    "volume": volume,
+    "mpe": permissible_error,
     "plate": plate,
     "certificate": expanded,
     "tips": tips_form,

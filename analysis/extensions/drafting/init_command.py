@@ -73,7 +73,8 @@ def _answer(name: str, texts: dict[str, str]) -> str:
     """
     entry = table("entries")[name]
     while True:
-        print(f"{entry['question']} [{entry['default']}]: ", end="", file=sys.stderr, flush=True)
+        default = entry["default"] or "half the MPE"
+        print(f"{entry['question']} [{default}]: ", end="", file=sys.stderr, flush=True)
         line = sys.stdin.readline()
         if not line:
             raise UsageError(f"no answer about the {entry['question']}; nothing is written")

@@ -8,6 +8,8 @@ from dataclasses import dataclass
 from ballplate.simulator.inputs import (
     LengthFunction,
     Target,
+    format_length,
+    number_of,
     parse_duration,
     parse_length_function,
     parse_positive_length,
@@ -17,9 +19,11 @@ from ballplate.simulator.inputs import (
 NUMBER = r"((?:[0-9]+\.?[0-9]*|\.[0-9]+))"
 # Between lengths: a cross, a comma, or a space before the next number.
 BETWEEN = re.compile(r"\s*[x×*,;]\s*|\s+(?=[-+.0-9])")
-# A um + L/K and (A + B L/K) um, or A um + B L, perhaps after a name such as MPE.
+# A name such as E0, MPE before a value.
+NAME = re.compile(r"\s*(?:[A-Za-z]\w*(?:,\s*\w+)?\s*=)?\s*±?\s*")
+# A um + L/K and (A + B L/K) um, or A um + B L.
 GROWING = re.compile(
-    rf"(?:[A-Za-z0-9_,:. ]*=)?\s*±?\s*\(?\s*{NUMBER}\s*([uµμ]m)?\s*\+\s*{NUMBER}?\s*[*·]?\s*L\s*"
+    rf"\(?\s*{NUMBER}\s*([uµμ]m)?\s*\+\s*{NUMBER}?\s*[*·]?\s*L\s*"
     r"(?:/\s*([1-9][0-9]{0,3}))?\s*\)?\s*([uµμ]m)?"
 )
 COVERAGE = re.compile(r"\s*[,;(]?\s*k\s*=\s*([1-9](?:\.[0-9]*)?)(?![0-9])\s*\)?\s*")
@@ -49,12 +53,36 @@ def lengths(text: str, count: int = 3) -> tuple[float, ...]:
     if len(words) != count:
         example = " ".join(["900", "1200", "700"][:count])
         raise ValueError(
-            f'"{text}" has {len(words)} lengths, not {count}; write for example "{example} mm"'
+            f'"{text}" has {number_of(len(words), "length")}, not {count}; write for example'
+            f' "{example} mm"'
         )
     unit = words[-1].lstrip("-+.0123456789 ")
     return tuple(
         parse_positive_length(word if word[-1:].isalpha() else f"{word} {unit}") for word in words
     )
+
+
+def volume(text: str) -> tuple[float, ...]:
+    """Return the edges of a measuring volume in metres.
+
+    :raises ValueError: no three lengths of 10 mm to 100 m.
+    """
+    edges = lengths(text)
+    for edge in edges:
+        if not 0.01 <= edge <= 100.0:
+            raise ValueError(f'"{text}" has an edge of {format_length(edge)}; give 10 mm to 100 m')
+    return edges
+
+
+def permissible_error(text: str) -> LengthFunction:
+    """Return a maximum permissible error, whose constant part gives the repeatability.
+
+    :raises ValueError: as `growing_length`, or without a constant part.
+    """
+    found = growing_length(text)
+    if found.constant == 0.0:
+        raise ValueError(f'"{text}" has no constant part; write for example "0.9 um + L/400"')
+    return found
 
 
 def growing_length(text: str) -> LengthFunction:
@@ -71,9 +99,10 @@ def growing_length(text: str) -> LengthFunction:
     >>> growing_length("0.4 um + 0.5 L") == growing_length("0.4 um + 0.5 um/m")
     True
     """
-    match = GROWING.fullmatch(text.strip())
+    text = NAME.sub("", text, 1).strip()
+    match = GROWING.fullmatch(text)
     if match is None or not (match[2] or match[5]) or not (match[3] or match[4]):
-        return parse_length_function(text.rpartition("=")[2].strip())
+        return parse_length_function(text)
     slope = 1000 * float(match[3] or 1) / float(match[4] or 1000)
     return parse_length_function(f"{match[1]} um + {slope:.9f} um/m")
 
@@ -86,11 +115,10 @@ def expanded(text: str, usual_factor: str = "") -> Target:
     >>> expanded("U = 0.4 um + 0.5 L, k = 2").standard
     LengthFunction(constant=2e-07, slope=2.5e-07)
     """
-    match = COVERAGE.search(text)
-    stated = match[1] if match else usual_factor
-    if not stated:
-        raise ValueError(f'"{text}" has no k of 1 to 10; add that of the certificate: "…, k=2"')
-    return Target(growing_length(COVERAGE.sub("", text)), float(stated))
+    factors = COVERAGE.findall(text) or [usual_factor]
+    if not factors[0] or len(factors) > 1:
+        raise ValueError(f'"{text}" needs one coverage factor of 1 to 10; write "…, k=2"')
+    return Target(growing_length(COVERAGE.sub("", text)), float(factors[0]))
 
 
 def target(text: str) -> Target:

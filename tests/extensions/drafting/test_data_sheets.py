@@ -29,6 +29,10 @@ EXAMPLE = Path("designs/quickstart.yaml")
         ({"volume": "900 1200 0 mm"}, wording.NOTHING_HIGH),
         ({"mpe": "0.9 + L/400"}, wording.NO_UNIT_OF_MPE),
         ({"mpe": "0.9 um + L/1"}, wording.STEEP),
+        ({"mpe": "0 um + L/400"}, wording.NO_CONSTANT_PART),
+        ({"volume": "900 1200 1 mm"}, wording.SMALL_EDGE),
+        ({"volume": "900"}, wording.NO_VOLUME),
+        ({"certificate": "0.4 um, k=2, k=3"}, wording.TWO_COVERAGE_FACTORS),
         ({"mpe": "0.9 um + L/0"}, wording.DIVIDES_BY_ZERO),
         ({"certificate": "0.4 um + 0.5 um/m"}, wording.NO_COVERAGE_FACTOR),
         ({"certificate": "0.4 um, k=0.5"}, wording.SMALL_COVERAGE_FACTOR),
@@ -155,7 +159,10 @@ def test_questions_at_a_terminal(tmp_path: Path) -> None:
     assert status == 0, told
     assert wording.UNKNOWN_MACHINE in told and wording.LARGER_THAN_THE_VOLUME in told
     assert "measuring volume, x y z [900 1200 700 mm]: " in told
-    assert told.count("columns x rows of balls") == 2 and " has no k of 1 to 10" in told
+    assert (
+        told.count("columns x rows of balls") == 2
+        and wording.NO_COVERAGE_FACTOR_OF_AN_ANSWER in told
+    )
     assert "next: ballplate plan m.yaml --hours 4 -o m-chosen.yaml" in told
     assert bp.load(tmp_path / "m.yaml").layouts["plate"].names[-1] == "r5c5"
 

@@ -11,10 +11,13 @@ NOTHING_HIGH = '"0 mm" must be above zero'
 NO_UNIT_OF_MPE = '"0.9" has no unit'
 STEEP = "grows by 1 mm per metre of length"
 DIVIDES_BY_ZERO = "divides by zero"
-NO_COVERAGE_FACTOR = (
-    '"0.4 um + 0.5 um/m" has no k of 1 to 10; add that of the certificate: "…, k=2"'
-)
-SMALL_COVERAGE_FACTOR = '"0.4 um, k=0.5" has no k of 1 to 10'
+NO_COVERAGE_FACTOR = '"0.4 um + 0.5 um/m" needs one coverage factor of 1 to 10; write "…, k=2"'
+SMALL_COVERAGE_FACTOR = '"0.4 um, k=0.5" needs one coverage factor of 1 to 10'
+NO_COVERAGE_FACTOR_OF_AN_ANSWER = '"0.4 um" needs one coverage factor of 1 to 10'
+TWO_COVERAGE_FACTORS = '"0.4 um, k=2, k=3" needs one coverage factor of 1 to 10'
+SMALL_EDGE = '"900 1200 1 mm" has an edge of 1 mm; give 10 mm to 100 m'
+NO_CONSTANT_PART = '"0 um + L/400" has no constant part'
+NO_VOLUME = '"900" has 1 length, not 3'
 SINGLE_LINE = '"1 x 6, 420 mm" is no plate of 2 x 2 balls or more'
 ONE_SIZE = '"6 x 4, 420 mm" has one size for two sides; give both, such as 420 x 252 mm'
 NO_TIME = '"0" leaves no time for measuring'
