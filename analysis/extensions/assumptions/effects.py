@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 import yaml
-from ballplate.presentation import Columns, Result, aligned, given, number, picked
+from ballplate.presentation import Data, MainTable, Result, aligned, given, number, picked
 from ballplate.simulator.computing import single_threaded
 from ballplate.simulator.design import Design, State
 from ballplate.simulator.estimation import linearise, moved, newton_step
@@ -115,9 +115,9 @@ class Assumptions(Result):
             rows.append([assumption.assumed, assumption.instead, *values, number(effect.ratio, 3)])
         return aligned(rows, [False, False, True, True, True])
 
-    def columns(self) -> tuple[Columns, Sequence[Any]]:
+    def columns(self) -> MainTable:
         """Columns with one row per assumption."""
-        columns: Columns = {
+        columns = {
             "assumption": "assumption.name",
             "assumed": "assumption.assumed",
             "instead": "assumption.instead",
@@ -130,7 +130,7 @@ class Assumptions(Result):
         }
         return columns, self.effects
 
-    def data(self) -> dict[str, Any]:
+    def data(self) -> Data:
         return {
             **self.named,
             **picked(self, "average", "maximum"),
@@ -140,7 +140,7 @@ class Assumptions(Result):
         }
 
 
-def _data(effect: AssumptionEffect) -> dict[str, Any]:
+def _data(effect: AssumptionEffect) -> Data:
     bias = None
     if effect.bias is not None:
         bias = dict(zip(("average", "maximum"), effect.bias, strict=True))

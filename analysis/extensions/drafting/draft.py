@@ -9,7 +9,6 @@ from typing import Any
 
 import numpy as np
 import yaml
-from ballplate.simulator.design import DistancesSettings
 from ballplate.simulator.inputs import LengthFunction, Target, typed_length
 
 from .data_sheet import DataSheet
@@ -86,9 +85,9 @@ def _tips(tips: Tips) -> str:
 
 def _certificate(standard: LengthFunction) -> str:
     """Return the uncertainties of the distances: the part that grows with length is an error of
-    scale, common to all, if the file format has that.
+    scale, common to all.
     """
-    if standard.slope and "common" in DistancesSettings.model_fields:
+    if standard.slope:
         common = function_text(LengthFunction(0.0, standard.slope)).rpartition("+ ")[2]
         return f"standard_uncertainty: {rounded(standard.constant)}\n    common: {common}"
     return f"standard_uncertainty: {function_text(standard)}"

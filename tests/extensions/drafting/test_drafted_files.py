@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import shlex
 from pathlib import Path
-from types import SimpleNamespace
 
 import ballplate as bp
 import numpy as np
@@ -13,7 +12,6 @@ from ballplate.cli import main
 from ballplate.extensions.drafting.data_sheet import data_sheet
 from ballplate.extensions.drafting.draft import draft
 from ballplate.extensions.drafting.machine_tables import chain_words, table
-from ballplate.simulator.design.observations.distances import DistancesSettings
 from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.machines.arrangement import ARRANGEMENTS
 from ballplate.simulator.machines.settings import build_error_model
@@ -118,26 +116,11 @@ def test_what_a_file_states_is_the_data_sheet() -> None:
     assert np.isclose(experiment.target_uncertainty.at(1.0), 0.5 * (0.45e-6 + 1.25e-6))
     (distances,) = experiment.calibration
     at_side = distances.standard_uncertainties[0]
-    slope = 0.0 if "common" in DistancesSettings.model_fields else 0.25e-6 * 0.42
-    assert np.isclose(at_side, 0.2e-6 + slope)
+    assert np.isclose(at_side, np.hypot(0.2e-6, 0.25e-6 * 0.42))
+    assert "    common: 0.25 um/m" in drafted(BRIDGE).splitlines()
     uncertain = [probe.is_estimated for probe in experiment.probes.values()]
     assert uncertain == [False, True, True, True, True]
     assert experiment.layouts["plate"].names[-1] == "r6c6"
-
-
-@pytest.mark.parametrize("common", [True, False])
-def test_growth_of_a_certificate_is_common_where_the_format_has_that(
-    common: bool, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    fields = {"common": None} if common else {}
-    monkeypatch.setattr(
-        "ballplate.extensions.drafting.draft.DistancesSettings",
-        SimpleNamespace(model_fields=fields),
-    )
-    lines = drafted(BRIDGE).splitlines()
-    assert ("    common: 0.25 um/m" in lines) == common
-    constant = "    standard_uncertainty: 0.2 um"
-    assert constant + ("" if common else " + 0.25 um/m") in lines
 
 
 def test_a_target_of_ones_own() -> None:
