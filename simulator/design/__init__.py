@@ -52,7 +52,6 @@ if TYPE_CHECKING:
     from .observations.distances import (
         CalibratedDistances,
         DistanceCalibration,
-        DistancesSettings,
     )
     from .observations.joint_values import JointValues
     from .observations.lengths import (
