@@ -63,7 +63,7 @@ def _unnamed(pairs: list[tuple[str, str]]) -> str:
     if not names:
         return "states no value; name at least one ball, or remove the item"
     repeated = [name for name, times in Counter(names).items() if times > 1]
-    return f"states {listing(repeated)} more than once; remove all but one" if repeated else ""
+    return f"states {listing(repeated)} more than once; keep only one" if repeated else ""
 
 
 def _unsuitable(item: Calibration, layout: BallLayout) -> str:
@@ -83,9 +83,8 @@ def _unsuitable(item: Calibration, layout: BallLayout) -> str:
     if not is_smooth.all():
         names_listed = listing(np.array(names)[~is_smooth].tolist())
         return (
-            f"{names_listed} cannot be told where balls are as drawn, for example of balls in one"
-            " line or"
-            " in one place; choose other balls"
+            f"{names_listed} cannot be determined at the nominal locations of the balls, for"
+            " example because balls are in one line or coincide; choose other balls"
         )
     # A ball that is named twice moves with both.
     is_same = observed.balls[:, :, None] == observed.balls[:, None, :]

@@ -26,7 +26,7 @@ def changed_tree(tree: Node, file: str, changes: AnyMapping[str, Any]) -> Node:
         try:
             earlier = written.setdefault(tuple(steps_of(path)), path)
             if earlier != path:
-                raise ValueError(f'is the same place as "{earlier}"; replace it once')
+                raise ValueError(f'is the same entry as "{earlier}"; replace it once')
             tree = (
                 removed(tree, path)
                 if value is None

@@ -147,7 +147,7 @@ def _true_machine_of_file(
         ends = " to ".join(
             format_length(end[2]) for end in (true_machine.lower, true_machine.upper)
         )
-        text = f"is outside the file's volume, which goes from {ends} in z; stay within it"
+        text = f"is outside the file's volume ({ends} in z); stay within it"
         references.problems.add(("true_machine", "level"), text)
     for axis, name in enumerate(AXES[: machine.dimension]):
         low, high = machine.volume.lower[axis], machine.volume.upper[axis]
@@ -156,8 +156,8 @@ def _true_machine_of_file(
             or high > true_machine.upper[axis] + TOLERANCE
         ):
             text = (
-                f"its volume goes from {format_length(true_machine.lower[axis])} to"
-                f" {format_length(true_machine.upper[axis])} in {name}, but machine.volume from"
+                f"its volume is {format_length(true_machine.lower[axis])} to"
+                f" {format_length(true_machine.upper[axis])} in {name}, but machine.volume is"
                 f" {format_length(low)} to {format_length(high)}; stay within it"
             )
             references.problems.add(steps, text)
@@ -241,10 +241,10 @@ def _read_curves(truth: CurvesSettings, machine: Machine | None, references: Ref
         covered = min(points.positions[-1], upper) - max(points.positions[0], lower)
         if covered < 0.5 * (upper - lower):
             text = (
-                f"goes from {format_length(points.positions[0])} to"
-                f" {format_length(points.positions[-1])}, but machine.volume from"
-                f" {format_length(lower)} to {format_length(upper)} in {AXES[axis]}; give most"
-                " of it"
+                f"covers {format_length(points.positions[0])} to"
+                f" {format_length(points.positions[-1])}, but machine.volume is"
+                f" {format_length(lower)} to {format_length(upper)} in {AXES[axis]}; cover most of"
+                " it"
             )
             problems.add(steps, text)
     truth.set_curves(curves)
@@ -309,11 +309,10 @@ def check_inside(
         else ""
     )
     text = (
-        f'reading ball "{layout.names[balls[worst]]}" with probe "{probe}" puts the scales at'
+        f'reading ball "{layout.names[balls[worst]]}" with probe "{probe}" moves the scales to'
         f" {AXES[axis]} = {format_length(place - offset)}{less},"
         f" {format_length(by_how_much[worst])} {sides[worst]} the measuring volume{others_text};"
-        " move"
-        " the artefact, or read it otherwise"
+        " move the artefact, or read it otherwise"
     )
     references.problems.add(steps, text)
 
@@ -471,8 +470,8 @@ def check_size(
     shared = errors + pose_size(d) * poses + d * (len(pivots) + offsets)
     if shared > MOST_SHARED:
         text = (
-            f"{poses + len(pivots)} poses, {errors} machine errors and {offsets} probe"
-            f" offsets make {shared} parameters besides the balls; at most {MOST_SHARED} are"
+            f"{poses + len(pivots)} poses, {errors} machine errors and {offsets} probe offsets"
+            f" make {shared} parameters in addition to the balls; at most {MOST_SHARED} are"
             " possible: leave positions out, or give the machine fewer coefficients"
         )
         problems.add(("positions",), text, of_key=True)
@@ -505,8 +504,8 @@ def check_derivatives(
     errors = len(build_error_model(settings, *machine.volume.corners).parameters)
     if count * d * errors > MOST_DERIVATIVES:
         text = (
-            f"{count} points with {errors} machine errors have {count * d * errors} derivatives; at"
-            f" most {MOST_DERIVATIVES // (d * errors)} points are possible with so many errors"
+            f"{count} points with {errors} machine errors have {count * d * errors} derivatives;"
+            f" at most {MOST_DERIVATIVES // (d * errors)} points are possible with these errors"
         )
         references.problems.add(("evaluation", "points"), text)
 

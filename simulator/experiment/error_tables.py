@@ -197,15 +197,15 @@ def _range(
     if not limits:
         return []
     shift = lower - positions[0]
-    right = "give positions of the axis, in the unit that the header says, and cover the axis"
+    right = "give positions of the axis, in the unit of the header, and cover the axis"
     if abs(shift) > MARGIN * length and abs(positions[-1] + shift - upper) <= MARGIN * length:
         change = (
             f"add {format_length(shift)} to"
             if shift > 0.0
-            else f"take {format_length(-shift)} from"
+            else f"subtract {format_length(-shift)} from"
         )
         right = f"{change} every position, or state the volume as the scales read"
-    reason = f"but the axis goes from {format_length(lower)} to {format_length(upper)}"
+    reason = f"but the axis is {format_length(lower)} to {format_length(upper)}"
     return [Message(file, number, 1, "", f"{text}, {reason}; {right}") for number, text in limits]
 
 

@@ -137,8 +137,8 @@ def _refuse_too_many(disturbed: Design, experiment: Experiment, is_pool: bool) -
         shared -= int(poses.sum()) + sum(parameter.position >= 0 for parameter in parameters)
     if shared > MOST_SHARED:
         text = (
-            f"their {len(parameters)} parameters make {shared} besides the balls; at most"
-            f" {MOST_SHARED} are possible: leave positions or candidates out, or take parameters"
+            f"their {len(parameters)} parameters make {shared} in addition to the balls; at most"
+            f" {MOST_SHARED} are possible: leave positions or candidates out, or state parameters"
             " of single positions as exact"
         )
         raise experiment.refused(("influences",), text)

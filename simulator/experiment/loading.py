@@ -88,7 +88,7 @@ def load(
                 " and evaluation "
             )
             text += (
-                f"points; at most {MOST_OF_ALL} are possible: put some of the variants into a file"
+                f"points; at most {MOST_OF_ALL} are possible: move some of the variants to a file"
                 " of their own"
             )
             base_problems.add(("variants", name), text)

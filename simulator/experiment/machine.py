@@ -66,8 +66,8 @@ def resolve_machine(settings: MachineSettings, problems: Problems) -> Machine | 
     largest = max(by_axis.values())
     if largest >= LARGE_REPEATABILITY:
         text = (
-            f"{format_length(largest)} is far more than the readings of a co-ordinate measuring"
-            f" machine scatter; write {typed_length(largest / 1000)} if that is meant"
+            f"{format_length(largest)} is far above the repeatability of a co-ordinate measuring"
+            f" machine; write {typed_length(largest / 1000)} if that is meant"
         )
         problems.doubt(steps, text)
     lower_corner, upper_corner = zip(*ends.values(), strict=True)
@@ -87,12 +87,15 @@ def resolve_noise(settings: str | NoiseSettings | None, problems: Problems) -> N
         text = "student t has no degrees of freedom; write {distribution: student t, degrees_of_"
         problems.add(steps, text + "freedom: 5}")
     elif settings.distribution != "student t" and freedom is not None:
-        text = f"{settings.distribution} noise has none; remove it, or write student t"
+        text = (
+            f"{settings.distribution} noise has no degrees of freedom; remove the key, or write"
+            " student t"
+        )
         problems.add((*steps, "degrees_of_freedom"), text)
     if settings.correlation:
         text = (
-            "is that of simulated readings only: U1 to U6 take the noise of all readings as"
-            " independent; have uncertainties with it by Monte Carlo (run --trials)"
+            "applies to simulated readings only: U1 to U6 assume independent noise in all"
+            " readings; determine uncertainties with it by Monte Carlo (run --trials)"
         )
         problems.doubt((*steps, "correlation"), text)
     return Noise(settings.distribution, freedom or np.inf, settings.correlation)
@@ -116,7 +119,9 @@ def resolve_evaluation(
             probe in references.probes, ("evaluation", "probe"), _unknown(probe, references)
         )
     if settings.points is None and settings.tasks is None:
-        text = 'gives nothing to evaluate; add "points", such as {random: 200, seed: 1}, or "tasks"'
+        text = (
+            'has neither points nor tasks; add "points", such as {random: 200, seed: 1}, or "tasks"'
+        )
         references.problems.add(("evaluation",), text)
         return None
     tasks = [
@@ -172,7 +177,7 @@ def _task(
     points = np.array([settings.start, settings.to])
     ends = points + [probes[name].offset for name in used]
     if np.linalg.norm(np.diff(ends, axis=0)) <= TOLERANCE:
-        problems.add((*steps, "to"), "is where the length begins; give two points")
+        problems.add((*steps, "to"), "coincides with the start of the length; give two points")
         return None
     return Task(
         settings.name, frozen(points), used, target_of(sections, settings.target_uncertainty)

@@ -166,7 +166,7 @@ def _check_ends(ends: Iterable[tuple[float, float]], problems: Problems) -> None
             )
             problems.add(("volume", axis), text)
         elif upper == lower:
-            text = f"ends where it begins, at {format_length(lower)}; give an end above it"
+            text = f"begins and ends at {format_length(lower)}; give an end above it"
             problems.add(("volume", axis), text)
 
 
@@ -348,9 +348,9 @@ def _inside(
     for k, value in enumerate(point or ()):
         if not machine.lower[k] <= value <= machine.upper[k]:
             text = (
-                f"{AXES[k]} = {format_length(value)} is outside the volume, which goes from"
-                f" {format_length(machine.lower[k])} to {format_length(machine.upper[k])}; correct"
-                " one of the two"
+                f"{AXES[k]} = {format_length(value)} is outside the volume"
+                f" ({format_length(machine.lower[k])} to {format_length(machine.upper[k])});"
+                " correct one of the two"
             )
             problems.add(steps, text)
             is_inside = False

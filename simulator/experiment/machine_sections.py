@@ -29,22 +29,19 @@ MOST_COEFFICIENTS = 11
 
 Point = tuple[Length, Length, Length]
 Sigmas = Literal[1, 2, 3]
-BANDWIDTH = (
-    "random part, as so many standard deviations on either side as sigmas says, the same along the"
-    " axis"
-)
+BANDWIDTH = "random part: a half-width of sigmas standard deviations, the same along the axis"
 SIGMAS = "standard deviations in a bandwidth: 1, 2 or 3"
 POLYNOMIAL = "coefficients of 1, t, t^2, … with t from 0 to 1 along the axis, to the tenth order"
 FILE = (
-    "CSV file with columns such as position_mm,EXX_um, whose comments may say # line, #"
+    "CSV file with columns such as position_mm,EXX_um and optional comments # line, #"
     " straightness, # probe"
 )
-LINE = "where it was measured, as positions of the other axes; default: through the reference point"
+LINE = "line of measurement, as positions of the other axes; default: through the reference point"
 PROBE = (
     "offset of the reflector or tip from the reference point of the probe while it was measured;"
     " default 0"
 )
-STRAIGHTEDGE = "table, where it was measured along a straightedge on a table that the axis moves"
+STRAIGHTEDGE = "table, if it was measured along a straightedge on a table that the axis moves"
 STRAIGHTNESS = "reference line of straightness errors: end points, least squares or minimum zone"
 
 
@@ -69,14 +66,14 @@ class SmoothingSettings(Settings):
         ),
     )
     every: int | None = Field(
-        None, ge=1, description="a knot at every so many points, as ballplate spline --every has"
+        None, ge=1, description="n: a knot at every n-th point, as in ballplate spline --every"
     )
     knots: tuple[Length, ...] | None = Field(None, description="positions of the knots")
 
     @model_validator(mode="after")
     def _one_kind_of_knots(self) -> Self:
         if self.every is not None and self.knots is not None:
-            raise ValueError('"every" and "knots" both say where knots are; leave one of them out')
+            raise ValueError('"every" and "knots" both state the knots; leave one of them out')
         return self
 
 
@@ -85,8 +82,8 @@ class _ErrorSettings(Settings):
     fit: SmoothingSettings | None = Field(
         None,
         description=(
-            "least-squares fit to the points of the file, to be used in their place: {order: 4} is"
-            " a cubic polynomial, {every: 5} a cubic spline"
+            "least-squares fit to the points of the file, used instead of them: {order: 4} is a"
+            " cubic polynomial, {every: 5} a cubic spline"
         ),
     )
     sigmas: Sigmas = Field(2, description=SIGMAS)
@@ -101,12 +98,10 @@ class _ErrorSettings(Settings):
                 "a polynomial and a file cannot both be the error; leave one of them out"
             )
         if self.fit is not None and self.file is None:
-            raise ValueError(
-                "there is nothing to fit; name a file with measured points, or remove it"
-            )
+            raise ValueError("fit has no points; name a file with measured points, or remove fit")
         if polynomial is None and self.file is None and bandwidth is None:
             raise ValueError(
-                "nothing is stated; give a polynomial, a file, or the bandwidth of a random error"
+                "has no data; give a polynomial, a file, or the bandwidth of a random error"
             )
         for key in ("line", "probe", "straightness", "straightedge"):
             if key in self.model_fields_set and polynomial is None:
@@ -171,9 +166,7 @@ class SquarenessValue(Settings):
     )
     at: Point | None = Field(
         None,
-        description=(
-            "where the two lines cross on which it was measured; default: the reference point"
-        ),
+        description="intersection of the two lines of measurement; default: the reference point",
     )
     bandwidth: PositiveAngle | None = Field(
         None, description="random part, the same wherever the machine is"
@@ -232,7 +225,7 @@ class DescribedMachineSettings(Settings):
     """
 
     title: Line = Field(description="one-line description of the machine")
-    description: Text | None = Field(None, description="further remarks")
+    description: Text | None = Field(None, description="further notes")
     arrangement: ArrangementName | ArrangementSettings = Field(description=ARRANGEMENT)
     volume: Forms[VolumeSettings, Annotated[Edges, Field(min_length=3)], VolumeSettings] = Field(
         description="ends per axis, {x: [0 mm, 1 m], …}, or edges from 0, [1 m, 1 m, 1 m]"
@@ -240,7 +233,8 @@ class DescribedMachineSettings(Settings):
     reference_point: Point | None = Field(
         None,
         description=(
-            "where all errors are zero and lines of reference cross; default: the lower corner"
+            "point where all errors are zero and lines of reference cross; default: the lower"
+            " corner"
         ),
     )
     probe: Point | None = Field(

@@ -180,8 +180,8 @@ def _has_its_files(settings: MapSettings, folder: Path, problems: Problems) -> b
     for name, fingerprint in settings.files.items():
         if name not in present or present[name] != fingerprint:
             text = (
-                "has changed since the map was written, which may no longer belong to it; put the"
-                " earlier file back, or fit again"
+                "has changed since the map was written, and the map may no longer belong to it;"
+                " restore the earlier file, or fit again"
             )
             problems.add(("files", name), text)
     return len(problems.messages) == before
@@ -197,7 +197,7 @@ def _probes(settings: MapSettings, d: int, problems: Problems) -> Probes | None:
     if len(settings.repeatability) != d:
         problems.add(("repeatability",), f"is not of {d} axes, as the volume")
     if settings.probe not in settings.probes:
-        text = f"is none of the probes; known: {listing(settings.probes)}"
+        text = f"is not one of the probes; known: {listing(settings.probes)}"
         problems.add(("probe",), text)
     if problems.messages:
         return None
@@ -345,8 +345,9 @@ def _check_unchanged(
     checksum = settings.checksum
     if checksum is not None and checksum != checksum_of(head, covariance, undetermined):
         text = (
-            "is not that of what the file says: it was edited or damaged since it was written;"
-            " write it again with fit -o, or remove the checksum if the changes are meant"
+            "does not match the content of the file: it was edited or damaged since it was"
+            " written; write it again with fit -o, or remove the checksum if the changes are"
+            " meant"
         )
         problems.add(("checksum",), text)
         return

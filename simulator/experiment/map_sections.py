@@ -29,7 +29,7 @@ class MapProbeSettings(Settings):
         (), description="axes of which the offset was estimated"
     )
     nominal: PerAxis | None = Field(
-        None, description="of an estimated offset: what was stated before; default: the estimate"
+        None, description="of an estimated offset: the value stated before; default: the estimate"
     )
 
 
@@ -64,7 +64,7 @@ class LeftOutSettings(Settings):
     """An estimate of the fit that the map does not apply."""
 
     name: Text = Field(description="as fit reports it")
-    kind: Text = Field(description="what it is of, such as influence")
+    kind: Text = Field(description="type of the estimate, such as influence")
     unit: Unit = Field(description="its unit")
     value: float | None = Field(None, description="the estimate; left out: undetermined")
     standard_uncertainty: float | None = Field(None, description="of the estimate")
@@ -74,9 +74,9 @@ class MapDataSettings(Settings):
     """The readings that a map comes from."""
 
     readings: Annotated[int, Field(ge=0)] = Field(description="how many")
-    sha256: Sha256 = Field(description="SHA-256 of what they say")
+    sha256: Sha256 = Field(description="SHA-256 of their content")
     positions: tuple[Fingerprint, ...] = Field(
-        (), description="what each position's readings say, in short, those of a prior map included"
+        (), description="fingerprints of each position's readings, those of a prior map included"
     )
 
 
@@ -91,7 +91,7 @@ class LackOfFitSettings(Settings):
         0, description="gross errors that the fit suspected among the readings"
     )
     has_pattern: bool = Field(
-        True, description="whether residuals have a pattern that scatter does not explain"
+        True, description="whether residuals have a pattern that noise does not explain"
     )
 
 
@@ -104,7 +104,8 @@ class MapSettings(Settings):
     date: Day | None = Field(None, description="day of the campaign, such as 2026-11-22")
     program: str = Field("", description="program that wrote the file")
     extensions: tuple[Text, ...] = Field(
-        (), description="names of extensions that the error model needs besides those shipped"
+        (),
+        description="names of extensions that the error model needs in addition to those shipped",
     )
     error_model: ErrorModelSettings = Field(  # type: ignore[valid-type]
         description="error model, as in an experiment file"
@@ -119,7 +120,7 @@ class MapSettings(Settings):
         description="stated standard uncertainty of a reading along each axis"
     )
     probes: dict[Name, MapProbeSettings] = Field(min_length=1, description="probes by name")
-    probe: Name = Field(description="the one that is meant where none is named")
+    probe: Name = Field(description="probe used if none is named")
     sigma: MapSigmaSettings = Field(
         description="factor of the stated uncertainties, and degrees of freedom"
     )
@@ -147,7 +148,7 @@ class MapSettings(Settings):
         ),
     )
     undetermined: tuple[str | float | int, ...] = Field(
-        (), description=f"directions that nothing determined, each {ROW}, one for each parameter"
+        (), description=f"directions that were not determined, each {ROW}, one for each parameter"
     )
     covariance: NonEmpty[str | float | int] = Field(
         description=(
@@ -157,7 +158,7 @@ class MapSettings(Settings):
         )
     )
     checksum: Sha256 | None = Field(
-        None, description="SHA-256 of what the file says; left out of a file written by hand"
+        None, description="SHA-256 of the file's content; left out of a file written by hand"
     )
 
 

@@ -46,7 +46,7 @@ def resolve_position(
     in_plane = references.artefacts[artefact].reads == "in plane"
     text = (
         f'"{artefact}" is read in its plane, which has to be across an axis of the machine;'
-        " correct the pose, or say reads: in space of the artefact"
+        " correct the pose, or write reads: in space for the artefact"
     )
     is_across = float(np.abs(pose.rotation[:, -1]).max()) > 1.0 - OBLIQUE
     if not references.require(is_across or not in_plane, (*steps, "pose"), text):
@@ -119,7 +119,7 @@ def _placement(
         return None
     if not {"plane", "level", "corner", "centre"} & set(plane_keys):
         needed = "corner or centre" if dimension == 2 else "plane, level and corner or centre"
-        problems.add(steps, f"does not say where the artefact is; add {needed}, or pose")
+        problems.add(steps, f"does not state the artefact's location; add {needed}, or pose")
         return None
     is_right = True
     if dimension == 2:

@@ -361,7 +361,7 @@ def _places(
         # A grid so fine that it is refused need not be made.
         count = len(places_by_axis[first]) * len(places_by_axis[second])
         if count > MOST_CANDIDATES:
-            text = f"{count} places are too many; at most {MOST_CANDIDATES} are possible"
+            text = f"{count} locations are too many; at most {MOST_CANDIDATES} are possible"
             references.problems.add(steps, text)
             return {}
         result[plane] = tuple(product(places_by_axis[first], places_by_axis[second]))

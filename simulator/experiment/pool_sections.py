@@ -38,7 +38,7 @@ class TimesSettings(OwnTimesSettings):
     plane_change: Seconds = Field(
         None,
         description=(
-            "additional, where a position is in another plane, or of another artefact, than the"
+            "additional, if a position is in another plane, or of another artefact, than the"
             " previous one; default 30 min"
         ),
     )
@@ -219,9 +219,7 @@ CandidateSettings = Annotated[
 
 class _Priced(Settings):
     name: Name = Field(description="name of the item, used in tables and messages")
-    price: Duration = Field(
-        0.0, description="what it takes of the budget, such as 3 h; default nothing"
-    )
+    price: Duration = Field(0.0, description="time taken from the budget, such as 3 h; default 0 h")
 
 
 @cache
@@ -258,7 +256,7 @@ class SelectorSettings(Settings):
     def _something(self) -> Self:
         if not self.model_fields_set:
             raise ValueError(
-                "selects nothing; give at least one of name, group, plane, artefact, probe"
+                "has no criterion; give at least one of name, group, plane, artefact, probe"
             )
         return self
 
@@ -298,7 +296,7 @@ class LimitsSettings(Settings):
     )
     reach: dict[Name, RegionSettings] = Field(
         default_factory=dict,
-        description="name of a probe → where balls can be read with it, {x: [200 mm, 1 m]}",
+        description="name of a probe → region in which it can read balls, {x: [200 mm, 1 m]}",
     )
     edge: Length | None = Field(
         None,
@@ -313,7 +311,8 @@ class PoolSettings(Settings):
     """What a plan chooses from, besides the positions of the file."""
 
     times: TimesSettings = Field(
-        default_factory=lambda: TimesSettings.model_validate({}), description="how long things take"
+        default_factory=lambda: TimesSettings.model_validate({}),
+        description="durations of set-up, readings and changes",
     )
     candidates: tuple[CandidateSettings, ...] = Field(
         (), description="groups of candidates, and single ones described as a position is"

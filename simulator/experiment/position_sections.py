@@ -45,7 +45,7 @@ class InPlaneSettings(Settings):
 class PoseSettings(Settings):
     """A free pose x = R y + origin of an artefact."""
 
-    origin: Coordinates = Field(description="where the origin of the artefact's frame is")
+    origin: Coordinates = Field(description="location of the origin of the artefact's frame")
     rotation: Forms[Angle, tuple[Angle, Angle, Angle], tuple[Angle, Angle, Angle]] | None = Field(
         None,
         description=(
@@ -75,7 +75,7 @@ class PositionSettings(Settings):
 
     name: Name = Field(description="name of the position, used in tables and messages")
     description: Name | None = Field(
-        None, description="what the position is, beside a short name; shown on run sheets"
+        None, description="one-line description in addition to a short name; shown on run sheets"
     )
     artefact: Name | None = Field(
         None, description="name of the artefact; optional if there is exactly one"

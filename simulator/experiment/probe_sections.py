@@ -21,7 +21,7 @@ class ProbeSettings(Settings):
         None, description="offset from the machine's reference point, as far as it is known"
     )
     a: Angle | None = Field(
-        None, alias="A", description="angle A of the head, 0 where the stylus points down"
+        None, alias="A", description="angle A of the head, 0 if the stylus points down"
     )
     b: Angle | None = Field(
         None, alias="B", description="angle B of the head, about the machine's z axis; default 0"
@@ -81,7 +81,7 @@ class StarSettings(Settings):
         "stated",
         description=(
             "stated (default): the star turns about the machine's reference point; unknown: its"
-            " place is estimated too, from the probe that is the reference"
+            " location is estimated too, relative to the probe that is the reference"
         ),
     )
     values: Text | None = Field(

@@ -52,7 +52,7 @@ def resolve_probes(sections: Sections, references: References) -> dict[str, Prob
             uncertainty = _offset_uncertainty(settings, steps, references)
             if name in members and (settings.unknown or settings.standard_uncertainty):
                 key = "unknown" if settings.unknown else "standard_uncertainty"
-                text = "its star says what is known of this probe; remove it"
+                text = "its star states the uncertainty of this probe; remove it"
                 problems.add((*steps, key), text, True)
         if name in members:
             uncertainty = frozen([np.inf] * (dimension or 0))
@@ -186,8 +186,8 @@ def _reference_probe(sections: Sections, references: References) -> str:
     in_place = _in_place(sections, references)
     if named:
         text = (
-            "its star turns about a stated place, which is the reference; remove it, or say place:"
-            " unknown of the star"
+            "its star turns about a stated place, which is the reference; remove it, or write"
+            " place: unknown for the star"
         )
         references.require(named[0] not in in_place, ("probes", named[0], "reference"), text)
         return named[0]
@@ -196,7 +196,7 @@ def _reference_probe(sections: Sections, references: References) -> str:
     first = references.probes[0] if references.probes else ""
     if first in listed and (listed[first].unknown or listed[first].standard_uncertainty):
         text = (
-            "its offset is held as stated, as the first probe is the reference where none has"
+            "its offset is held as stated, as the first probe is the reference if none has"
             " reference: true"
         )
         problems.doubt(("probes", first), f"{text}; its stated uncertainty is ignored")

@@ -44,7 +44,7 @@ def check_readings(sections: Sections, references: References) -> None:
     for name, offset in offsets.items():
         references.has_dimension(offset, ("readings", "offsets_in_controller", name))
     if offsets and settings.coordinates not in ("ball centres", "part"):
-        text = "goes with coordinates: ball centres, or part; add it, or leave this out"
+        text = "applies to coordinates: ball centres, or part; add it, or leave this out"
         problems.add(("readings", "offsets_in_controller"), text)
     _read_correction(settings, references)
 

@@ -17,7 +17,7 @@ Coordinate = Literal["scale readings", "ball centres", "part"]
 COORDINATES: tuple[Coordinate, ...] = ("scale readings", "ball centres", "part")
 
 Columns = Forms[Name, Name, Annotated[dict[Name, Name], Field(min_length=1)]]
-_COORDINATE = "its name or number, or {probe: column, …} where each probe has a column"
+_COORDINATE = "its name or number, or {probe: column, …} if each probe has a column"
 
 
 class CompensationSettings(OfMachineFile):
@@ -66,7 +66,7 @@ class ReadingsSettings(Settings):
         ),
     )
     columns: ColumnsSettings | None = Field(
-        None, description="which columns of the table are meant, where their names do not tell"
+        None, description="columns of the table, if their names do not identify them"
     )
     unit: Text | None = Field(
         None, description="unit of columns that state none: mm, um, m, in or another length unit"
@@ -75,7 +75,7 @@ class ReadingsSettings(Settings):
         None, description="point or comma before decimals; default: found in the table"
     )
     separator: Literal["comma", "semicolon", "tab", "bar", "space"] | None = Field(
-        None, description="what separates columns; default: found in the table"
+        None, description="separator of columns; default: found in the table"
     )
     encoding: Text | None = Field(
         None, description="encoding of the table, such as cp1250; default: UTF-8, 16 or cp1252"
@@ -86,22 +86,22 @@ class ReadingsSettings(Settings):
     swap_names: bool | None = Field(
         None,
         description=(
-            "true: where readings show that the names of two balls of a position are swapped, swap"
-            " them, and tell; default: refuse them"
+            "true: if readings show that the names of two balls of a position are swapped, swap"
+            " and report them; default: refuse them"
         ),
     )
     coordinates: Coordinate | None = Field(
         None,
         description=(
-            "scale readings (default), ball centres, from which the measuring program has taken off"
-            " the probe's offset, or part: ball centres in a part's co-ordinate system, another in"
-            " each position"
+            "scale readings (default), ball centres, from which the measuring program has"
+            " subtracted the probe's offset, or part: ball centres in a part's co-ordinate"
+            " system, another in each position"
         ),
     )
     offsets_in_controller: dict[Name, Coordinates] | None = Field(
         None,
         description=(
-            "name → offset that the measuring program has applied to ball centres, where it is not"
+            "name → offset that the measuring program has applied to ball centres, if it is not"
             " that of probes"
         ),
     )
@@ -109,8 +109,8 @@ class ReadingsSettings(Settings):
         Field(
             None,
             description=(
-                "whether the machine's own correction was on; or {file: machine.yaml}, which was on"
-                " and is taken off"
+                "whether the machine's own correction was on; or {file: machine.yaml}, which was"
+                " on and is subtracted"
             ),
         )
     )

@@ -67,8 +67,8 @@ def resolve_references(
         twins = coincident_balls(layout)
         for i, j in twins[:3]:
             text = (
-                f'balls "{layout.names[i]}" and "{layout.names[j]}" are at the same place; correct'
-                " one of them"
+                f'balls "{layout.names[i]}" and "{layout.names[j]}" have the same location;'
+                " correct one of them"
             )
             problems.add(where, text)
         if dimension == 2 and np.any(layout.coordinates[:, 2]):
@@ -82,7 +82,7 @@ def resolve_references(
         elif not twins:
             artefacts[name], layouts[name] = listed, layout
         if listed.reads == "in plane":
-            text = "what is read in its plane is a plate in space; remove it, and flatness"
+            text = "only a plate in space is read in its plane; remove it, and flatness"
             if listed.role != "plate" or dimension == 2:
                 problems.add((*steps, "reads"), text)
         if listed.axes is not None:

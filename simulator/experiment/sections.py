@@ -88,7 +88,7 @@ class MapPriorSettings(Settings):
         None, description="years since the campaign of the map"
     )
     date: Day | None = Field(
-        None, description="day of this campaign, such as 2027-05-22, in place of years"
+        None, description="day of this campaign, such as 2027-05-22, instead of years"
     )
     offsets: bool = Field(
         False,
@@ -133,9 +133,9 @@ class TaskSettings(Settings):
 
     name: Name = Field(description="name of the task, used in tables and messages")
     start: Coordinates = Field(
-        alias="from", description="where the length begins: co-ordinates as those of points"
+        alias="from", description="start of the length: co-ordinates as those of points"
     )
-    to: Coordinates = Field(description="where the length ends")
+    to: Coordinates = Field(description="end of the length")
     probe: Name | None = Field(
         None, description="probe that both ends are measured with; default: evaluation.probe"
     )
@@ -161,7 +161,7 @@ class EvaluationSettings(Settings):
     ) = Field(
         None,
         description=(
-            "{random: 200, seed: 1}, {file: points.csv}, or a list of co-ordinates; optional where"
+            "{random: 200, seed: 1}, {file: points.csv}, or a list of co-ordinates; optional if"
             " tasks are given"
         ),
     )
@@ -178,7 +178,7 @@ class ExperimentSettings(Settings):
     """A ball-plate experiment on a co-ordinate measuring machine."""
 
     title: Line = Field(description="one-line description of the experiment")
-    description: Text | None = Field(None, description="further remarks")
+    description: Text | None = Field(None, description="further notes")
     machine: MachineSettings = Field(description="measuring volume and repeatability")
     error_model: ErrorModelSettings = Field(  # type: ignore[valid-type,unused-ignore]
         description="the errors of the machine that are estimated"
@@ -190,25 +190,27 @@ class ExperimentSettings(Settings):
     probes: Annotated[dict[Name, AnyProbe], Field(min_length=1)] | None = Field(
         None,
         description=(
-            "name → offset of the probe from the machine's reference point, or {offset: …, "
-            "standard_uncertainty: …} where it is estimated; optional in 2-D"
+            "name → offset of the probe from the machine's reference point, or {offset: …,"
+            " standard_uncertainty: …} if it is estimated; optional in 2-D"
         ),
     )
     head: HeadSettings | None = Field(
         None, description="articulating head, whose angles A and B probes may be stated by"
     )
     stars: NonEmpty[StarSettings] | None = Field(
-        None, description="probes whose tips are known among one another, as one body"
+        None, description="probes whose tips are known relative to one another, as one body"
     )
     artefacts: Annotated[dict[Name, AnyArtefactSettings], Field(min_length=1)] = Field(
         description=f"name → artefact: {', '.join(ARTEFACTS)}"
     )
     positions: NonEmpty[PositionSettings] = Field(
-        description="where the artefacts are put and what is read there"
+        description="placements of the artefacts and the balls read in each"
     )
     calibration: tuple[CalibrationSettings, ...] = Field(
         (),
-        description="what is known of the artefacts: distances, coordinates, radius; may be empty",
+        description=(
+            "calibrated values of the artefacts: distances, coordinates, radius; may be empty"
+        ),
     )
     pool: PoolSettings | None = Field(
         None, description="candidates from which ballplate plan chooses positions and calibration"
@@ -217,13 +219,13 @@ class ExperimentSettings(Settings):
         None, description="prior knowledge of machine errors and poses, or a map of the machine"
     )
     readings: ReadingsSettings | None = Field(
-        None, description="the laboratory's readings: where they are and how they are written"
+        None, description="the laboratory's readings: their files and format"
     )
     influences: NonEmpty[AnyInfluence] | None = Field(
-        None, description="what disturbs readings, such as temperature, probing or drift"
+        None, description="effects on readings, such as temperature, probing or drift"
     )
     evaluation: EvaluationSettings | None = Field(
-        None, description="where the machine's uncertainty is evaluated"
+        None, description="points and lengths for which the machine's uncertainty is evaluated"
     )
     target_uncertainty: LengthFunction | None = Field(
         None,
@@ -258,7 +260,7 @@ class ExperimentSettings(Settings):
     )
     seed: Seed = Field(1, description="seed of simulated readings; default 1")
     extensions: NonEmpty[Text] | None = Field(
-        None, description="names of extensions that the file needs besides those shipped"
+        None, description="names of extensions that the file needs in addition to those shipped"
     )
     variants: Annotated[dict[Name, dict[Text, Any]], Field(min_length=1)] | None = Field(
         None,

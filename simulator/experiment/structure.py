@@ -49,8 +49,8 @@ OTHER_FILES = {
         " experiment"
     ),
     "map": (
-        "this is a map that a fit left behind; use it with ballplate correct, map or diff,"
-        " or name it as a prior or true machine with kind: map in an experiment"
+        "this is the error map of a fit; use it with ballplate correct, map or diff, or name it"
+        " as a prior or true machine with kind: map in an experiment"
     ),
 }
 

@@ -48,8 +48,7 @@ def read_true_map(truth: TrueMapSettings, machine: Machine | None, references: R
     if true_map.undetermined.shape[1]:
         text = (
             f"has {true_map.undetermined.shape[1]} undetermined directions, in which the true"
-            " machine"
-            " is as the fit happened to leave it"
+            " machine keeps arbitrary values of the fit"
         )
         references.problems.doubt(steps, text)
     if machine is None:
@@ -81,7 +80,7 @@ def resolve_map_prior(
     if fitted is None or years is None or not _is_same(fitted, model, machine, of_file, references):
         return []
     if fitted.conversion_residual is not None:
-        text = "was converted from another error model, and holds what no readings were asked for"
+        text = "was converted from another error model, and has values that no readings determined"
         problems.add(of_file, f"{text}; use the map that fit wrote")
         return []
     kept_indices = np.arange(len(fitted.values))
@@ -101,7 +100,7 @@ def resolve_map_prior(
     combinations = determined_combinations(marginal_of(fitted, kept_indices))
     if fitted.without_scatter or not fitted.sigma > 0.0 or not (combinations[2] > 0.0).all():
         text = (
-            "states no uncertainty, as that of readings without scatter does; use the map of real"
+            "states no uncertainty, like a map of readings without noise; use the map of real"
             " readings"
         )
         problems.add(of_file, text)
@@ -161,7 +160,7 @@ def _years(
         problems.add((*steps, "drift_per_year"), text)
         return None
     if fitted.date is None:
-        text = "the map states no date; give years: 0.5 in place of the date of this campaign"
+        text = "the map states no date; give years: 0.5 instead of the date of this campaign"
         problems.add((*steps, "date"), text)
         return None
     start, end = parse_day(fitted.date), parse_day(settings.date)
@@ -224,9 +223,8 @@ def _check_ends(
         if is_wrong:
             remedy = "stay within it" if outside_only else "make them the same, or convert the map"
             text = (
-                f"its volume goes from {format_length(ends[0])} to {format_length(ends[1])} in"
-                f" {axis}, but machine.volume from {format_length(low)} to {format_length(high)};"
-                f" {remedy}"
+                f"its volume is {format_length(ends[0])} to {format_length(ends[1])} in {axis},"
+                f" but machine.volume is {format_length(low)} to {format_length(high)}; {remedy}"
             )
             references.problems.add(steps, text)
             is_right = False

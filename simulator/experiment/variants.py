@@ -100,9 +100,7 @@ def variant_trees(root: Node, problems: Problems) -> dict[str, Node]:
                     (p for p, steps in places.items() if _overlap(steps, place)), None
                 )
                 if overlapping is not None:
-                    raise ValueError(
-                        f'is part of the same place as "{overlapping}"; replace it once'
-                    )
+                    raise ValueError(f'overlaps the path "{overlapping}"; replace it once')
                 places[path] = place
                 tree = override(tree, path, node, overrides.key_marks[path])
             except ValueError as error:
@@ -230,9 +228,7 @@ def _replaced(
         below = _replaced(node.items[i], deeper, value, mark, here)
         return replace(node, items=(*node.items[:i], below, *node.items[i + 1 :]))
     named = format_path(above) or "the experiment"
-    raise ValueError(
-        f"{named} is {describe(node.value)} and has nothing below it; replace it as a whole"
-    )
+    raise ValueError(f"{named} is {describe(node.value)} and has no entries; replace it as a whole")
 
 
 def _index(node: Sequence, step: str, above: tuple[str, ...]) -> int:

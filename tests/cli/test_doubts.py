@@ -23,11 +23,11 @@ QUICKSTART = Path("designs/quickstart.yaml")
         (
             "0.4 mm",
             (
-                "0.4 mm is far more than the readings of a co-ordinate measuring machine scatter;"
+                "0.4 mm is far above the repeatability of a co-ordinate measuring machine;"
                 " write 0.4 um if"
             ),
         ),
-        ("[0.2 um, 0.2 mm, 0.2 um]", "0.2 mm is far more"),
+        ("[0.2 um, 0.2 mm, 0.2 um]", "0.2 mm is far above"),
         ("50 um", ""),
         ("0.2 um", ""),
     ],

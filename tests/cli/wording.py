@@ -17,7 +17,8 @@ A_TURN_OF_DEGREES_LIES_BETWEEN = (
     'a turn of 180 degrees lies between "straight" and "turned by 180"; turn the plate by about 90'
 )
 BALLS_AND_ARE_AT_THE_SAME = (
-    '10:57: artefacts.same.directions: balls "1" and "2" are at the same place; correct one of them'
+    '10:57: artefacts.same.directions: balls "1" and "2" have the same location; correct one of'
+    " them"
 )
 BALL_IN_POSITION_FIRST = "4:1: ball 3 in position first is "
 BALL_IN_POSITION_LOW_IS_WHERE = (
@@ -130,9 +131,9 @@ RADIUS_CHANGE_TOGETHER_WITHOUT_CHANGING_ANY = (
 )
 RANK_DEFICIENCY_EXPECTED_FULL_RANK = "rank deficiency 2, expected full rank"
 READING_BALL_WITH_PROBE_PUTS = (
-    '18:5: positions[0]: reading ball "2" with probe "magnet" puts the scales at y = 900 '
-    "mm, 100 mm above the measuring volume, and 1 more reading; move the artefact, or "
-    "read it otherwise"
+    '18:5: positions[0]: reading ball "2" with probe "magnet" moves the scales to y = 900 mm,'
+    " 100 mm above the measuring volume, and 1 more reading; move the artefact, or read it"
+    " otherwise"
 )
 READ_BUT_NOT_PLANNED_LOW = "read but not planned (1): z low: ball r1c2 with right"
 STANDARD_OUTPUT_CANNOT_BE_WRITTEN = "standard output: cannot be written"

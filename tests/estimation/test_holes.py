@@ -187,7 +187,7 @@ OBLIQUE = {"origin": ["100 mm", "100 mm", "300 mm"], "rotation": ["10 deg", "0 d
         ({"artefacts": {"plate": {**PLATE, "flatness": "5 um"}}}, "go together; give both"),
         (
             {"artefacts": {"plate": {**HOLES, "role": "length_standard"}}},
-            "what is read in its plane is a plate in space",
+            "only a plate in space is read in its plane",
         ),
         (
             {"positions": [{"name": "oblique", "pose": OBLIQUE, "probes": ["down"]}]},

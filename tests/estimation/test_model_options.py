@@ -390,7 +390,7 @@ def kinematic_y_first(volume: Any) -> list[Column]:
         ({"error_model": {"kind": "empirical"}}, 'kind "empirical" has 3 dimensions'),
         (
             {"true_machine": {"kind": "machine", "file": "machine.yaml", "level": "400 mm"}},
-            "level: is outside the file's volume, which goes from 0 mm to 300 mm in z",
+            "level: is outside the file's volume (0 mm to 300 mm in z)",
         ),
         (
             {"true_machine": {"kind": "curves", "files": ["x.csv", "z.csv"]}},

@@ -285,7 +285,7 @@ def test_a_certificate_of_the_star_is_drawn_and_read_again(tmp_path: Path) -> No
         (
             {"probes": ["down", "right"]},
             {"right": {"unknown": True}},
-            "its star says what is known",
+            "its star states the uncertainty",
         ),
         ({}, {"down": {"reference": True}}, "turns about a stated place, which is the reference"),
         ({"values": "tips.csv"}, {}, "no co-ordinates for left"),

@@ -80,7 +80,7 @@ def test_axes_of_sweeps_take_both(tmp_path: Path) -> None:
 
 
 def test_both_at_once_from_python_are_refused() -> None:
-    with pytest.raises(ExperimentError, match="same place"):
+    with pytest.raises(ExperimentError, match="same entry"):
         bp.quickstart().with_({OLD: "1 um", NEW: "2 um"})
 
 

@@ -107,8 +107,8 @@ def replaced(old: str, new: str) -> str:
             + "\n  - {name: low,",
             (
                 "7:1: positions: 581 poses, 69 machine errors and 0 probe offsets make 3555"
-                " parameters besides the balls; at most 3500 are possible: leave positions out, or"
-                " give the machine fewer coefficients"
+                " parameters in addition to the balls; at most 3500 are possible: leave"
+                " positions out, or give the machine fewer coefficients"
             ),
         ),
         (
@@ -200,9 +200,9 @@ def test_more_points_than_there_is_memory_for_with_so_many_errors(tmp_path: Path
     (tmp_path / "e.yaml").write_text(text)
     errors = len(lay_out(load(tmp_path / "e.yaml")[0]).model.parameters)
     most = 50_000_000 // (3 * errors)
-    assert (
-        line == f"11:22: evaluation.points: 40000 points with {errors} machine errors have"
-        f" {120_000 * errors} derivatives; at most {most} points are possible with so many"
+    assert line == (
+        f"11:22: evaluation.points: 40000 points with {errors} machine errors have"
+        f" {120_000 * errors} derivatives; at most {most} points are possible with these"
         " errors"
     )
     (tmp_path / "e.yaml").write_text(f"{text}evaluation: {{points: {{random: {most}}}}}\n")
@@ -421,10 +421,10 @@ def test_variants_that_are_too_large_together(
     assert len(load(path)) == most
     (line,) = refusals(tmp_path, text + "".join(names))
     place = f"{text.count(chr(10)) + most + 1}:7: variants.v{most}"
-    assert (
-        line == f"{place}: the variants up to here have {(most + 1) * each} balls, balls read,"
-        f" calibrated values, priors and evaluation points; at most {most * each} are possible:"
-        " put some of the variants into a file of their own"
+    assert line == (
+        f"{place}: the variants up to here have {(most + 1) * each} balls, balls read,"
+        f" calibrated values, priors and evaluation points; at most {most * each} are"
+        " possible: move some of the variants to a file of their own"
     )
     # A single experiment has the other limits alone.
     monkeypatch.setattr(modules["ballplate.simulator.experiment.loading"], "MOST_OF_ALL", each - 1)

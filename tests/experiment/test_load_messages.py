@@ -197,7 +197,8 @@ ARTEFACTS = [
     ]),
     ("kind: grid, balls: [3, 3], size: [500 mm, 500 mm]",
      "kind: balls, coordinates: {a: [1 mm, 1 mm], b: [1 mm, 1 mm]}", [
-        '8:37: artefacts.plate.coordinates: balls "a" and "b" are at the same place; correct one of them']),
+        '8:37: artefacts.plate.coordinates: balls "a" and "b" have the same location; correct'
+        " one of them"]),
     ("kind: grid, balls: [3, 3], size: [500 mm, 500 mm]", "kind: balls, file: none.csv", [
         "8:30: artefacts.plate.file: none.csv: there is no such file; check the name and the folder"]),
     ("positions:", "  idle: {kind: two_spheres, length: 500 mm}\npositions:", [
@@ -234,8 +235,8 @@ POSITIONS = [
     (LOW, LOW.replace("corner:", "centre: {x: 1 m, y: 1 m}, corner:"), [
         '11:57: positions[0].centre: does not go with "corner"; remove one of the two']),
     (LOW, LOW.replace("plane: z, level: 0 mm, corner: {x: 0 mm, y: 0 mm}", "repeats: 2"), [
-        "11:5: positions[0]: does not say where the artefact is; "
-        "add plane, level and corner or centre, or pose"]),
+        "11:5: positions[0]: does not state the artefact's location; add plane, level and"
+        " corner or centre, or pose"]),
     (LOW, LOW.replace("plane: z, level: 0 mm, corner:", "pose: {origin: [0 m, 0 m, 0 m]}, corner:"), [
         '11:67: positions[0].corner: does not go with "pose"; remove one of the two']),
     (LOW, LOW.replace("plane: z, level: 0 mm, corner: {x: 0 mm, y: 0 mm}",
@@ -258,12 +259,13 @@ POSITIONS = [
         '11:117: positions[0].readings[0].balls[0]: unknown ball "r1c7"; did you mean "r1c3"?',
     ]),
     (LOW, LOW.replace("x: 0 mm", "x: 600 mm"), [
-        '11:5: positions[0]: reading ball "r1c3" with probe "down" puts the scales at x = 1100 mm, 100 mm above the '
-        "measuring volume, and 2 more readings; move the artefact, or read it otherwise"]),
+        '11:5: positions[0]: reading ball "r1c3" with probe "down" moves the scales to x = 1100'
+        " mm, 100 mm above the measuring volume, and 2 more readings; move the artefact, or"
+        " read it otherwise"]),
     (LOW, LOW.replace("level: 0 mm", "level: -52.000002 mm"), [
-        '11:5: positions[0]: reading ball "r1c1" with probe "down" puts the scales at z = -2.000002 mm (the ball at '
-        "-52.000002 mm less the offset of -50 mm), 2.000002 mm below the measuring volume, and 8 more readings; move "
-        "the artefact, or read it otherwise"]),
+        '11:5: positions[0]: reading ball "r1c1" with probe "down" moves the scales to z ='
+        " -2.000002 mm (the ball at -52.000002 mm less the offset of -50 mm), 2.000002 mm below"
+        " the measuring volume, and 8 more readings; move the artefact, or read it otherwise"]),
     ("name: bar, artefact: bar, plane: z, level: 0 mm", "artefact: baar, plane: z, level: 0", [
         '12:5: positions[1].name: missing; add "name" (name of the position, used in tables and messages)',
         '12:16: positions[1].artefact: unknown artefact "baar"; did you mean "bar"?',

@@ -50,7 +50,7 @@ WRONG = [
     ("to: [1 m, 0 mm, 0 mm]}", "to: [2 m, 0 mm, 0 mm]}",
      "12:47: evaluation.tasks[0].to: x = 2000 mm is 1000 mm above the measuring volume; move the point inside"),
     ("to: [1 m, 0 mm, 0 mm]}", "to: [0 mm, 0 mm, 0 mm]}",
-     "12:47: evaluation.tasks[0].to: is where the length begins; give two points"),
+     "12:47: evaluation.tasks[0].to: coincides with the start of the length; give two points"),
     ("probe: down, t", "probe: dwon, t",
      '13:73: evaluation.tasks[1].probe: unknown probe "dwon"; did you mean "down"?'),
     ("probes: [down, side]", "probes: [down, sid]",
@@ -60,9 +60,10 @@ WRONG = [
     ("probes: [down, side]", "probes: [down, side], probe: down",
      '14:89: evaluation.tasks[2].probe: does not go with "probes"; remove one of the two'),
     ("from: [0 mm, 0 mm, 0 mm], to: [1 m, 0 mm, 0 mm]}", "to: [1 m, 0 mm, 0 mm]}",
-     '12:7: evaluation.tasks[0].from: missing; add "from" (where the length begins: co-ordinates as those of points)'),
+     '12:7: evaluation.tasks[0].from: missing; add "from" (start of the length: co-ordinates as those of points)'),
     (TEXT[TEXT.index("  tasks"):], "",
-     '9:1: evaluation: gives nothing to evaluate; add "points", such as {random: 200, seed: 1}, or "tasks"'),
+     '9:1: evaluation: has neither points nor tasks; add "points", such as {random: 200, seed:'
+     ' 1}, or "tasks"'),
 ]  # fmt: skip
 
 

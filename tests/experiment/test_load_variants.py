@@ -125,7 +125,7 @@ def test_a_message_about_the_base_comes_once(tmp_path: Path) -> None:
         'probes, artefacts, '
          "positions"),
         ("tilte", '"tilte" cannot be replaced in a variant; did you mean "title"?'),
-        ("title.x", 'title is the text "base" and has nothing below it; replace it as a whole'),
+        ("title.x", 'title is the text "base" and has no entries; replace it as a whole'),
         ("machine..volume", '"machine..volume" is not a path; write for example positions[1].level or '
          "artefacts.plate.size"),
         ("positions[0", '"positions[0" is not a path; write for example positions[1].level or '

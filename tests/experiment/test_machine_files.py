@@ -144,8 +144,8 @@ probing: 0 um
         'm.yaml:9:8: errors.EZX: "line" has no meaning here; write # line: … into the file',
         "m.yaml:9:15: errors.EZX.file: eyx.csv: the file should have EZX alone",
         (
-            "m.yaml:10:8: errors.EAX: nothing is stated; give a polynomial, a file, or the"
-            " bandwidth of a random error"
+            "m.yaml:10:8: errors.EAX: has no data; give a polynomial, a file, or the bandwidth"
+            " of a random error"
         ),
         "m.yaml:11:35: errors.EYY.straightness: unknown key",
         (
@@ -186,7 +186,7 @@ probing: 0 um
         (
             "y: [0 mm, 1200 mm]",
             "y: [1 m, 1 m]",
-            "m.yaml:3:36: volume.y: ends where it begins, at 1000 mm; give an end",
+            "m.yaml:3:36: volume.y: begins and ends at 1000 mm; give an end",
         ),
         (
             ", z: [0 mm, 1200 mm]}",
@@ -333,22 +333,19 @@ def test_what_is_wrong_with_a_machine(tmp_path: Path, old: str, new: str, messag
         (
             "1800,",
             "950,",
-            [
-                "eyx.csv:8:1: the table ends at 950 mm, but the axis goes from -100 mm to 1800 mm;"
-                " give"
-            ],
+            ["eyx.csv:8:1: the table ends at 950 mm, but the axis is -100 mm to 1800 mm; give"],
         ),
         (
             "-100,",
             "-200,",
-            ["eyx.csv:7:1: the table begins at -200 mm, but the axis goes from -100 mm to 1800 mm"],
+            ["eyx.csv:7:1: the table begins at -200 mm, but the axis is -100 mm to 1800 mm"],
         ),
         (
             "position_mm",
             "position_m",
             [
                 "eyx.csv:7:1: the table begins at -100000 mm",
-                "eyx.csv:8:1: the table ends at 1800000 mm, but the axis goes",
+                "eyx.csv:8:1: the table ends at 1800000 mm, but the axis is",
             ],
         ),
     ],
@@ -474,7 +471,7 @@ def test_mistakes_of_a_machine_file_are_told_with_the_experiment(tmp_path: Path)
         (
             "x: [0 mm, 1 m]",
             "x: [0 mm, 3 m]",
-            "e.yaml:4:37: true_machine.file: its volume goes from -100 mm to 1800 mm",
+            "e.yaml:4:37: true_machine.file: its volume is -100 mm to 1800 mm",
         ),
         ("m.yaml, random", "n.yaml, random", "e.yaml:4:37: true_machine.file:"),
         (", random_part: omitted", "", "e.yaml:4:37: true_machine.file: has a random part"),

@@ -440,8 +440,8 @@ MISTAKES = [
         '21:39: pool.candidates[0].probes.x[1]: probe "right" is listed twice; remove one of the two']),
     (f"      {SOME_PROBES}\n", "", ["16:7: pool.candidates[0].probes: missing; add \"probes\", some of: down, right"]),
     ("origin: [100 mm, 100 mm, 100 mm]", "origin: [800 mm, 100 mm, 100 mm]", [
-        '22:7: pool.candidates[1]: reading ball "2" with probe "down" puts the scales at x = 1100 mm, 100 mm above '
-        "the measuring volume; move the artefact, or read it otherwise"]),
+        '22:7: pool.candidates[1]: reading ball "2" with probe "down" moves the scales to x ='
+        " 1100 mm, 100 mm above the measuring volume; move the artefact, or read it otherwise"]),
     ("name: bar, art", "name: low, art", [
         '22:14: pool.candidates[1].name: "low" is the name of positions[0] already; names must differ']),
     ("name: dear", "name: bar", [
@@ -453,7 +453,8 @@ MISTAKES = [
         "28:22: pool.limits.never_together[0]: at most 1 of these are allowed, but low, bar are to be kept; correct "
         "pool.limits"]),
     ("{plane: x}", "{}", [
-        "29:20: pool.limits.at_most[0].of: selects nothing; give at least one of name, group, plane, artefact, probe"]),
+        "29:20: pool.limits.at_most[0].of: has no criterion; give at least one of name, group,"
+        " plane, artefact, probe"]),
     ("{plane: x}", "{group: sum}", [
         '29:28: pool.limits.at_most[0].of.group: unknown group "sum"; known: bar, dear, gauge, some']),
     ("{plane: x}", "{name: z *}", [

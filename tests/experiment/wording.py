@@ -44,10 +44,8 @@ IS_BEYOND_WHAT_CAN_BE_COMPUTED = (
     "is beyond what can be computed with; write 0, or a length of 1e-18 m to 1e+06 m"
 )
 IS_NOT_A = 'd.csv:2:11: "five" is not a number; write for example "500.0003"'
-IS_PART_OF_THE_SAME_2 = "e.yaml:12:5: variants.A[positions[0].level]: is part of the same place as"
-IS_PART_OF_THE_SAME_PLACE = (
-    "e.yaml:15:5: variants.B[positions[0].level]: is part of the same place as"
-)
+IS_PART_OF_THE_SAME_2 = "e.yaml:12:5: variants.A[positions[0].level]: overlaps the path"
+IS_PART_OF_THE_SAME_PLACE = "e.yaml:15:5: variants.B[positions[0].level]: overlaps the path"
 MISSING_ADD_POSITIONS = (
     "1:1: positions: missing; add positions, or choose some from the pool with: ballplate plan FILE"
 )
@@ -78,8 +76,8 @@ NO_CO_ORDINATES_FOR_ADD_THEM = (
 NO_POSITION_READS_BALLS = "6:3: artefacts.plate: no position reads balls r1c2"
 PER_METRE_OF_LENGTH = "per metre of length; give less than 100 um/m"
 POINTS_ARE_TOO_MANY = "eyx.csv:5:1: 3 points are too many; at most 2 are possible"
-PUTS_THE_SCALES = "puts the scales at"
-TAKE_MM_FROM_EVERY_POSITION = "take 100 mm from every position"
+PUTS_THE_SCALES = "moves the scales to"
+TAKE_MM_FROM_EVERY_POSITION = "subtract 100 mm from every position"
 THERE_ARE_READINGS_UP_TO_HERE = (
     "16:7: pool.candidates[0]: there are 6440000 readings up to here, repeats counted; at most"
 )

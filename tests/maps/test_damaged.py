@@ -72,7 +72,7 @@ EDITS: dict[str, tuple[Callable[[str], str], str, int, str]] = {
         lambda text: re.sub(r'("value": -?[0-9])', r"\g<1>7", text, count=1),
         "checksum:",
         1,
-        "is not that of what the file says: it was edited or damaged",
+        "does not match the content of the file: it was edited or damaged",
     ),
     "value without checksum": (
         lambda text: without_checksum(re.sub(r'("value": -?[0-9])', r"\g<1>7", text, count=2)),

@@ -393,7 +393,7 @@ def test_plans_and_trials_know_the_map(tmp_path: Path) -> None:
 CASES = {
     "volume": (
         {"machine": IN_SPACE["machine"] | {"volume": ["500 mm", "500 mm", "600 mm"]}},
-        "its volume goes from 0 mm to 500 mm in z, but machine.volume from 0 mm to 600 mm",
+        "its volume is 0 mm to 500 mm in z, but machine.volume is 0 mm to 600 mm",
     ),
     "model": (
         {"error_model": {"kind": "empirical"}},

@@ -65,7 +65,7 @@ def test_a_true_machine_of_another_volume_or_dimension_is_refused(folder: Path) 
     with pytest.raises(bp.ExperimentError, match="true_machine.file: is of 2 axes"):
         experiment_of("kinematic", folder, true_machine=truth)
     larger = {"volume": ["500 mm", "700 mm"], "repeatability": "0.5 um"}
-    with pytest.raises(bp.ExperimentError, match="in y, but machine.volume from 0 mm to 700 mm"):
+    with pytest.raises(bp.ExperimentError, match="in y, but machine.volume is 0 mm to 700 mm"):
         experiment_of("plane", folder, true_machine=truth, machine=larger)
     smaller = {"volume": ["480 mm", "520 mm"], "repeatability": "0.5 um"}
     inside = experiment_of("plane", folder, true_machine=truth, machine=smaller)

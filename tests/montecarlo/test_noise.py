@@ -174,7 +174,8 @@ def test_the_page_states_what_monte_carlo_gives(name: str) -> None:
         ("student t", "noise: student t has no degrees of freedom; write"),
         (
             {"distribution": "uniform", "degrees_of_freedom": 4},
-            "noise.degrees_of_freedom: uniform noise has none; remove it, or write student t",
+            "noise.degrees_of_freedom: uniform noise has no degrees of freedom; remove the key,"
+            " or write student t",
         ),
         ({"distribution": "student t", "degrees_of_freedom": 2}, "noise.degrees_of_freedom"),
         ({"correlation": 1.0}, "noise.correlation"),

@@ -6,4 +6,4 @@ THE_FITTED_ONE_FOLLOWS_EXACTLY = "the fitted one follows exactly"
 TOO_OPTIMISTIC_THE_FITTED_MODEL_CANNOT = (
     "Too optimistic? The fitted model cannot follow the true machine exactly."
 )
-TO_TAKE_THE_NOISE_OF_ALL = "U1 to U6 take the noise of all readings as independent"
+TO_TAKE_THE_NOISE_OF_ALL = "U1 to U6 assume independent noise in all readings"

@@ -395,12 +395,12 @@ def test_reliability_has_the_unit_of_the_kind(told: dict[str, Any]) -> None:
 @pytest.mark.parametrize(
     ("name", "words"),
     [
-        ("collinear plane", "cannot be told where balls are as drawn"),
-        ("nearly collinear plane", "cannot be told where balls are as drawn"),
+        ("collinear plane", "cannot be determined at the nominal locations of the balls"),
+        ("nearly collinear plane", "cannot be determined at the nominal locations of the balls"),
         ("ball of its plane", "is the same wherever balls are"),
-        ("angle in one line", "cannot be told where balls are as drawn"),
-        ("ball twice", "cannot be told where balls are as drawn"),
-        ("the same ball", "cannot be told where balls are as drawn"),
+        ("angle in one line", "cannot be determined at the nominal locations of the balls"),
+        ("ball twice", "cannot be determined at the nominal locations of the balls"),
+        ("the same ball", "cannot be determined at the nominal locations of the balls"),
         ("no balls", "states no value"),
         ("same angle twice", "states r1c1, angle more than once"),
     ],

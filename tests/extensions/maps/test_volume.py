@@ -67,11 +67,10 @@ def test_scale_readings_outside_are_refused_though_the_balls_are_inside(
         main([command, path, *(["-o", str(tmp_path / "r.csv")] if command == "simulate" else [])])
         == 3
     )
-    assert (
-        capsys.readouterr().err.removeprefix(f"{path}:")
-        == '8:5: positions[0]: reading ball "r1c1" with probe "long" puts the scales at z = 1300 mm'
-        " (the ball at 900 mm less the offset of -400 mm), 300 mm above the measuring volume,"
-        " and 8 more readings; move the artefact, or read it otherwise\n"
+    assert capsys.readouterr().err.removeprefix(f"{path}:") == (
+        '8:5: positions[0]: reading ball "r1c1" with probe "long" moves the scales to z ='
+        " 1300 mm (the ball at 900 mm less the offset of -400 mm), 300 mm above the"
+        " measuring volume, and 8 more readings; move the artefact, or read it otherwise\n"
     )
     assert not (tmp_path / "r.csv").exists()
 
