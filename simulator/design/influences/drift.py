@@ -72,7 +72,7 @@ class DriftPositionSettings(Settings):
     start: Duration | None = Field(
         None, description="when its first reading begins, from any zero on"
     )
-    reading: Duration | None = Field(None, description="how long a reading takes there")
+    reading: Duration | None = Field(None, description="duration of a reading there")
 
 
 class DriftSettings(InfluenceSettings):
@@ -88,7 +88,7 @@ class DriftSettings(InfluenceSettings):
         Field(None, description="of all scales together, or a list by axis")
     )
     times: DriftTimesSettings | None = Field(
-        None, description="how long readings take where a file has no times of theirs"
+        None, description="durations of readings, for a file without times"
     )
     positions: dict[Name, DriftPositionSettings] | None = Field(
         None, description="name of a position → when it is read"

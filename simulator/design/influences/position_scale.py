@@ -44,7 +44,10 @@ class PositionScaleSettings(InfluenceSettings):
         description="of the scale in each position, independent of all others; left out: unknown",
     )
     by_axis: bool = Field(
-        False, description="whether the scale of each axis varies by itself; default: all as one"
+        False,
+        description=(
+            "whether the scale of each axis varies separately; default: all vary together"
+        ),
     )
     positions: NonEmpty[Name] | None = Field(
         None, description="positions whose scale varies; default: all"

@@ -49,7 +49,8 @@ class ProbingSettings(InfluenceSettings):
         description="of that value, common to all probes; 0 um: exactly known; left out: unknown",
     )
     between_probes: Length = Field(
-        0.0, description="standard uncertainty of what each probe has beside that; default 0"
+        0.0,
+        description=("standard uncertainty of each probe's deviation from that value; default 0"),
     )
     probes: NonEmpty[Name] | None = Field(None, description="probes that have it; default: all")
     directions: dict[Name, NonEmpty[float]] | None = Field(

@@ -29,8 +29,8 @@ class ReindexingSettings(InfluenceSettings):
     standard_uncertainty: Length | None = Field(
         None,
         description=(
-            "repeatability of re-indexing at the tip, for each axis, anew for each position and"
-            " probe; left out: unknown"
+            "repeatability of re-indexing at the tip, for each axis, independent for each"
+            " position and probe; left out: unknown"
         ),
     )
     probes: NonEmpty[Name] | None = Field(

@@ -40,7 +40,7 @@ Direction = Literal["x", "y", "z", "-x", "-y", "-z"]
 class TermSettings(Settings):
     """A term of a polynomial in the co-ordinates of balls, about the middle of the plate."""
 
-    factor: float = Field(1.0, description="how large the term is beside others; default 1")
+    factor: float = Field(1.0, description="size of the term relative to others; default 1")
     x: Annotated[int, Field(ge=0, le=12)] = Field(0, description="power of x; default 0")
     y: Annotated[int, Field(ge=0, le=12)] = Field(0, description="power of y; default 0")
 
@@ -50,7 +50,7 @@ class SagSettings(InfluenceSettings):
 
     kind: Literal["sag"] = Field(description="sag of a plate under its own weight")
     artefact: Name | None = Field(
-        None, description="plate that sags; may be left out where there is one artefact"
+        None, description="plate that sags; optional if there is exactly one artefact"
     )
     value: Length | None = Field(
         None,
@@ -65,13 +65,13 @@ class SagSettings(InfluenceSettings):
     shape: Forms[Literal["x", "y", "both"], NonEmpty[TermSettings], TermSettings] | None = Field(
         None,
         description=(
-            "quadratic along x, y or both (default) of the plate, most at its middle and nothing at"
-            " the outermost balls, or terms of a polynomial in the places of balls, which are 0 at"
-            " the middle and 1 at the outermost"
+            "quadratic along x, y or both (default) of the plate, largest at its middle and zero"
+            " at the outermost balls, or terms of a polynomial in the co-ordinates of balls,"
+            " which are 0 at the middle and 1 at the outermost"
         ),
     )
     values: Text | None = Field(
-        None, description="CSV file of what each ball sags by, columns ball and sag_um"
+        None, description="CSV file with the sag of each ball, columns ball and sag_um"
     )
     gravity: Direction | None = Field(
         None, description="its direction in the machine; default -z, in two dimensions -y"

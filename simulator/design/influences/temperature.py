@@ -70,7 +70,7 @@ class MeasuredSettings(Settings):
         0.0, description="of the temperature in each position, independent of all others; default 0"
     )
     sensor_uncertainty: TemperatureDifference = Field(
-        0.0, description="of what the sensor is wrong by in all positions alike; default 0"
+        0.0, description="of the sensor's error common to all positions; default 0"
     )
 
 

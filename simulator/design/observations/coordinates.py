@@ -139,15 +139,15 @@ class CoordinatesSettings(CommonPartSettings):
     ) = Field(
         None,
         description=(
-            "of every co-ordinate, or per axis of the artefact: {x: …, y: …}; 0 um where they are"
-            " exact; left out where values or covariance state it"
+            "of every co-ordinate, or per axis of the artefact: {x: …, y: …}; 0 um if they are"
+            " exact; left out if values or covariance state it"
         ),
     )
     axes: tuple[Literal["x", "y", "z"], ...] | None = Field(
         None,
         min_length=1,
         description=(
-            "calibrated axes where values or covariance state the uncertainties; default: all"
+            "calibrated axes if values or covariance state the uncertainties; default: all"
         ),
     )
     values: Text | None = Field(

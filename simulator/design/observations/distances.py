@@ -154,7 +154,7 @@ class DistancesSettings(CommonPartSettings):
     standard_uncertainty: UncertaintyFunction | None = Field(
         None,
         description=(
-            "of each distance; may grow with it; 0 um where it is exact; left out where values or"
+            "of each distance; may grow with it; 0 um if it is exact; left out if values or"
             " covariance state it"
         ),
     )

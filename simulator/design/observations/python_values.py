@@ -148,8 +148,8 @@ class PythonValuesSettings(CertificateSettings):
     )
     object: Text = Field(
         description=(
-            "module:function, the module installed or beside this file, or the name of an installed"
-            f" entry point of the group {GROUP}"
+            "module:function, the module installed or next to this file, or the name of an"
+            f" installed entry point of the group {GROUP}"
         )
     )
     options: dict[str, Any] = Field(
@@ -160,13 +160,13 @@ class PythonValuesSettings(CertificateSettings):
     )
     balls: CalibratedBalls = Field("all", description="all (default), corners, or a list of balls")
     standard_uncertainty: Forms[Text, NonEmpty[Text], NonEmpty[Text]] | None = Field(
-        None, description="of every value, or a list of one for each; 0 where they are exact"
+        None, description="of every value, or a list of one for each; 0 if they are exact"
     )
     values: Forms[Text, NonEmpty[Text], NonEmpty[Text]] | None = Field(
         None,
         description=(
             "list of values with their unit, or of lengths a CSV file with columns first, second,"
-            " value_mm or a DCC (XML); default: as drawn"
+            " value_mm or a DCC (XML); default: nominal values"
         ),
     )
 

@@ -54,10 +54,10 @@ class RadiusSettings(Settings):
         None, description="name of the gauge; optional if there is exactly one artefact"
     )
     value: PositiveLength | None = Field(
-        None, description="the radius certified; default: as drawn"
+        None, description="calibrated radius; default: nominal radius"
     )
     standard_uncertainty: LengthUncertainty = Field(
-        description="of the radius, the same wherever the gauge stands; 0 um where it is exact"
+        description="of the radius, the same in all positions of the gauge; 0 um if it is exact"
     )
 
 
