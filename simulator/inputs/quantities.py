@@ -22,9 +22,12 @@ from pydantic_core import CoreSchema, core_schema
 from .number_arrays import Array
 from .settings import describe, hint, shorten
 
+# Sizes of units in SI, by their names.
+Factors = Mapping[str, Fraction]
+
 PI = Fraction("3.14159265358979323846264338327950288419716939937510582")
 
-LENGTH_UNITS: Mapping[str, Fraction] = {
+LENGTH_UNITS: Factors = {
     "m": Fraction(1),
     "dm": Fraction(1, 10),
     "cm": Fraction(1, 100),
@@ -34,7 +37,7 @@ LENGTH_UNITS: Mapping[str, Fraction] = {
     "pm": Fraction(1, 10**12),
     "in": Fraction(254, 10**4),
 }
-ANGLE_UNITS: Mapping[str, Fraction] = {
+ANGLE_UNITS: Factors = {
     "rad": Fraction(1),
     "mrad": Fraction(1, 10**3),
     "urad": Fraction(1, 10**6),
@@ -43,7 +46,7 @@ ANGLE_UNITS: Mapping[str, Fraction] = {
     "arcmin": PI / (180 * 60),
     "arcsec": PI / (180 * 3600),
 }
-RATIO_UNITS: Mapping[str, Fraction] = {
+RATIO_UNITS: Factors = {
     "ppm": Fraction(1, 10**6),
     "ppb": Fraction(1, 10**9),
     "%": Fraction(1, 100),
@@ -52,31 +55,29 @@ RATIO_UNITS: Mapping[str, Fraction] = {
     "um/m": Fraction(1, 10**6),
     "nm/m": Fraction(1, 10**9),
 }
-TEMPERATURE_UNITS: Mapping[str, Fraction] = {
+TEMPERATURE_UNITS: Factors = {
     "K": Fraction(1),
     "degC": Fraction(1),
     "mK": Fraction(1, 10**3),
 }
-EXPANSION_UNITS: Mapping[str, Fraction] = {
+EXPANSION_UNITS: Factors = {
     f"{ratio}/{degree}": RATIO_UNITS.get(ratio, Fraction(1))
     for ratio in ("um/m", "ppm", "mm/m", "m/m", "1")
     for degree in ("K", "degC")
 }
-BENDING_UNITS: Mapping[str, Fraction] = {
-    f"{unit}/m": factor for unit, factor in ANGLE_UNITS.items()
-}
-DURATION_UNITS: Mapping[str, Fraction] = {
+BENDING_UNITS: Factors = {f"{unit}/m": factor for unit, factor in ANGLE_UNITS.items()}
+DURATION_UNITS: Factors = {
     "s": Fraction(1),
     "min": Fraction(60),
     "h": Fraction(3600),
 }
 # Drifts are kept per hour.
-LENGTH_DRIFT_UNITS: Mapping[str, Fraction] = {
+LENGTH_DRIFT_UNITS: Factors = {
     f"{unit}/{time}": LENGTH_UNITS[unit] * 3600 / seconds
     for time, seconds in sorted(DURATION_UNITS.items())
     for unit in ("um", "nm", "mm", "m")
 }
-RATIO_DRIFT_UNITS: Mapping[str, Fraction] = {
+RATIO_DRIFT_UNITS: Factors = {
     f"{unit}/{time}": RATIO_UNITS[unit] * 3600 / seconds
     for time, seconds in sorted(DURATION_UNITS.items())
     for unit in ("ppm", "um/m", "nm/m", "m/m")
@@ -96,7 +97,7 @@ BASE_UNITS: Mapping[str, str] = {
     "ratio per time": "m/m/h",
 }
 # Kind of quantity → its units and an example for the messages.
-UNITS: Mapping[str, Mapping[str, Fraction]] = {
+UNITS: Mapping[str, Factors] = {
     "length": LENGTH_UNITS,
     "angle": ANGLE_UNITS,
     "ratio": RATIO_UNITS,

@@ -16,6 +16,9 @@ from ..inputs.settings import listing
 from ..inputs.yamltree import Mark
 from ..machines.protocol import Array, Integers
 
+# Indices of the position, the ball and the probe of a reading.
+ReadingKey = tuple[int, int, int]
+
 # Directions of a gauge within this (rad) of the planned ones are taken as planned.
 AS_PLANNED = 0.01
 
@@ -61,7 +64,7 @@ class ObservedReadings:
         return (*self.certificate_doubts, *self.offset_doubts, *doubts)
 
 
-def reading_keys(readings: Readings) -> list[tuple[int, int, int]]:
+def reading_keys(readings: Readings) -> list[ReadingKey]:
     """Return position, ball and probe of each reading."""
     table = np.stack([readings.position, readings.ball, readings.probe], axis=1)
     return [(row[0], row[1], row[2]) for row in table.tolist()]
@@ -88,7 +91,7 @@ def combine_standards(
     since its ball may have moved.
     """
     on_plate = design.artefacts.is_plate[design.balls.artefact[readings.ball]]
-    groups: dict[tuple[int, int, int], list[int]] = {}
+    groups: dict[ReadingKey, list[int]] = {}
     keys = reading_keys(readings)
     of_gauge = np.isin(readings.position, design.gauge_positions)
     for i in np.flatnonzero(~on_plate & ~of_gauge):

@@ -20,7 +20,7 @@ from ..inputs.spreadsheets import CsvWriter
 from ..inputs.tables import FileRow
 from ..inputs.yamltree import GivenText, Mark
 from ..machines.protocol import Array, Integers
-from .observed_readings import ObservedReadings, combine_standards, reading_keys
+from .observed_readings import ObservedReadings, ReadingKey, combine_standards, reading_keys
 from .reading_sources import Source, source_rows
 
 AXES = ("x", "y", "z")
@@ -163,9 +163,9 @@ def _indices(rows: tuple[FileRow, ...], design: Design) -> tuple[Integers, list[
         for artefact in range(len(design.artefacts.names))
     ]
     # Equal names, which are frequent, are looked up once.
-    indices: dict[tuple[str, ...], tuple[int, int, int]] = {}
+    indices: dict[tuple[str, ...], ReadingKey] = {}
     faults: dict[tuple[str, ...], list[str]] = {}
-    index: list[tuple[int, int, int]] = []
+    index: list[ReadingKey] = []
     unknown: dict[str, list[FileRow]] = {}
     for row in rows:
         if len(unknown) >= MOST_MESSAGES:
@@ -249,7 +249,7 @@ def _where_not_read(
 def _refuse_repeated(rows: tuple[FileRow, ...], readings: Readings, design: Design) -> None:
     # A copied line would count as further information.
     planned = Counter(reading_keys(design.readings.expanded()))
-    rows_by_key: dict[tuple[int, int, int], list[FileRow]] = {}
+    rows_by_key: dict[ReadingKey, list[FileRow]] = {}
     for key, row in zip(reading_keys(readings), rows, strict=True):
         rows_by_key.setdefault(key, []).append(row)
     messages = []
@@ -278,10 +278,10 @@ def _planned_uncertainty(design: Design, readings: Readings) -> Array | None:
         return None
     planned = design.readings.expanded()
     assert planned.uncertainty is not None
-    of_key: dict[tuple[int, int, int], list[Array]] = {}
+    of_key: dict[ReadingKey, list[Array]] = {}
     for key, u in zip(reading_keys(planned), planned.uncertainty, strict=True):
         of_key.setdefault(key, []).append(u)
-    matched: Counter[tuple[int, int, int]] = Counter()
+    matched: Counter[ReadingKey] = Counter()
     uncertainties = []
     for key in reading_keys(readings):
         candidates = of_key.get(key, [design.machine.repeatability])
@@ -295,14 +295,14 @@ def _compare(
 ) -> tuple[tuple[str, ...], tuple[str, ...]]:
     planned, actual = reading_keys(design.readings.expanded()), reading_keys(readings)
 
-    def name(key: tuple[int, int, int]) -> str:
+    def name(key: ReadingKey) -> str:
         position, ball, probe = key
         return (
             f"{design.positions.names[position]}: ball {design.ball_label(ball)} with"
             f" {design.probes.names[probe]}"
         )
 
-    def without(keys: list[tuple[int, int, int]], matches: list[tuple[int, int, int]]) -> list[int]:
+    def without(keys: list[ReadingKey], matches: list[ReadingKey]) -> list[int]:
         remaining = Counter(matches)
         surplus = []
         for i, key in enumerate(keys):

@@ -20,6 +20,9 @@ from ballplate.simulator.machines import Array, Integers
 from .heading_words import folded
 from .symmetry import turns_onto_itself
 
+# Places (m, d) that rows of a file state.
+PlacesOf = Callable[[Sequence[FileRow]], Array]
+
 # A reading is of the ball whose place is nearer than this part of the distance to its nearest
 # neighbour; a position is the one whose readings are on average as near, and others twice as far.
 BY_PLACE = 0.3
@@ -40,7 +43,7 @@ class Names:
 
 
 def with_known_names(
-    rows: Sequence[FileRow], design: Design, places: Callable[[Sequence[FileRow]], Array] | None
+    rows: Sequence[FileRow], design: Design, places: PlacesOf | None
 ) -> tuple[tuple[FileRow, ...], Names]:
     """Return rows with the names of the design, and notes on matched and unmatched names.
 
@@ -150,7 +153,7 @@ def _planned_probes(rows: Sequence[FileRow], design: Design, names: Names) -> Se
 def _matched_positions(
     rows: Sequence[FileRow],
     design: Design,
-    places: Callable[[Sequence[FileRow]], Array] | None,
+    places: PlacesOf | None,
     names: Names,
 ) -> Sequence[FileRow]:
     """Return rows whose positions are identified by number or location."""
@@ -184,7 +187,7 @@ def _others_by_place(
     used: Sequence[str],
     strange: Sequence[str],
     design: Design,
-    places: Callable[[Sequence[FileRow]], Array] | None,
+    places: PlacesOf | None,
     names: Names,
 ) -> Sequence[FileRow]:
     """Return rows of a table most of whose positions are known, with the others identified by
@@ -205,7 +208,7 @@ def _positions_by_place(
     rows: Sequence[FileRow],
     used: Sequence[str],
     design: Design,
-    places: Callable[[Sequence[FileRow]], Array],
+    places: PlacesOf,
     expected: Mapping[str, str],
 ) -> tuple[dict[str, str], str]:
     """Return the position nearest to each one of the table, or a reason why there is none.
@@ -271,7 +274,7 @@ def _nearest(seen_places: Array, places: Array, rank: int = 1) -> tuple[Array, I
 def _matched_balls(
     rows: Sequence[FileRow],
     design: Design,
-    places: Callable[[Sequence[FileRow]], Array] | None,
+    places: PlacesOf | None,
     findings: Names,
 ) -> Sequence[FileRow]:
     """Return rows whose balls are identified by number or location, artefact by artefact."""
@@ -392,7 +395,7 @@ def _by_place(
     used: Sequence[str],
     balls: Integers,
     design: Design,
-    places: Callable[[Sequence[FileRow]], Array] | None,
+    places: PlacesOf | None,
     findings: Names,
 ) -> dict[str, str]:
     """Match balls by the nearest nominal location, if each name has a different one."""

@@ -26,6 +26,9 @@ from .scale import scale_certificate
 from .screening import rank_of, seen_by, weakest_of
 from .written import Edit, edits
 
+# Changes that are made together.
+ChangeSet = tuple[Change, ...]
+
 # Repairs told, of different kinds.
 MOST_TOLD = 3
 # Repairs of single directions told.
@@ -54,7 +57,7 @@ class Repair:
     is true if it is far below those of the design before. `edits` are the changes of the file.
     """
 
-    changes: tuple[Change, ...]
+    changes: ChangeSet
     deficiency: int
     removes: tuple[int, ...]
     weak: int
@@ -136,7 +139,7 @@ class _Search:
             self.base, [change for changes in candidates.values() for change in changes]
         )
         self.ranks = {change: rank_of([effect]) for change, effect in self.seen.items()}
-        best: dict[ChangeKind, tuple[Change, ...]] = {}
+        best: dict[ChangeKind, ChangeSet] = {}
         singles: list[Change] = []
         steps = counted(candidates.items(), "kinds of changes", len(candidates), report)
         for kind, changes in steps:
@@ -146,7 +149,7 @@ class _Search:
                 break
             whole, part = self.singles(kind, changes)
             singles += [*whole, *part]
-            possible: list[tuple[Change, ...]] = [
+            possible: list[ChangeSet] = [
                 (change,) for change in whole if not self.judge((change,)).deficiency
             ]
             together = self.set_of_additions(changes) if self.is_worth_more(possible) else ()
@@ -184,7 +187,7 @@ class _Search:
                 order = sorted([with_length, *order], key=lambda repair: repair.order)
         return tuple(order[: self.most])
 
-    def is_worth_more(self, possible: Sequence[tuple[Change, ...]]) -> bool:
+    def is_worth_more(self, possible: Sequence[ChangeSet]) -> bool:
         """True if several changes of a class may be better than the best one."""
         cheapest = min(map(self.preference, possible), default=None)
         return cheapest is None or cheapest[0] or cheapest[1] > 1.0
@@ -192,13 +195,13 @@ class _Search:
     def mixed(
         self,
         offered: Mapping[ChangeKind, Sequence[Change]],
-        best: Mapping[ChangeKind, tuple[Change, ...]],
-    ) -> Iterator[tuple[Change, ...]]:
+        best: Mapping[ChangeKind, ChangeSet],
+    ) -> Iterator[ChangeSet]:
         """Return sets of changes if the only sound repairs reduce the model: additions first, then
         moves too.
         """
 
-        def is_enough(some: Iterable[tuple[Change, ...]]) -> bool:
+        def is_enough(some: Iterable[ChangeSet]) -> bool:
             return any(self.is_sound(self.judge(change)) for change in some)
 
         if is_enough(change for kind, change in best.items() if kind < ChangeKind.ARTEFACT):
@@ -241,7 +244,7 @@ class _Search:
         """True if changes repair the design in more than name."""
         return after.is_cured and not self.is_faint(after)
 
-    def helps(self, changes: tuple[Change, ...]) -> bool:
+    def helps(self, changes: ChangeSet) -> bool:
         """True if changes give full rank, or fewer weak directions."""
         after = self.judge(changes)
         return after.deficiency < self.before.deficiency or after.weak < self.before.weak
@@ -259,7 +262,7 @@ class _Search:
                 self.sets += 1
         return self.judged[key] or self.before
 
-    def preference(self, changes: tuple[Change, ...]) -> tuple[bool, float, int, float]:
+    def preference(self, changes: ChangeSet) -> tuple[bool, float, int, float]:
         """Sort key: repairs without weak directions first, then the cheapest, then the least
         uncertain.
         """
@@ -271,7 +274,7 @@ class _Search:
             float(comparable(after.spread)),
         )
 
-    def best_of(self, possible: Sequence[tuple[Change, ...]]) -> tuple[Change, ...]:
+    def best_of(self, possible: Sequence[ChangeSet]) -> ChangeSet:
         """Of the cheapest repairs of a kind that with the smallest U6 with uncertain offsets."""
         order = sorted(possible, key=self.preference)
         equal = [
@@ -281,7 +284,7 @@ class _Search:
         ]
         return min(equal[:MOST_COMPARED], key=self.loosened) if len(equal) > 1 else order[0]
 
-    def loosened(self, changes: tuple[Change, ...]) -> float:
+    def loosened(self, changes: ChangeSet) -> float:
         """Average U6 of changes where exact offsets are uncertain."""
         lengths = _loosened(apply_all(changes, self.base.experiment))
         return inf if lengths is None else float(comparable(lengths.total / lengths.count))
@@ -319,10 +322,10 @@ class _Search:
                 break
         return tried
 
-    def set_of_additions(self, changes: Sequence[Change]) -> tuple[Change, ...]:
+    def set_of_additions(self, changes: Sequence[Change]) -> ChangeSet:
         """Return several additions that together determine every direction; possibly empty."""
         additions = [change for change in changes if change in self.seen and self.ranks[change]]
-        nominal: tuple[Change, ...] = ()
+        nominal: ChangeSet = ()
         for together in self.cheapest_sets(additions):
             after = self.judge(together)
             if self.is_sound(after):
@@ -330,12 +333,12 @@ class _Search:
             nominal = nominal or (together if not after.deficiency else ())
         return nominal
 
-    def cheapest_sets(self, additions: Sequence[Change]) -> list[tuple[Change, ...]]:
+    def cheapest_sets(self, additions: Sequence[Change]) -> list[ChangeSet]:
         """Sets of additions that remove all null directions, the cheapest pairs first, then one
         that is built up.
         """
         few = different(additions, self.seen)
-        sets: list[tuple[Change, ...]] = [
+        sets: list[ChangeSet] = [
             (few[i], few[k])
             for i, k in covering_pairs([self.seen[change] for change in few])
             if self.may_be((few[i], few[k]))
@@ -362,11 +365,11 @@ class _Search:
             for position in changed.positions
         )
 
-    def greedy(self, changes: Sequence[Change]) -> tuple[Change, ...]:
+    def greedy(self, changes: Sequence[Change]) -> ChangeSet:
         """A set that is built up of the change that helps most each time, less what can be left out
         of it.
         """
-        built: tuple[Change, ...] = ()
+        built: ChangeSet = ()
         after = self.before
         while not after.is_cured and len(built) < self.together:
             possible = [(*built, change) for change in changes if self.may_be((*built, change))]
@@ -410,7 +413,7 @@ class _Search:
         """Machine errors of the null directions, in the reported form."""
         return self.before.open_errors @ independent_mixture(self.base.at)
 
-    def told(self, changes: tuple[Change, ...], removes: tuple[int, ...] | None = None) -> Repair:
+    def told(self, changes: ChangeSet, removes: tuple[int, ...] | None = None) -> Repair:
         """A repair with the prediction of the changed design."""
         experiment = self.base.experiment
         changed = apply_all(changes, experiment)

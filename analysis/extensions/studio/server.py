@@ -33,6 +33,9 @@ from starlette.types import ASGIApp, Receive, Scope, Send
 from .actions import ActionError
 from .session import RefusedError, Session
 
+# What answers a request with its content.
+Work = Callable[[Request, dict[str, Any]], Any]
+
 STATIC = Path(__file__).parent / "static"
 
 # The largest request: a text, or readings.
@@ -148,7 +151,7 @@ def _made_page(session: Session) -> Callable[[Request], Awaitable[Response]]:
 
 
 def _answering(
-    work: Callable[[Request, dict[str, Any]], Any],
+    work: Work,
 ) -> Callable[[Request], Awaitable[Response]]:
     """A request that is answered with plain data, or with the `error` that a person has made: an
     answer like any other, which a browser does not count among its own failures.
@@ -221,7 +224,7 @@ def _error(text: str, status: int = 200) -> Response:
     return _json({"error": text}, status)
 
 
-def _acting(session: Session) -> Callable[[Request, dict[str, Any]], Any]:
+def _acting(session: Session) -> Work:
     def act(request: Request, body: dict[str, Any]) -> Any:
         session.act(body)
         return session.state()
@@ -229,14 +232,14 @@ def _acting(session: Session) -> Callable[[Request, dict[str, Any]], Any]:
     return act
 
 
-def _starting(session: Session) -> Callable[[Request, dict[str, Any]], Any]:
+def _starting(session: Session) -> Work:
     def start(request: Request, body: dict[str, Any]) -> Any:
         return {"id": session.start(str(body.get("job")), body.get("settings") or {})}
 
     return start
 
 
-def _stopping(session: Session) -> Callable[[Request, dict[str, Any]], Any]:
+def _stopping(session: Session) -> Work:
     def stop(request: Request, body: dict[str, Any]) -> Any:
         session.stop(int(body.get("id", 0)))
         return session.jobs()

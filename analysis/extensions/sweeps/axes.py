@@ -21,7 +21,7 @@ from ballplate.simulator.inputs import (
     written,
 )
 
-from .model import Choice, SweepAxis, Unit
+from .model import Choice, SweepAxis, Trees, Unit
 from .sweep_settings import AxisSettings
 from .values import entry_names, label, numeric, of_range, subset_count, subsets
 
@@ -35,7 +35,7 @@ def read_axis(
     name: str,
     settings: AxisSettings,
     root: Node,
-    trees: dict[str | None, Node],
+    trees: Trees,
     variant: str | None,
     problems: Problems,
 ) -> SweepAxis | None:
@@ -104,7 +104,7 @@ def _choices(
     source: str,
     settings: AxisSettings,
     root: Node,
-    trees: dict[str | None, Node],
+    trees: Trees,
     variant: str | None,
     problems: Problems,
 ) -> list[Choice]:
@@ -150,7 +150,7 @@ def _nodes(root: Node, steps: Steps, problems: Problems) -> list[tuple[str, Node
 
 
 def _variant_choices(
-    here: Steps, settings: AxisSettings, trees: dict[str | None, Node], problems: Problems
+    here: Steps, settings: AxisSettings, trees: Trees, problems: Problems
 ) -> list[Choice]:
     names = [name for name in trees if name is not None]
     chosen = list(settings.variants or ()) if settings.variants != "all" else names
@@ -204,7 +204,7 @@ def _subset_choices(
     here: Steps,
     settings: AxisSettings,
     root: Node,
-    trees: dict[str | None, Node],
+    trees: Trees,
     variant: str | None,
     problems: Problems,
 ) -> list[Choice]:
@@ -250,9 +250,7 @@ def _subset_choices(
     return [Choice(text, (), kept=(path, names_kept, mark)) for text, names_kept in labelled]
 
 
-def _check_paths(
-    here: Steps, choices: list[Choice], trees: dict[str | None, Node], problems: Problems
-) -> None:
+def _check_paths(here: Steps, choices: list[Choice], trees: Trees, problems: Problems) -> None:
     """Refuse a path that no variant has."""
     for path in dict.fromkeys(path for choice in choices[:1] for path, _, _ in choice.changes):
         errors = []

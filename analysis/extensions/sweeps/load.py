@@ -41,7 +41,7 @@ from ballplate.simulator.inputs import (
 from .axes import read_axis
 from .bundle import bundle_of, code_digest
 from .conditions import holds
-from .model import Sweep, SweepAxis
+from .model import Sweep, SweepAxis, Trees
 from .store_columns import is_reserved
 from .sweep_settings import SweepSettings
 from .values import entry_names
@@ -107,9 +107,7 @@ def load_sweep(
     return replace(sweep, digest=bundle.digest, code=code)
 
 
-def _axes(
-    settings: SweepSettings, root: Node, trees: dict[str | None, Node], problems: Problems
-) -> list[SweepAxis]:
+def _axes(settings: SweepSettings, root: Node, trees: Trees, problems: Problems) -> list[SweepAxis]:
     read_axes = [
         read_axis(name, axis_settings, root, trees, settings.variant, problems)
         for name, axis_settings in settings.axes.items()
@@ -187,7 +185,7 @@ def _settings(root: Node, problems: Problems) -> SweepSettings | None:
     return None if problems.messages else settings
 
 
-def _trees(base: Path) -> dict[str | None, Node]:
+def _trees(base: Path) -> Trees:
     """Return the trees of the base file by variant, or the whole file under None.
 
     :raises ExperimentError: the file cannot be read, or a variant is invalid.
@@ -200,9 +198,7 @@ def _trees(base: Path) -> dict[str | None, Node]:
     return dict(variants.items()) if variants else {None: root}
 
 
-def _check_variant(
-    settings: SweepSettings, trees: dict[str | None, Node], problems: Problems
-) -> None:
+def _check_variant(settings: SweepSettings, trees: Trees, problems: Problems) -> None:
     names = [name for name in trees if name is not None]
     has_axis = any(axis.variants is not None for axis in settings.axes.values())
     if settings.variant is not None and settings.variant not in trees:

@@ -8,6 +8,9 @@ from typing import Literal
 
 from ballplate.simulator.inputs import OPENED, Mark, Node, Trust
 
+# Contents of the base file and its variants, by their names.
+Trees = dict[str | None, Node]
+
 Unit = Literal["m", "rad", "1", ""]
 
 
@@ -62,7 +65,7 @@ class Sweep:
     source: Path
     title: str
     base: Path
-    trees: dict[str | None, Node]
+    trees: Trees
     variant: str | None
     axes: tuple[SweepAxis, ...]
     cells: tuple[tuple[int, ...], ...]
