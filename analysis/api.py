@@ -372,7 +372,7 @@ def compare(
     texts = {"published_rms": published_rms, "published_maximum": published_maximum}
     ensure_type(str, "a length with a unit, such as '0.35 um'", **texts)
     ensure_report(report)
-    published: dict[str, float | None] = {}
+    published = {}
     for key, text in texts.items():
         try:
             length = None if text is None else parse_length(text)

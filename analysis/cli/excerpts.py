@@ -43,7 +43,7 @@ def print_errors(messages: Iterable[Message], options: Namespace) -> None:
     """
     with_lines = options.verbose or sys.stderr.isatty()
     colour = has_colour(sys.stderr) if with_lines else False
-    files: dict[str, list[str]] = {}
+    files = {}
     for message in messages:
         print(message, file=sys.stderr)
         if not with_lines or not message.line:

@@ -70,7 +70,7 @@ def rule(text: str) -> str:
 
 def columns(text: str) -> dict[str, str]:
     """Read columns from the command line."""
-    assignments: dict[str, str] = {}
+    assignments = {}
     for part in text.split(","):
         name, sign, column = (piece.strip() for piece in part.partition("="))
         if not sign or not column or name in assignments:

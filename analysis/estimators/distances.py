@@ -450,7 +450,7 @@ def compare_estimators(
     seed = experiment.seed if seed is None else seed
     rms, maximum, failed = [], [], []
     same, true = _same_pairs(design, on_truth, truth, seed, points)
-    errors: list[Array] = []
+    errors = []
     for trial in range(trials):
         generator = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(trial,)))
         try:

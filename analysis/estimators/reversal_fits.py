@@ -142,7 +142,7 @@ PARAMETERS: tuple[tuple[str, Literal["rad", "1", "m"]], ...] = (
 
 def _refuse_others(experiment: Experiment, observed: ObservedReadings, scale: Scale | None) -> None:
     """Refuse experiments that are no reversal."""
-    messages: list[Message] = []
+    messages = []
 
     def add(steps: Steps, text: str) -> None:
         messages.append(experiment.message(steps, f"{text}, {INSTEAD}"))

@@ -121,7 +121,7 @@ def outcome(
     shared: Reference, aims: tuple[MonteCarloQuantity, ...], total: Accumulator
 ) -> MonteCarloOutcome:
     """Return the outcome of sums."""
-    comparisons: dict[str, MonteCarloComparison] = {}
+    comparisons = {}
     failed, trials = len(total.failed), total.count + len(total.failed)
     n = 0 if failed > max(FAILED_LIMIT, FAILED_SHARE * trials) else total.count
     for aim, sums in zip(aims, total.quantities, strict=True):

@@ -245,7 +245,7 @@ def _groups(design: Design) -> list[Integers]:
     turn[order] = np.arange(len(key)) - first
     order = np.lexsort((readings.ball, turn, readings.position))
     changes = np.diff(readings.position[order]) | np.diff(turn[order])
-    groups: list[Integers] = []
+    groups = []
     for members in np.split(order, np.flatnonzero(changes) + 1):
         count = -(-len(members) // READINGS_AT_ONCE)
         groups += (

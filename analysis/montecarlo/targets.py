@@ -70,7 +70,7 @@ def targets(shared: Reference) -> tuple[MonteCarloQuantity, ...]:
     """
     at = shared.linearisation
     displaced = _displaced(shared, at)
-    quantities: list[MonteCarloQuantity] = []
+    quantities = []
     for symbol, kind in QUANTITIES.items():
         for functions in functions_of(symbol, at.design, at.layout) if kind.in_replicates else ():
             if isinstance(functions, Parameters):
@@ -101,7 +101,7 @@ class Displaced:
 
 def _displaced(shared: Reference, at: Linearisation) -> Callable[[Places], Displaced]:
     """Return a function from places to `Displaced`, with a cache of points."""
-    cache: dict[bytes, Displaced] = {}
+    cache = {}
 
     def displaced(places: Places) -> Displaced:
         if isinstance(places, BallPlaces):

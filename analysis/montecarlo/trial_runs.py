@@ -44,7 +44,7 @@ def run_trials(
     import scipy.special  # noqa: F401
 
     aims = targets(shared)
-    total: Accumulator | None = None
+    total = None
     interrupted = False
     try:
         for part in _parts(shared, aims, seed, trials, workers):
@@ -88,7 +88,7 @@ def sum_of_task(
     shared: Reference, aims: tuple[MonteCarloQuantity, ...], seed: int, task: int, trials: int
 ) -> Accumulator:
     """Return sums over the replicates of one task."""
-    total: Accumulator | None = None
+    total = None
     for batch in range(task * BATCHES, (task + 1) * BATCHES):
         count = min(BATCH, trials - batch * BATCH)
         if count <= 0:

@@ -10,7 +10,7 @@ from itertools import combinations
 
 import numpy as np
 from ballplate.planning.bound import Bound, bound
-from ballplate.planning.choice import CurvePoint, DriftInOrders, Gain, OpenPool
+from ballplate.planning.choice import CurvePoint, DriftInOrders, Gain
 from ballplate.planning.constraints import Budget, Constraints, constraints
 from ballplate.planning.criteria import (
     CriterionName,
@@ -106,7 +106,7 @@ def campaign(
         )
     refuse_many_points(experiment, request.criterion)
     offered = offered or offer(pool)
-    refusal: ExperimentError | None = None
+    refusal = None
     result, less = None, offered.without_begun(experiment)
     try:
         result = _campaign(experiment, pool, request, offered, earlier, workers, report)
@@ -162,7 +162,7 @@ def _campaign(
     information = pool_information(
         steady, whole, is_about_balls(request.criterion), completed_by, report
     )
-    gap: OpenPool | None = None
+    gap = None
     gap_of = optional_service("pool_gap") if information.deficiency else None
     if gap_of is not None:
         gap = gap_of(steady, pool.candidates, information, report)

@@ -111,7 +111,7 @@ def check_files(
     An unknown variant is reported last, as an error of all files together. Progress counts files,
     the designs of a single file, or the search for repairs of a single design.
     """
-    names_seen: set[str | None] = set()
+    names_seen = set()
     complete = True
     within = report if len(files) == 1 else unreported
     for path in counted(files, "files", len(files), report) if len(files) > 1 else files:
@@ -153,7 +153,7 @@ def checked_design(
 ) -> CheckedDesign:
     """An experiment judged, with changes looked for in its pool if there is one."""
     prediction = check(experiment, with_scale=True)
-    suggestions: SuggestedChanges | None = None
+    suggestions = None
     if with_pool is not None:
         suggestions = service("suggested")(with_pool, prediction, report)
     goals, missed = _judged(experiment, wanted.goals)

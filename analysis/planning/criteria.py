@@ -355,7 +355,7 @@ class Pairs:
     def squares(
         self, uncertainties: Iterable[Array], weigh: Callable[[Array], Array]
     ) -> tuple[Array, Array]:
-        sums: list[Array] = []
+        sums = []
         # The squares' sum is that of displacements times these.
         moved = np.zeros_like(self.displacement)
         # What follows belongs to other functions.
@@ -440,8 +440,8 @@ def criterion(information: Information, experiment: Experiment, name: CriterionN
     """
     drawn = information.drawn
     scaled = np.zeros((0, information.basis.size))
-    functions: Several | None = None
-    needed: list[tuple[str, tuple[int, ...]]] = []
+    functions = None
+    needed = []
     symbol = name.removesuffix(MAXIMUM)
     kind = QUANTITIES.get(symbol)
     if kind is None:
@@ -452,7 +452,7 @@ def criterion(information: Information, experiment: Experiment, name: CriterionN
             raise refused(experiment.source, text, "pool")
         scaled = _of_shared(information, STEP * np.eye(drawn.shared)[model])
     else:
-        parts: list[Pairs | Linear] = []
+        parts = []
         for quantity_functions in functions_of(symbol, drawn.design, drawn.layout):
             assert isinstance(quantity_functions, Distances)
             if isinstance(quantity_functions.places, BallPlaces):

@@ -55,7 +55,7 @@ def in_time(
 
 def in_order_settings(experiment: Experiment) -> dict[int, dict[str, Any]]:
     """Return an experiment file's times of its drifts, by index of the influence quantity."""
-    settings_by_index: dict[int, dict[str, Any]] = {}
+    settings_by_index = {}
     for k, influence in enumerate(experiment.influences):
         if isinstance(influence, DriftSettings):
             places = (influence.positions or {}).items()

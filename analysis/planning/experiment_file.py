@@ -286,7 +286,7 @@ def _chunks(text: str, root: MappingNode) -> dict[str, str]:
     if len(starts) < len(root.items) or is_marked or has_anchors:
         return {}
     first = min(starts)
-    chunks: dict[str, list[str]] = {}
+    chunks = {}
     key, above = "", list[str]()
     for number, line in enumerate(lines[first:], first):
         if number in starts:

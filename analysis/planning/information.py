@@ -248,9 +248,9 @@ def pool_information(
 
     base = np.concatenate([_in_amounts(rows, balls) for rows in rows_always])
     of_positions = position_rows(drawn)
-    pool_rows: list[Array] = []
-    pose_ranks: list[int] = []
-    pose_open: list[int] = []
+    pool_rows = []
+    pose_ranks = []
+    pose_open = []
     for k in counted(range(len(candidates)), "candidates", len(candidates), report):
         if k in items:
             pool_rows.append(np.concatenate([_in_amounts(r, balls) for r in items[k]]))
@@ -528,7 +528,7 @@ def _inverse(triangle: Triangle) -> Array:
 
 
 def _batches(every: list[Array], size: int) -> Iterator[list[Array]]:
-    some: list[Array] = []
+    some = []
     for rows in every:
         some.append(rows)
         if sum(map(len, some)) > size:

@@ -176,7 +176,7 @@ def run_sheet(
     else:
         begun, gap = ordered((), changes, before, first)
         sequence = (*begun, *in_order(positions, changes, order))
-    steps: list[Step] = []
+    steps = []
     elapsed = 0.0
     for k, (candidate, probes) in enumerate(sequence):
         is_done = k < len(before)

@@ -24,7 +24,7 @@ def short_names(
     skipped, so that each number means one position.
     """
     used = {name.casefold() for name in (*names_taken, *names_known.values())}
-    names_found: dict[str, str] = {}
+    names_found = {}
     number = 0
     for place, candidate in enumerate(order, 1):
         if candidate.name in names_known:

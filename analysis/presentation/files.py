@@ -56,7 +56,7 @@ def write_files(
 
     :raises UnwrittenError: one cannot be written, or a library that it needs is not installed.
     """
-    temporaries: dict[Path, Path] = {}
+    temporaries = {}
     path = Path()
     try:
         for path, writer in writers.items():

@@ -88,7 +88,7 @@ def _write_axis(
     out = out if out @ (centre - middle) > 0 else -out
     # Ends move inwards to separate those of two axes, except at a short edge.
     off, inward = (0.06, 0.05) if length > SHORT * size else (0.14, 0.0)
-    written: list[Array] = []
+    written = []
     for start, text, away, shift in (
         (centre, f"{name}, mm", off, 0.0),
         (ends[0], _millimetres(low), 0.06, inward),

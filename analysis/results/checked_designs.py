@@ -57,7 +57,7 @@ def _predict(
 ) -> Prediction:
     at, target = linearise(design), experiment.target_uncertainty
     judged = verdict(at, experiment.expected_rank_deficiency, target)
-    quantities: dict[str, Quantity] = {}
+    quantities = {}
     if with_quantities:
         quantities = uncertainties(at, target=target)
         lengths = quantities.get("U6")

@@ -175,8 +175,8 @@ def estimated_functions(at: Linearisation, monomials: bool) -> EstimatedFunction
     design, layout, state = at.design, at.layout, at.state
     identity, size = np.eye(len(layout)), len(layout)
     functions: list[Function] = []
-    values: list[Array] = []
-    rows: list[Array] = []
+    values = []
+    rows = []
 
     def add(
         kind: FunctionKind,

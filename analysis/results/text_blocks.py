@@ -370,7 +370,7 @@ def quantities_data(quantities: dict[str, Quantity]) -> Data:
 
 
 def quantity_data(q: Quantity) -> Data:
-    compared: dict[str, Any] = {}
+    compared = {}
     if q.within_target is not None:
         compared = {"within_target": q.within_target, "target_coverage_factor": q.coverage_factor}
     return {

@@ -77,7 +77,7 @@ def uncertainties(
     their own.
     """
     quantities: dict[str, Quantity] = {}
-    cache: dict[bytes, Displacements] = {}
+    cache = {}
 
     def displaced(places: Places) -> Displacements:
         if isinstance(places, BallPlaces):

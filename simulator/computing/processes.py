@@ -8,9 +8,8 @@ import sys
 import threading
 import time
 import warnings
-from collections.abc import Callable, Generator, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, suppress
-from types import FrameType
 from typing import Any, TypeVar
 
 Result = TypeVar("Result")
@@ -53,7 +52,7 @@ def in_processes(
         initializer=begin_worker,
         initargs=(os.getpid(),),
     )
-    results: Generator[Result, None, None] | None = None
+    results = None
     finished = False
     try:
         with _signals_held():
@@ -129,7 +128,7 @@ def _signals_held() -> Iterator[None]:
     if threading.current_thread() is not threading.main_thread():
         yield
         return
-    pending: list[tuple[int, FrameType | None]] = []
+    pending = []
     before = {}
     for number in (signal.SIGINT, signal.SIGTERM):
         handler = signal.getsignal(number)

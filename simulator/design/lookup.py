@@ -182,7 +182,7 @@ class References:
     def _known_once(
         self, noun: str, names_known: Collection[str], names: Sequence[str], steps: Steps
     ) -> bool:
-        names_seen: set[str] = set()
+        names_seen = set()
         before = len(self.problems.messages)
         for i, name in enumerate(names):
             if name not in names_known:

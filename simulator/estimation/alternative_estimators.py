@@ -133,7 +133,7 @@ def alternative_estimate(
     measured = _measured(design, points, pairs, across_probes)
     a = np.zeros(len(design.model.parameters)) if start is None else start
     scale = np.array([MICROMETRE / parameter.effect for parameter in design.model.parameters])
-    record: list[Iteration] = []
+    record = []
     length, previous, count = 0.0, np.inf, 0
     null = np.zeros((len(a), 0))
     status: Status = "not converged"

@@ -85,7 +85,7 @@ def gauss_newton(
     settings = settings or GaussNewtonSettings()
     layout = design.once(shared_layout)
     state = start
-    record: list[Iteration] = []
+    record = []
     length, previous = 0.0, np.inf
     status: Status = "not converged"
     while True:

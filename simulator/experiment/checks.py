@@ -343,8 +343,8 @@ def check_use(
     balls that no position reads.
     """
     problems = references.problems
-    placed: set[str] = set()
-    uncertain: set[str] = set()
+    placed = set()
+    uncertain = set()
     in_pool = (
         set(references.artefact_names)
         if candidates is None

@@ -59,7 +59,7 @@ def read_numbered_curves(
     names_known = (*NAMES, *(f"{name}{BANDWIDTH}" for name in NAMES)) if bandwidths else NAMES
     names, factors = _columns(Mark(file, lines[0][0], 1), lines[0][1], names_known)
     messages: list[Message] = []
-    rows: list[tuple[int, list[float]]] = []
+    rows = []
     for number, line in lines[1:]:
         if len(messages) >= MOST_MESSAGES:
             messages.append(Message(file, number, 1, "", MORE_ERRORS))
@@ -93,9 +93,9 @@ def read_numbered_curves(
 
 
 def _columns(mark: Mark, header: str, errors: tuple[str, ...]) -> tuple[list[str], list[Fraction]]:
-    messages: list[Message] = []
-    names: list[str] = []
-    factors: list[Fraction] = []
+    messages = []
+    names = []
+    factors = []
     for place, cell, name, unit in header_cells(mark, header, EXAMPLE):
         if name != POSITION and name not in errors:
             is_known = cell in (POSITION, *errors)

@@ -61,7 +61,7 @@ def parse_line(text: str) -> dict[str, float]:
     {'y': 0.6, 'z': 0.2}
     """
     _refuse_decimal_comma(text)
-    values: dict[str, float] = {}
+    values = {}
     for part in text.split(","):
         name, equals, value = (piece.strip() for piece in part.partition("="))
         if not equals or name not in AXES:

@@ -158,7 +158,7 @@ def _least_misfit(exact: _Exact, drawn: Array) -> tuple[Array, Array] | None:
     """
     extent = float(np.ptp(drawn, axis=0).max())
     generator = np.random.default_rng(0)
-    best: tuple[Array, Array] | None = None
+    best = None
     for start in STARTS:
         off = start * extent * generator.standard_normal(drawn.shape)
         balls, misfit = _solved(exact, drawn + off)

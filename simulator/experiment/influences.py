@@ -30,7 +30,7 @@ def resolve_influences(
 ) -> tuple[InfluenceSettings, ...]:
     """Return the influence quantities; faults go to the problems."""
     placed = {position.name: position.artefact for position in positions.values()}
-    found: list[InfluenceSettings] = []
+    found = []
     standards = [
         name
         for name in dict.fromkeys(placed.values())

@@ -54,10 +54,10 @@ def standard_lengths(
     """
     artefacts = list(experiment.artefacts)
     rows: list[_Row] = []
-    names: list[str] = []
-    standing: list[int] = []
-    drawn: list[float] = []
-    index_of_pair: dict[tuple[int, int, int], int] = {}
+    names = []
+    standing = []
+    drawn = []
+    index_of_pair = {}
     standards = [
         k
         for k, artefact in enumerate(experiment.artefacts.values())

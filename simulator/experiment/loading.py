@@ -9,7 +9,6 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from ..design.observations.calibration import Calibration
 from ..inputs.decoding import refuse_long_lines
 from ..inputs.messages import ExperimentError, Message
 from ..inputs.problems import Problems, in_order, written_count
@@ -73,7 +72,7 @@ def load(
         _raise_if_any([*base_problems.messages, *messages], refused, source)
         assert experiment is not None
         return (experiment,)
-    experiments: list[Experiment] = []
+    experiments = []
     variants_of: dict[Message, list[str]] = {}
     size = 0
     for name, tree in trees.items():
@@ -207,7 +206,7 @@ def _build(
     readers, reader_count = (
         (named, len(named) + (not candidates.complete)) if planning else (positions, position_count)
     )
-    calibrations: dict[int, Calibration] = {}
+    calibrations = {}
     for key, settings in sections.entries("calibration").items():
         i = int(key)
         calibration = resolve_calibration(settings, ("calibration", i), references)

@@ -81,7 +81,7 @@ def _data(map_data: MapData) -> dict[str, Any]:
 
 def _probe_data(fitted: FittedMap) -> dict[str, Any]:
     """Probes as a file states them, by name."""
-    data: dict[str, Any] = {}
+    data = {}
     for k, name in enumerate(fitted.probes.names):
         data[name] = {
             "offset": [_length(component) for component in fitted.probes.offsets[k].tolist()]

@@ -41,7 +41,7 @@ def named_in(nodes: Sequence[tuple[str, Node]], folder: Path) -> list[Path]:
     """Return existing files that nodes at paths of an experiment name, as seen from a folder,
     those that these name, and modules.
     """
-    paths: set[Path] = set()
+    paths = set()
     for key, node in nodes:
         for scalar in path_scalars(node, key):
             text = str(scalar.value)
@@ -127,7 +127,7 @@ def module_files(folder: Path, module: str) -> set[Path]:
     """Files in a folder that make up a module, and those that it imports from there, by what their
     text says.
     """
-    paths: set[Path] = set()
+    paths = set()
     waiting = [module]
     while waiting:
         top = waiting.pop().partition(".")[0]

@@ -4,7 +4,7 @@ choice.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from collections.abc import Mapping as AnyMapping
 from collections.abc import Sequence as AnySequence
 from dataclasses import dataclass, field, replace
@@ -211,7 +211,7 @@ def resolve_pool(
     if ("pool", "times") not in sections.values:
         return None
     chosen_from, complete = list(candidates.found), candidates.complete
-    at_most: list[AtMost] = []
+    at_most = []
     radii: dict[str, list[int]] = {}
     fixed = {
         calibration.artefact: i
@@ -473,7 +473,7 @@ def _selected(
             text = f'unknown {key} "{name}"; {hint(name, sorted(names))}'
             references.problems.add((*steps, key), text)
             return []
-    tests: list[Callable[[Candidate], bool]] = []
+    tests = []
     if selector.name is not None:
         pattern = selector.name
         tests.append(lambda candidate: fnmatchcase(candidate.name, pattern))

@@ -45,7 +45,7 @@ def resolve_priors(
         # Told already, with the error model.
         return ()
     known_quantities = _known(model, positions, references)
-    priors: list[Prior] = []
+    priors = []
     for i, entry in entries.items():
         steps: Steps = ("priors", int(i))
         if isinstance(entry, MapPriorSettings):

@@ -88,7 +88,7 @@ def _offset(
 
 def _star_members(sections: Sections, references: References) -> list[str]:
     """Return probes of stars, and report faults of their names."""
-    members: list[str] = []
+    members = []
     for i, settings in sections.entries("stars").items():
         steps: Steps = ("stars", int(i), "probes")
         names = settings.probes or references.probes

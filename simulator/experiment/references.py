@@ -42,8 +42,8 @@ def resolve_references(
     probes = written_keys(root, "probes")
     if not probes and written(root, "probes") is None and dimension in (2, None):
         probes = (DEFAULT_PROBE,)
-    artefacts: dict[str, ArtefactSettings] = {}
-    layouts: dict[str, BallLayout] = {}
+    artefacts = {}
+    layouts = {}
     balls = 0
     for key, settings in sections.entries("artefacts").items():
         name, steps = str(key), ("artefacts", str(key))
@@ -127,7 +127,7 @@ def _with_coordinates(
     except ExperimentError as error:
         problems.take(error, steps)
         return None
-    coordinates: dict[str, tuple[float, ...]] = {}
+    coordinates = {}
     complete = True
     for row in rows:
         if row.texts[0] in coordinates:

@@ -72,7 +72,7 @@ def _exchange(star: Star, offsets: Array) -> tuple[tuple[int, int], float]:
     Exchanges in a symmetric star differ by a turn: among those that leave as little, the one with
     the least turn is likeliest, since most tables use axes like the machine's.
     """
-    exchanges: list[tuple[float, float, tuple[int, int]]] = []
+    exchanges = []
     for i in range(len(offsets) - 1):
         later = np.arange(i + 1, len(offsets))
         tried = np.repeat(offsets[None], len(later), axis=0)

@@ -326,9 +326,9 @@ def _columns(
     units: Mapping[str, Mapping[str, Fraction]],
 ) -> tuple[list[str], dict[str, Fraction]]:
     """Return the names of the columns without their units, and the factors of units."""
-    messages: list[Message] = []
-    names: list[str] = []
-    factors: dict[str, Fraction] = {}
+    messages = []
+    names = []
+    factors = {}
     for cell_mark, cell, name, unit in header_cells(mark, header, example):
         its_units = units.get(name, LENGTH_UNITS)
         if cell in texts:

@@ -59,7 +59,7 @@ class Explanation:
 
 def explain(errors: list[ErrorDetails], node: Node, schema: Schema) -> list[Explanation]:
     """Return explanations of errors in ``node``; ``schema`` is its JSON schema."""
-    explanations: list[Explanation] = []
+    explanations = []
     choices: dict[Steps, dict[str, list[tuple[Explanation, bool]]]] = {}
     # More than `MOST_MESSAGES` are not reported.
     for error in errors[: 2 * MOST_MESSAGES]:

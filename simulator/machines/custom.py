@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import importlib
 import sys
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypeVar
@@ -196,7 +196,7 @@ def module_source(name: str, folder: Path | None) -> Path | None:
     beside = None if folder is None else module_file(folder.resolve(), module)
     if beside is not None:
         return beside
-    locations: Sequence[str] | None = None
+    locations = None
     spec = None
     parts = module.split(".")
     for count in range(1, len(parts) + 1):

@@ -380,7 +380,7 @@ def fitted_volumetric(
     positioning error.
     """
     expanding = {f"E{axis.upper()}{axis.upper()}" for axis in machine.temperature}
-    functions: dict[str, Basis] = {}
+    functions = {}
     for error in machine.errors:
         if error.shape is None:
             continue

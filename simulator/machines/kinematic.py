@@ -17,7 +17,7 @@ import numpy as np
 from .arrangement import AXES, Arrangement
 from .bases import Basis, Polynomial, Quoted, SingleFunction
 from .error_names import AXIS_ERRORS, SQUARENESS_ERRORS, AxisError, SquarenessError
-from .protocol import Array, Line, Parameter, Reported, Unit
+from .protocol import Array, Line, Parameter, Reported
 from .rigid_chain import RigidChain
 
 # Straightness held at zero at the far end, so that the frame's axes are those of the machine: the x
@@ -209,7 +209,7 @@ class KinematicModel:
     def _reported(self) -> Reported:
         quoted = [f.basis.quoted() for f in self.functions]
         names: list[str] = []
-        units: list[Unit] = []
+        units = []
         matrix = np.zeros((sum(len(q.names) for q in quoted), len(self.parameters)))
         for f, q in zip(self.functions, quoted, strict=True):
             matrix[len(names) : len(names) + len(q.names), self.slices[f.name]] = q.matrix
@@ -294,7 +294,7 @@ def carried_vectors(arrangement: Arrangement, x: Array, p: Array) -> list[tuple[
     On the probe's side: the chain beyond the axis, and the probe offset. On the workpiece's side:
     x + p less the displacements of the axes between this axis and the workpiece.
     """
-    by_axis: dict[str, tuple[float, Array]] = {}
+    by_axis = {}
     for side, sign in ((arrangement.probe_side, 1.0), (arrangement.workpiece_side, -1.0)):
         for index, axis in enumerate(side):
             beyond = np.array([name in side[index + 1 :] for name in AXES])

@@ -81,7 +81,7 @@ class Products:
         by_axis = [
             axis.quoted_whole(variable) for axis, variable in zip(self.axes, VARIABLES, strict=True)
         ]
-        rows: dict[str, Array] = {}
+        rows = {}
         for powers in product(*(range(len(quoted.names)) for quoted in by_axis)):
             row = np.array(
                 [

@@ -89,8 +89,8 @@ def _parameters_of_values(values: dict[str, str], model: ErrorModel) -> Array:
     reported = model.reported()
     rows = reported.known_names()
     quoted = {name: (reported.units[row], reported.matrix[row]) for name, row in rows.items()}
-    problems: list[tuple[str, str]] = []
-    targets: dict[str, float] = {}
+    problems = []
+    targets = {}
     for name, text in values.items():
         entry = rows_of_a.get(name) or quoted.get(name)
         if entry is None:

@@ -163,9 +163,9 @@ def _indices(rows: tuple[FileRow, ...], design: Design) -> tuple[Integers, list[
         for artefact in range(len(design.artefacts.names))
     ]
     # Equal names, which are frequent, are looked up once.
-    indices: dict[tuple[str, ...], ReadingKey] = {}
+    indices = {}
     faults: dict[tuple[str, ...], list[str]] = {}
-    index: list[ReadingKey] = []
+    index = []
     unknown: dict[str, list[FileRow]] = {}
     for row in rows:
         if len(unknown) >= MOST_MESSAGES:
@@ -174,7 +174,7 @@ def _indices(rows: tuple[FileRow, ...], design: Design) -> tuple[Integers, list[
         if row.texts not in indices:
             position, ball, probe = row.texts
             texts = faults.setdefault(row.texts, [])
-            balls_of_plate: dict[str, int] = {}
+            balls_of_plate = {}
             if position not in positions:
                 texts.append(f'unknown position "{position}"; {hint(position, positions)}')
             else:
@@ -230,7 +230,7 @@ def _where_not_read(
     :raises ExperimentError: a co-ordinate is missing, or present although unread.
     """
     is_read = measured(design, readings)
-    messages: list[Message] = []
+    messages = []
     for i, axis in np.argwhere(np.isnan(x) == is_read)[:MOST_MESSAGES].tolist():
         position = design.positions.names[readings.position[i]]
         text = f"no {AXES[axis]}; write a number, or remove the line"

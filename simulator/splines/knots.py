@@ -29,7 +29,7 @@ def at_every(
     (3.0, 13.0)
     """
     distinct = np.unique(x)
-    knots_found: list[float] = []
+    knots_found = []
     ends = [lower, *boundaries, upper]
     for start, end in zip(ends, ends[1:], strict=False):
         inside = distinct[(distinct >= start) & (distinct <= end)]

@@ -174,7 +174,7 @@ def _contradiction(
             f"the {constraints[k].words} is prescribed twice, differently; leave one of them out",
             constraints[k].places,
         )
-    texts: list[str] = []
+    texts = []
     places: list[float] = []
     for constraint in (constraints[k], *involved):
         indices = [f"{{{len(places) + i}}}" for i in range(len(constraint.places))]

@@ -240,7 +240,7 @@ def _additions(
 
 def _closed(pool: Pool, names_read: set[str]) -> set[str]:
     """Return candidates of groups whose limit is reached."""
-    closed: set[str] = set()
+    closed = set()
     for limit in pool.at_most:
         members = {pool.candidates[k].name for k in limit.members}
         if len(members & names_read) >= limit.count:

@@ -21,7 +21,7 @@ from ballplate.simulator.experiment import (
     with_chosen,
 )
 from ballplate.simulator.geometry import AXIS_NAMES
-from ballplate.simulator.inputs import ExperimentError, GivenText, Message, hint, length_text
+from ballplate.simulator.inputs import ExperimentError, GivenText, hint, length_text
 from ballplate.simulator.machines import Array
 from ballplate.simulator.readings import named_rows, read_readings
 
@@ -55,8 +55,8 @@ def done_candidates(
     in_plane = any(artefact.reads == "in plane" for artefact in experiment.artefacts.values())
     empty = AXIS_NAMES[:d] if in_plane else ()
     rows = named_rows(path, names_by_column, settings, d, empty)
-    messages: dict[str, Message] = {}
-    counts: dict[str, int] = {}
+    messages = {}
+    counts = {}
     name = ""
     for row in rows:
         name = row.texts[0]

@@ -60,7 +60,7 @@ def planned_readings(sheet: RunSheet, experiment: Experiment) -> list[PlannedRea
 
     :raises ExperimentError: two readings would have the same feature name.
     """
-    planned: list[PlannedReading] = []
+    planned = []
     meant: dict[str, tuple[str, str, str]] = {}
     for step in sheet.steps:
         item = step.candidate.item

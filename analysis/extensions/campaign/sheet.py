@@ -99,8 +99,8 @@ def sheet_of(experiment: Experiment) -> Sheet:
     tree = to_python(experiment.tree)
     positions = tree.get("positions", ()) if isinstance(tree, Mapping) else ()
     by_name = {str(settings["name"]): settings for settings in positions}
-    steps: list[Step] = []
-    before: tuple[Candidate, tuple[str, ...]] | None = None
+    steps = []
+    before = None
     pool, start = experiment.pool, 0.0
     timed = (
         {}

@@ -96,7 +96,7 @@ def run(options: Namespace) -> int:
     if options.ball_diameter is not None and not is_dmis:
         raise UsageError("--ball-diameter is for --points with a name that ends in .dmi")
     sheet = sheet_of(single(options, planning=True))
-    texts: dict[Path, str] = {}
+    texts = {}
     if options.output is not None:
         texts[options.output] = sheet.text(options.output.suffix.lower())
     if options.readings is not None:

@@ -150,7 +150,7 @@ def _temperatures(measurement: Element) -> Iterator[tuple[str, float]]:
 
 def _result(element: Element, temperatures: tuple[tuple[str, float], ...]) -> DigitalResult:
     lengths: list[DigitalValue] = []
-    matrices: list[tuple[tuple[int, ...], NamedMatrix]] = []
+    matrices = []
     data = element.first("data")
     for part in _parts(data, ()) if data is not None else ():
         block = part.block

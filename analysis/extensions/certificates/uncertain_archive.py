@@ -33,7 +33,7 @@ def gtc_archive(certificate: CertifiedBalls) -> str:
     origin = int(hashlib.sha256(certificate.fingerprint.encode() + content).hexdigest()[:32], 16)
     identifiers = {k: f"({origin}, {i})" for i, k in enumerate(uncertain.tolist(), 1)}
     freedom = certificate.degrees_of_freedom
-    ensemble: dict[str, Any] = {}
+    ensemble = {}
     if np.isfinite(freedom):
         # Of numbers that are correlated and known from one scatter (GTC, ensembles).
         ensemble = {"ensemble": list(identifiers.values())}

@@ -20,7 +20,6 @@ import numpy as np
 from ballplate.simulator.inputs import (
     ExperimentError,
     Mark,
-    Message,
     listing,
     read_number,
     read_text,
@@ -99,7 +98,7 @@ def _read(paths: Sequence[Path]) -> StatedTable:
 
 
 def _axis(path: Path, axis: int) -> tuple[AxisTable, list[str]]:
-    messages: list[Message] = []
+    messages = []
     rows, has_backlash = [], False
     for line in _lines(path):
         unknown = [name for name in line.cells if name not in ("NR", POSITION, BACKLASH, *LETTERS)]

@@ -119,10 +119,10 @@ def _read(paths: Sequence[Path]) -> StatedTable:
     :raises ExperimentError: faults of them.
     """
     blocks: list[_Block] = []
-    senses: set[Sense | None] = set()
-    arrangement: Arrangement | None = None
+    senses = set()
+    arrangement = None
     for path in paths:
-        sense: Sense | None = None
+        sense = None
         for line in read_text(path).splitlines():
             remark = line.partition("//")[2]
             sense = stated_sense(remark) or sense
@@ -221,7 +221,7 @@ def _wrong_names(names: Sequence[str], mark: Mark) -> list[Message]:
 
 def _axes(blocks: Sequence[_Block], path: Path) -> tuple[AxisTable, ...]:
     """Tables of axes, and squareness errors as slopes of their straightness errors."""
-    axes: dict[int, AxisTable] = {}
+    axes = {}
     slopes = np.zeros((3, 3))
     for block in blocks:
         for name in block.names:

@@ -145,7 +145,7 @@ def machine_files(tables: AxisTables, title: str, stem: str) -> dict[str, str]:
     there = tabulated(functions, nodes, reference, tuple(reference.tolist()))
     straight = [_without_slopes(axis, float(reference[axis.axis])) for axis in there.axes]
     slopes = np.array([slope for _, slope in straight])
-    files: dict[str, str] = {}
+    files = {}
     errors = []
     for table, _ in straight:
         for name, values in zip(names_of(table.axis), table.values.T, strict=True):

@@ -263,7 +263,7 @@ def bootstrap(
         (design, truth, sigma, monomials, seed, first, min(first + AT_ONCE, trials))
         for first in range(0, trials, AT_ONCE)
     )
-    replicates: list[Replicate] = []
+    replicates = []
     try:
         for some in in_processes(_task, tasks, workers):
             replicates += some

@@ -113,7 +113,7 @@ def without(design: Design, group: LeftGroup) -> tuple[Design, Flags]:
     out = np.isin(readings.position, group.positions)
     uncertainty = reading_uncertainties(design, readings) * np.where(out, OUT, 1.0)[:, None]
     changed: list[Observations] = [lengths.select(~out[lengths.first])]
-    is_out: dict[type[Observations], Flags] = {}
+    is_out = {}
     for observation in design.observations:
         if not isinstance(observation, Lengths):
             mine = np.zeros(observation.count(design), bool)

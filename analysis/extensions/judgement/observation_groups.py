@@ -99,7 +99,7 @@ def reweighted(design: Design, groups: Sequence[ObservationGroup], ratios: Array
     places = row_places(design)
     uncertainty = reading_uncertainties(design, design.readings).copy()
     uncertainty[chosen] *= times[places["reading"]].reshape(-1, d)
-    changed: list[Observations] = []
+    changed = []
     for observation in design.observations:
         times_of_rows = times[places[observation.word]]
         if isinstance(observation, Lengths):

@@ -122,7 +122,7 @@ def _names(design: Design, observations: Observations, experiment: Experiment) -
         return _of_priors(design, observations, experiment)
     if isinstance(observations, Stars):
         return [f"stars[{k}]" for k in observations.star.tolist()]
-    names: list[str] = []
+    names = []
     for k, item in enumerate(experiment.calibration):
         if not experiment.is_observed(item):
             continue

@@ -281,8 +281,8 @@ class _Reader:
             if name in roles and (unit := roles[name].unit) is not None:
                 factors[roles[name].place] = names_known[unit], power_of_ten(names_known[unit])
         places = {role: roles[role].place for role in TEXTS if role in roles}
-        rows: list[tuple[FileRow, float]] = []
-        messages: list[Message] = []
+        rows = []
+        messages = []
 
         def number(cells: Sequence[str], i: int, mark: Mark) -> float:
             factor, power = factors.get(i, (None, ""))

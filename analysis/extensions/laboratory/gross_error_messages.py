@@ -54,7 +54,7 @@ def refuse_gross_errors(
             )
             raise marks[0].refused(text)
     messages = [_of_position(design, wrong, marks) for wrong in positions]
-    handled: set[int] = set()
+    handled = set()
     for wrong in readings:
         if wrong.reading not in handled:
             messages.append(_of_reading(design, wrong, marks))

@@ -226,7 +226,7 @@ def _against_readings(
         + TIMES_OFFSET * _offset_uncertainties(design)[readings.probe]
     )
     limit = np.minimum(limit, AGAINST_DRAWING * pitch[readings.ball])
-    undecided: list[tuple[int, int]] = []
+    undecided = []
     apart = np.zeros(len(readings))
     for sweep in range(12):
         motions = _Motions(rotations, origins, ~wrong)
@@ -310,7 +310,7 @@ def _explained(
     from scipy.spatial import cKDTree
 
     readings = design.readings
-    named: list[WrongReading] = []
+    named = []
     local = _in_frame(motions, readings.position, places)
     other_ball = np.full(len(readings), -1)
     for artefact in np.unique(design.balls.artefact[readings.ball[wrong]]):

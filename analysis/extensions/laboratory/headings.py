@@ -114,7 +114,7 @@ def read_headings(cells: Sequence[str], words: Vocabulary) -> Headings | None:
     if groups is None:
         return None
     columns_taken = {axis.place for group in groups for axis in group.axes}
-    roles: dict[str, HeadedColumn] = {}
+    roles = {}
     for role in (*TEXTS, "u", "diameter"):
         name = getattr(columns_stated, role, None)
         if name is not None:

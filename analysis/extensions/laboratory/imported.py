@@ -248,7 +248,7 @@ def _taken(report: Report, path: Path | GivenText, settings: ImportSettings) -> 
         feature for feature, parts in zip(features, names.parts, strict=True) if parts is None
     ]
     taken_report.leave(unnamed, f"the name is not of {names.rule}")
-    keys_seen: set[tuple[object, ...]] = set()
+    keys_seen = set()
     for (feature, fit), parts in zip(complete, names.parts, strict=True):
         if parts is None:
             continue

@@ -75,7 +75,7 @@ def _renamed(rows: Sequence[FileRow], role: int, names: Mapping[str, str]) -> Se
     """Rows with other names in one role."""
     if not names:
         return rows
-    names_by_texts: dict[tuple[str, ...], tuple[str, ...]] = {}
+    names_by_texts = {}
     for row in rows:
         if row.texts not in names_by_texts:
             name = names.get(row.texts[role], row.texts[role])
@@ -130,7 +130,7 @@ def _planned_probes(rows: Sequence[FileRow], design: Design, names: Names) -> Se
     """Rows without a probe's name with the only probe that is planned in their position."""
     if all(row.texts[2] for row in rows):
         return rows
-    only: dict[str, str] = {}
+    only = {}
     for k, name in enumerate(design.positions.names):
         probes = np.unique(design.readings.probe[design.readings.position == k])
         if len(probes) == 1:
@@ -216,7 +216,7 @@ def _positions_by_place(
     One that is `expected`, by its number, need only be the nearest.
     """
     names = {name: i for i, name in enumerate(design.balls.names)}
-    matched: dict[str, str] = {}
+    matched = {}
     for name in used:
         rows_of_name = [row for row in rows if row.texts[0] == name]
         places_of_name = places(rows_of_name)

@@ -129,8 +129,8 @@ def forms_of(lines: Sequence[Line], words: Vocabulary, settings: ReadingsSetting
     if settings.separator == "space":
         tried = ["wide", "space"]
     decimals = [settings.decimal] if settings.decimal else list(DECIMALS)
-    forms: list[Form] = []
-    reasons: list[NoFormError] = []
+    forms = []
+    reasons = []
     for separator in tried:
         try:
             header, headings = _find_headings(lines, separator, words, settings)
@@ -159,7 +159,7 @@ def _find_headings(
             return -1, numbered_columns(words, len(row or ()))
         except HeadingError as error:
             raise NoFormError(1, str(error)) from None
-    wrong: NoFormError | None = None
+    wrong = None
     widest = NoFormError(lines[0][0], "", ())
     comments = [i for i, (_, text) in enumerate(lines[:MOST_ABOVE]) if text.lstrip()[:1] == "#"]
     candidate_lines = [i for i in range(min(len(lines), MOST_ABOVE)) if i not in set(comments)]
@@ -204,7 +204,7 @@ def _form(
     units: dict[int, str] = {}
     rows: list[Row] = []
     empty: list[int] = []
-    remarks: list[int] = []
+    remarks = []
     wrong: list[tuple[int, str]] = []
     ball = headings.roles["ball"].place if "ball" in headings.roles else 0
     for line_number, text in _below(lines, header):

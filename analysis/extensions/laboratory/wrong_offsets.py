@@ -169,7 +169,7 @@ def offset_differences(design: Design, x: Array) -> OffsetDifferences:
     """
     pitch, readings = ball_pitches(design), design.readings
     is_read, places_seen = measured(design, readings), seen_places(design, readings, x)
-    rows: list[tuple[int, int, Array, Array, int]] = []
+    rows = []
     for k, mine, nominal in read_in_positions(design, readings):
         probe = readings.probe[mine]
         several = np.unique(probe)

@@ -74,7 +74,7 @@ def error_functions(
 
     :raises ValueError: there is none of a name.
     """
-    curves: list[FunctionCurve] = []
+    curves = []
     numbers: list[EstimatedNumber] = []
     functions = dict.fromkeys(parameter.function for parameter in fitted.model.parameters)
     for name in functions:

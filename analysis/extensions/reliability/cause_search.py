@@ -144,7 +144,7 @@ class Search:
     def diagnosis(self) -> Diagnosis:
         """Search until no further gross error is significant."""
         chosen: list[_Chosen] = []
-        scatter: MoreScatter | None = None
+        scatter = None
         while True:
             event = self._best_event()
             smooth = self._smooth_chances(event)

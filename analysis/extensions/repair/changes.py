@@ -215,7 +215,7 @@ def with_artefact(
             )
             place = replace(place, readings=groups)
         places.append(place)
-    items: list[Calibration] = []
+    items = []
     for item in experiment.calibration:
         if item.artefact == name:
             carried = _carried_over(item, old, new)

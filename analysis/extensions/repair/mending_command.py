@@ -35,9 +35,9 @@ def with_repairs(
     Unrepaired designs keep their suggestions. The number is the least exit status.
     """
     path = Path(checked.file)
-    repaired: set[str | None] = set()
+    repaired = set()
     messages: list[Message] = []
-    statuses: list[str] = []
+    statuses = []
     status = 0
     try:
         mark, text = _text(path) if checked.designs else ("", "")
@@ -69,7 +69,7 @@ def with_repairs(
         messages += error.messages
     for line in statuses if status != BAD_FILE else ():
         note(options, line)
-    after: dict[str | None, CheckedDesign] = {}
+    after = {}
     if repaired and not status:
         names = [name for name in repaired if name is not None]
         (again,) = check_files([path], names, replace(wanted, repairs=options.suggest))

@@ -148,7 +148,7 @@ def new_tips(experiment: Experiment) -> dict[str, Probe]:
     if len(values) > 1 and values[1] > 1e-6:
         return {}
     size = float(np.linalg.norm(offsets, axis=1).max(initial=0.0)) or TIP
-    tips: dict[str, Probe] = {}
+    tips = {}
     for sign, axis in product((1.0, -1.0), range(3)):
         offset = np.zeros(3)
         offset[axis] = sign * size

@@ -140,7 +140,7 @@ class _Search:
         )
         self.ranks = {change: rank_of([effect]) for change, effect in self.seen.items()}
         best: dict[ChangeKind, ChangeSet] = {}
-        singles: list[Change] = []
+        singles = []
         steps = counted(candidates.items(), "kinds of changes", len(candidates), report)
         for kind, changes in steps:
             sound = sum(self.is_sound(self.judge(change)) for change in best.values())
@@ -396,7 +396,7 @@ class _Search:
             return ()
         open_errors = self.open_errors()
         order = self.thinned(sorted(singles, key=lambda change: (change.kind, change.cost)))
-        by_change: dict[Change, tuple[int, ...]] = {}
+        by_change = {}
         for k in range(self.before.deficiency):
             for change in order:
                 after = self.judge((change,))

@@ -168,8 +168,8 @@ def _dumped(value: Any, flow_style: bool = False) -> str:
 
 def _spans(text: str, file: str) -> _Text:
     events: Iterator[Any] = iter(yaml.parse(text, Loader=LOADER))
-    scalars: list[tuple[int, int]] = []
-    aliases: set[str] = set()
+    scalars = []
+    aliases = set()
 
     def read(event: Any) -> _Span:
         start, end = event.start_mark.index, event.end_mark.index

@@ -344,7 +344,7 @@ def _wanted_of(line: ProgressLine) -> str:
 
 
 def _differences(section: Section) -> list[Block]:
-    blocks: list[Block] = []
+    blocks = []
     rows = []
     for compared in section.differences:
         if compared.comparison.failed:

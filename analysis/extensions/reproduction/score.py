@@ -38,7 +38,7 @@ class Score:
 
 def scores(problem: str, certified: Mapping[str, Any], answered: Any) -> list[Score]:
     """Return scores of a program's answers, in the form of `certified`, quantity by quantity."""
-    scored: list[Score] = []
+    scored = []
     for key, part in (("as_drawn", "as drawn"), ("estimate", "estimate")):
         if key not in certified:
             continue

@@ -201,7 +201,7 @@ def along(
     points_along = [*places]
     indices = [*range(len(places))]
     marks = [*labels]
-    where: list[int] = []
+    where = []
     for k, boundary in enumerate(boundaries):
         same = np.flatnonzero((np.array(points_along) == boundary).all(axis=1))
         if len(same):

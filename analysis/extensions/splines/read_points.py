@@ -131,8 +131,8 @@ def read_points(path: Path, x: str | None = None, y: str | None = None) -> Curve
     messages: list[Message] = []
     values: list[list[float]] = []
     names: list[str] = []
-    features: list[str] = []
-    normals: list[list[float]] = []
+    features = []
+    normals = []
     names_seen: dict[str, int] = {}
     for number, line in lines[1:]:
         if len(messages) >= MOST_MESSAGES or len(values) > MOST_POINTS:
@@ -220,7 +220,7 @@ def choose_points(points: CurvePoints, text: str, file: str) -> list[int]:
     """
     by_name = {name: k for k, name in enumerate(points.names)}
     numbers = {int(name): k for name, k in by_name.items() if re.fullmatch("[0-9]{1,9}", name)}
-    indices: set[int] = set()
+    indices = set()
     messages = []
     for part in re.split(r"\s*,\s*", text.strip()):
         span = re.fullmatch(r"([0-9]{1,9})\s*-\s*([0-9]{1,9})", part)

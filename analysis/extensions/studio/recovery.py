@@ -164,7 +164,7 @@ def _code(text: str, file: Path) -> list[object] | None:
         root, variants, _ = trees_of(text, file, [])
     except ExperimentError:
         return None
-    objects: list[object] = []
+    objects = []
     for tree in (root, *variants.values()):
         if runs_code(tree, file.parent):
             kinds = (to_python(node) for _, node in walk(tree) if isinstance(node, Mapping))

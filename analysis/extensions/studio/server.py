@@ -158,7 +158,7 @@ def _answering(
     """
 
     async def respond(request: Request) -> Response:
-        body: Any = {}
+        body = {}
         if request.method == "POST":
             if not request.headers.get("content-type", "").startswith("application/json"):
                 return _error("send JSON", 415)

@@ -21,7 +21,7 @@ from ballplate.simulator.inputs import (
     written,
 )
 
-from .model import Choice, SweepAxis, Trees, Unit
+from .model import Choice, SweepAxis, Trees
 from .sweep_settings import AxisSettings
 from .values import entry_names, label, numeric, of_range, subset_count, subsets
 
@@ -71,7 +71,7 @@ def read_axis(
 
 def _with_numbers(name: str, choices: list[Choice], is_simple: bool) -> SweepAxis:
     """Return the axis, with numbers if all choices are quantities in one unit."""
-    values: list[tuple[float, Unit]] = []
+    values = []
     if is_simple:
         values = [numeric(to_python(choice.changes[0][1])) for choice in choices]
     if len({unit for _, unit in values}) != 1 or not values[0][1]:

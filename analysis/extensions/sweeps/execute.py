@@ -96,7 +96,7 @@ def run_sweep(
     run.before = run.cells - len(remaining)
     summary = run.summary() if not retry_failed else Summary(run.cells, run.before, run.before, 0)
     report(summary.step)
-    failed: set[int] = set()
+    failed = set()
     for cells in _groups(remaining, blocks_of(sweep)):
         for tasks in _waves(run, cells, blocks_of(sweep)):
             for row in runner(tasks) if tasks else ():

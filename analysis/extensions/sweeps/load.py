@@ -25,7 +25,6 @@ from ballplate.simulator.inputs import (
     ExperimentError,
     Mapping,
     Mark,
-    Message,
     Node,
     Problems,
     Scalar,
@@ -308,7 +307,7 @@ def _check_base(sweep: Sweep) -> None:
     try:
         experiment_of(sweep, 0)
     except ExperimentError:
-        messages: set[Message] = set()
+        messages = set()
         for name, tree in sweep.trees.items():
             experiment, errors = build(tree, sweep.base, name, sweep.trust)
             if experiment is not None:

@@ -137,9 +137,9 @@ def read_results(connection: sqlite3.Connection, sweep: int, count: int) -> Stor
 
     :raises sqlite3.OperationalError: the store cannot be read.
     """
-    rows: list[StoredRow] = []
-    damaged: dict[int, str] = {}
-    missing: list[int] = []
+    rows = []
+    damaged = {}
+    missing = []
     # One query for each cell, so that a damaged page costs only its own rows.
     for number in range(count):
         try:

@@ -69,7 +69,7 @@ def displacements(
     used = np.unique(np.ravel_multi_index(index, sizes))
     place = np.full(int(np.prod(sizes)), -1)
     place[used] = np.arange(len(used))
-    parameters: list[InfluenceParameter] = []
+    parameters = []
     for key in used.tolist():
         index_by_level = dict(zip(levels, np.unravel_index(key, sizes), strict=True))
         label = words({level: names[level][k] for level, k in index_by_level.items()})

@@ -124,8 +124,8 @@ class DriftSettings(InfluenceSettings):
         )
         hours = max(float(np.abs(clock.hours(design.readings)).max(initial=0.0)), LEAST_HOURS)
         reach = float(np.abs(design.machine.volume.corners).max())
-        parts: list[tuple[int, bool]] = []
-        parameters: list[InfluenceParameter] = []
+        parts = []
+        parameters = []
         if self.axes is not None:
             listed = self.axes if isinstance(self.axes, tuple) else (self.axes,) * d
             for axis, amount in enumerate(listed):
@@ -175,7 +175,7 @@ class Clock:
         before = self.set_up * is_next + self.probe_change * is_changed
         seconds_taken = np.array(self.reading)[position] * readings.repeats
         seconds = np.cumsum(before + seconds_taken) - 0.5 * seconds_taken
-        positions_seen: set[int] = set()
+        positions_seen = set()
         for first in np.flatnonzero(is_next).tolist():
             start = self.starts[position[first]]
             if not np.isnan(start) and int(position[first]) not in positions_seen:

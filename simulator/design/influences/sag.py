@@ -183,8 +183,8 @@ def _values(path: Path, names: tuple[str, ...]) -> Array:
 
     :raises ExperimentError: the file is invalid; a ball is unknown, missing or there twice.
     """
-    values_by_name: dict[str, float] = {}
-    messages: list[Message] = []
+    values_by_name = {}
+    messages = []
     for row in read_table(path, ["ball"], ["sag"]):
         (ball,), (value,) = row.texts, row.lengths
         if ball not in names:

@@ -290,7 +290,7 @@ def _table_of_coordinates(
     if rows_read is None:
         return None
     before, names_known = len(problems.messages), set(layout.names)
-    by_ball: dict[str, tuple[Array, Array]] = {}
+    by_ball = {}
     for row, uncertainty in zip(*rows_read, strict=True):
         name = row.texts[0]
         if name not in names_known:

@@ -402,7 +402,7 @@ def _by_pair(
     once.
     """
     problems, known_names = references.problems, set(layout.names)
-    by_pair: dict[frozenset[str], CertificateEntry] = {}
+    by_pair = {}
     for entry in entries:
         names, distance, mark, place = entry.names, entry.value, entry.mark, entry.steps
         for name in names:

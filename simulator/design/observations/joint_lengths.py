@@ -288,7 +288,7 @@ def joint_whitening(
         root = np.asarray(np.linalg.solve(triangle.T, within.T).T, float)
         alike.setdefault(certificate[certificate_rows].tobytes(), []).append(len(groups))
         groups.append((rows, within, root))
-    together: list[Together] = []
+    together = []
     consistencies, equations_found, errors = [], [np.zeros((0, count))], []
     for members in alike.values():
         same = np.stack([groups[k][0] for k in members])

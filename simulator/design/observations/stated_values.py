@@ -14,7 +14,7 @@ import numpy as np
 from pydantic import Field
 
 from ...inputs.extensions import optional_service
-from ...inputs.messages import ExperimentError, Message, Steps
+from ...inputs.messages import ExperimentError, Steps
 from ...inputs.quantities import CommonPart
 from ...inputs.settings import Settings, Text, hint, listing, shorten
 from ...inputs.yamltree import Mark
@@ -271,12 +271,12 @@ def _of_file(
     except ExperimentError as error:
         problems.take(error, place)
         return None
-    index: dict[str, int] = {}
+    index = {}
     for k, (first, second) in enumerate(names):
         index[f"{first} {second}"] = k
         index[f"{second} {first}"] = k
     entry_of_name = np.full(len(names), -1)
-    messages: list[Message] = []
+    messages = []
     for i, name in enumerate(matrix.names):
         position_in_names = index.get(" ".join(name.split()))
         if position_in_names is None:

@@ -120,7 +120,7 @@ def _feature(document: _Document, element: Element, kind: str) -> Feature:
 
 def _points(document: _Document, element: Element) -> Array | None:
     """Return points (n, 3) of a sphere in metres, if they can be read."""
-    point_arrays: list[Array] = []
+    point_arrays = []
     for listed in element.all("PointList"):
         for child in listed.children:
             if child.name == "MeasurePoint":

@@ -42,7 +42,7 @@ def uncertainty_measures(results: ReportedSweep, of_parts: bool = True) -> list[
 
     `of_parts` includes lengths and angles of U2 and U3, and numbers of undetermined values.
     """
-    measures: list[Measure] = []
+    measures = []
     for symbol in DESCRIPTIONS:
         if " " in symbol and not of_parts:
             continue
@@ -83,7 +83,7 @@ def rank_measures(results: ReportedSweep) -> list[Measure]:
 
 def trial_measures(results: ReportedSweep, of_parts: bool = True) -> list[Measure]:
     """Return the measures of Monte Carlo; an empty list without trials."""
-    measures: list[Measure] = []
+    measures = []
     for symbol in trial_symbols(results):
         if " " in symbol and not of_parts:
             continue

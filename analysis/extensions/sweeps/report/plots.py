@@ -54,7 +54,7 @@ def plot_svg(plot: Plot, name: str) -> Html:
     count = len(plot.panels)
     below = BELOW + LINE * rows * wrapped
     with drawing(below + count * (PANEL + ABOVE)) as figure:
-        panels: list[Axes] = []
+        panels = []
         for k, panel in enumerate(plot.panels):
             bottom = below + (count - 1 - k) * (PANEL + ABOVE)
             panels.append(placed_axes(figure, LEFT, bottom, WIDTH - LEFT - RIGHT, PANEL))

@@ -143,7 +143,7 @@ def _values(*axes: dict[str, Any]) -> list[list[str]]:
     >>> _values({"unit": "m", "values": [1.0, 1.0000000001]}, {"unit": "m", "values": [1.0]})
     [['1 m', '1.0000000001 m'], ['1 m']]
     """
-    texts: list[list[str]] = []
+    texts = []
     for digits in range(DIGITS, ALL_DIGITS + 1):
         texts = [_rounded(axis, digits) for axis in axes]
         if all(
