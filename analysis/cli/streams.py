@@ -69,7 +69,7 @@ def _lasting(stream: Any, number: int, is_told: bool) -> Any:
         return stream
     with suppress(OSError):
         stream.flush()
-    lasting: Any = _Lasting(raw, number, is_told)
+    lasting = _Lasting(raw, number, is_told)
     return io.TextIOWrapper(
         # Where Python was told not to buffer, there is none between text and file.
         lasting if raw is buffer else io.BufferedWriter(lasting),

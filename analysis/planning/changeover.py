@@ -408,7 +408,7 @@ def _probe_changes(content: _Content, size: int) -> Integers:
     """Return the fewest changes of probe between an arriving and a leaving probe (size, size)
     while these positions are read.
     """
-    graphs: set[_Graph] = {((-1,) * size, 0)}
+    graphs = {((-1,) * size, 0)}
     for probes, count in content:
         pairs = list(combinations(probes, 2)) or [(probes[0], probes[0])]
         for _ in range(_enough(len(probes), count, comes_back=False)):

@@ -175,7 +175,7 @@ def advised(design: CheckedDesign) -> CheckedDesign:
     """Return a design with the goals its prediction meets, and suggestions."""
     prediction = design.prediction
     lines = [*design.goals]
-    data: Data = {"goals": list(design.goals), "missed": list(design.missed)}
+    data = {"goals": list(design.goals), "missed": list(design.missed)}
     if design.suggestions is not None:
         lines += design.suggestions.lines(prediction.verdict)
         data |= design.suggestions.data()

@@ -213,7 +213,7 @@ def pool_information(
         text = "has no position to choose; add candidates"
         raise refused(experiment.source, text, "pool")
     drawn = draw(experiment, positions)
-    items: dict[int, list[CandidateRows]] = {
+    items = {
         k: calibration_rows(drawn, experiment, candidate.item, candidate.name)
         for k, candidate in enumerate(candidates)
         if not isinstance(candidate.item, Position)

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 from ballplate.simulator.experiment.model import Candidate, ChangeTimes, Position
 from ballplate.simulator.inputs.settings import listing
 
-from .changeover import Setup, cheapest, kind_of
+from .changeover import cheapest, kind_of
 from .orders import LEAST_CHANGE_OVER, ReadingOrder, Sequenced, in_order
 from .short_names import with_short_name
 
@@ -334,7 +334,7 @@ def ordered(
     ]
     if first is not None:
         visits.append((first, _ending_with(first, order.before)))
-    members: dict[Setup, Iterator[Candidate]] = {
+    members = {
         kind: iter([candidate for candidate in positions if kind_of(candidate) == kind])
         for kind in set(map(kind_of, positions))
     }

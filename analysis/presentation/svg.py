@@ -174,7 +174,7 @@ def save(figure: Figure, path: str | Path | None, words: str) -> Figure:
     kind = path.suffix.lower()
     if kind not in PICTURES:
         raise ValueError(f"{path} should end in one of {', '.join(PICTURES)}")
-    metadata: dict[str, str | None] = {"Title": words, "Creator": None}
+    metadata = {"Title": words, "Creator": None}
     if kind == ".svg":
         metadata["Date"] = None
     elif kind == ".pdf":

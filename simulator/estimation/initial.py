@@ -129,7 +129,7 @@ def _assemble(locations: Array, nominal: Array, d: int) -> tuple[Array, list[tup
     first = int(present.sum(axis=1).argmax())
     shape = np.where(present[first][:, None], locations[first], np.nan)
     weight = present[first].astype(float)
-    poses: list[tuple[Array, Array]] = [(np.eye(d), np.zeros(d))] * len(locations)
+    poses = [(np.eye(d), np.zeros(d))] * len(locations)
     waiting = [k for k in range(len(locations)) if k != first]
     while waiting:
         shared = [present[k] & ~np.isnan(shape[:, 0]) for k in waiting]

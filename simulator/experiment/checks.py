@@ -123,7 +123,7 @@ def _true_machine_of_file(
     """Let the true machine be that of its file, or report its faults."""
     from ..machines.description import random_part
 
-    steps: Steps = ("true_machine", "file")
+    steps = ("true_machine", "file")
     true_machine = _machine_of_file(
         truth.file, ("true_machine",), references, references.problems.doubts
     )
@@ -216,7 +216,7 @@ def _read_curves(truth: CurvesSettings, machine: Machine | None, references: Ref
 
     problems, curves = references.problems, dict[str, Points]()
     for i, file in enumerate(truth.files):
-        steps: Steps = ("true_machine", "files", i)
+        steps = ("true_machine", "files", i)
         try:
             found = read_curves(references.file(file))
         except ExperimentError as error:

@@ -4,7 +4,6 @@ names.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from fractions import Fraction
 from pathlib import Path
 
@@ -109,7 +108,7 @@ def _columns(mark: Mark, header: str, errors: tuple[str, ...]) -> tuple[list[str
             continue
         error = AXIS_ERRORS.get(name.removesuffix(BANDWIDTH))
         is_angle = error is not None and error.is_rotation
-        units: Mapping[str, Fraction] = ANGLE_UNITS if is_angle else LENGTH_UNITS
+        units = ANGLE_UNITS if is_angle else LENGTH_UNITS
         if unit not in units:
             messages.append(
                 place.message(

@@ -46,7 +46,7 @@ def resolve_machine(settings: MachineSettings, problems: Problems) -> Machine | 
             )
             problems.add(("machine", "volume", axis), text)
             is_right = False
-    steps: Steps = ("machine", "repeatability")
+    steps = ("machine", "repeatability")
     by_axis: dict[str, float]
     if isinstance(settings.repeatability, float):
         by_axis = dict.fromkeys(ends, settings.repeatability)
@@ -147,7 +147,7 @@ def _task(
     references: References,
 ) -> Task | None:
     """Return a task, or None after reporting faults."""
-    steps: Steps = ("evaluation", "tasks", i)
+    steps = ("evaluation", "tasks", i)
     problems, dimension = references.problems, references.dimension
     before = len(problems.messages)
     names = [task.name for task in sections.get("evaluation").tasks]

@@ -195,7 +195,7 @@ def _errors(
         one = getattr(settings.errors, name, None)
         if one is None:
             continue
-        steps: Steps = ("errors", name)
+        steps = ("errors", name)
         random = None if one.bandwidth is None else one.bandwidth / one.sigmas
         error = ParametricError(name, criterion=machine.criterion, deviation=random)
         if one.polynomial is not None:

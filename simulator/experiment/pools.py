@@ -132,7 +132,7 @@ def resolve_candidates(
         references.is_position(name, position_names, ("pool", "times", "positions", name))
     count = len(positions)
     for i in range(written_count(root, "pool", "candidates")):
-        steps: Steps = ("pool", "candidates", i)
+        steps = ("pool", "candidates", i)
         settings = sections.get(*steps)
         if settings is None:
             references.check_written(steps)
@@ -343,7 +343,7 @@ def _reach(limits: LimitsSettings, references: References) -> dict[str, Array]:
     """Lower and upper ends (2, d) of where balls can be read, by probe."""
     problems, reach = references.problems, {}
     for name, region in limits.reach.items():
-        steps: Steps = ("pool", "limits", "reach", name)
+        steps = ("pool", "limits", "reach", name)
         if name not in references.probes:
             problems.add(
                 steps, f'unknown probe "{name}"; {hint(name, references.probes)}', of_key=True
@@ -462,7 +462,7 @@ def _selected(
     groups = {candidate.group for candidate in candidates if candidate.group} | set(
         _group_names(root)
     )
-    names_by_selector: dict[str, Any] = {
+    names_by_selector = {
         "group": groups,
         "artefact": references.artefact_names,
         "probe": references.probes,

@@ -47,7 +47,7 @@ def resolve_priors(
     known_quantities = _known(model, positions, references)
     priors = []
     for i, entry in entries.items():
-        steps: Steps = ("priors", int(i))
+        steps = ("priors", int(i))
         if isinstance(entry, MapPriorSettings):
             # Loaded where a map is named: few experiments have any.
             from .used_maps import resolve_map_prior
@@ -77,7 +77,7 @@ def _known(
     known_quantities: dict[str, tuple[_Known, ...]] = {}
     unit_rows = np.eye(len(model.parameters))
     for row, parameter in zip(unit_rows, model.parameters, strict=True):
-        quantity: _Known = (parameter.name, None, None, -1, row, parameter.unit, 0.0)
+        quantity = (parameter.name, None, None, -1, row, parameter.unit, 0.0)
         known_quantities[parameter.name] = (quantity,)
         if parameter.function != parameter.name:
             known_quantities[parameter.function] = (

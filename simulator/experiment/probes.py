@@ -90,7 +90,7 @@ def _star_members(sections: Sections, references: References) -> list[str]:
     """Return probes of stars, and report faults of their names."""
     members = []
     for i, settings in sections.entries("stars").items():
-        steps: Steps = ("stars", int(i), "probes")
+        steps = ("stars", int(i), "probes")
         names = settings.probes or references.probes
         if settings.probes is not None and not references.are_probes(names, steps):
             continue
@@ -121,7 +121,7 @@ def resolve_stars(
         names = tuple(settings.probes or references.probes)
         if not set(names) <= set(probes):
             continue
-        steps: Steps = ("stars", int(i))
+        steps = ("stars", int(i))
         coordinates = np.array([probes[name].offset for name in names])
         if settings.values is not None:
             values = _star_values(settings, names, (*steps, "values"), references)

@@ -89,7 +89,7 @@ def _read_correction(settings: ReadingsSettings, references: References) -> None
     correction = settings.compensation
     if not isinstance(correction, CompensationSettings):
         return
-    steps: Steps = ("readings", "compensation", "file")
+    steps = ("readings", "compensation", "file")
     if references.dimension == 2:
         text = "a machine file has 3 dimensions, but machine.volume has 2"
         references.problems.add(steps, text)

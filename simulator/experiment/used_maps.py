@@ -34,7 +34,7 @@ SAME, SAME_PART = 1e-12, 1e-9
 
 def read_true_map(truth: TrueMapSettings, machine: Machine | None, references: References) -> None:
     """Let the true machine be that of its map, or report its faults."""
-    steps: Steps = ("true_machine", "file")
+    steps = ("true_machine", "file")
     true_map = _read(truth.file, steps, references)
     if true_map is None:
         return

@@ -159,7 +159,7 @@ def removed(root: Node, path: str) -> Node:
 def _less(node: Node, steps: list[str], above: tuple[str, ...]) -> Node:
     step, deeper = steps[0], steps[1:]
     here = (*above, step)
-    key: str | int = int(step) if isinstance(node, Sequence) else step
+    key = int(step) if isinstance(node, Sequence) else step
     below = child(node, key)
     if below is None:
         items = node.items if isinstance(node, Mapping) else ()

@@ -20,7 +20,6 @@ from .ball_layouts import (
     BallsPerSide,
     Coordinates,
     Name,
-    Pairs,
     frozen,
 )
 from .listed_directions import DIRECTIONS, DirectionsSettings, directions
@@ -139,7 +138,7 @@ class TwoSpheresSettings(ArtefactSettings):
 
     def layout(self) -> BallLayout:
         """Return two balls; their only pair is in every set."""
-        only: Pairs = ((0, 1),)
+        only = ((0, 1),)
         return BallLayout(
             ("1", "2"),
             frozen([(0.0, 0.0, 0.0), (self.length, 0.0, 0.0)]),
@@ -214,20 +213,20 @@ def _rectangle(
     ]
     lower_left, lower_right = index[0, 0], index[0, columns - 1]
     upper_left, upper_right = index[rows - 1, 0], index[rows - 1, columns - 1]
-    sides: Pairs = (
+    sides = (
         (lower_left, lower_right),
         (upper_left, upper_right),
         (lower_left, upper_left),
         (lower_right, upper_right),
     )
-    diagonals: Pairs = ((lower_left, upper_right), (lower_right, upper_left))
+    diagonals = ((lower_left, upper_right), (lower_right, upper_left))
     neighbours = tuple(
         (i, index[neighbour])
         for (row, column), i in index.items()
         for neighbour in ((row, column + 1), (row + 1, column))
         if neighbour in index
     )
-    sets: dict[str, Pairs] = {
+    sets = {
         "corner sides": sides,
         "corner diagonals": diagonals,
         "corners": sides + diagonals,

@@ -78,7 +78,7 @@ def read_table(
         a number, there are no rows; all problems of the file at once.
     """
     file = str(path)
-    messages: list[Message] = [] if problems is None else problems
+    messages = [] if problems is None else problems
     lines = table_lines(path)
     example = ",".join([*texts, *(f"{name}_mm" for name in lengths)])
     if not lines:

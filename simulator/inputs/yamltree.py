@@ -374,7 +374,7 @@ class _Builder:
             self._open(event, mark)
         elif isinstance(event, yaml.SequenceEndEvent | yaml.MappingEndEvent):
             opened = self.stack.pop()
-            node: Node = (
+            node = (
                 Sequence(opened.mark, tuple(opened.items))
                 if opened.entries is None
                 else Mapping(opened.mark, opened.entries, opened.key_marks or {})

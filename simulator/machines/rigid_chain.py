@@ -48,8 +48,8 @@ class RigidChain:
     def _walk(self) -> tuple[Array, list[Array], list[Array]]:
         m = len(self.x)
         dtype = np.result_type(self.x, self.translation, self.p)
-        by_translation: list[Array] = [np.zeros((0,))] * 3
-        by_rotation: list[Array] = [np.zeros((0,))] * 3
+        by_translation = [np.zeros((0,))] * 3
+        by_rotation = [np.zeros((0,))] * 3
 
         def step(axis: int) -> Array:
             displaced = self.translation[:, axis].astype(dtype, copy=True)

@@ -58,7 +58,7 @@ class ObservedReadings:
         try:
             checks = service("ReadingChecks")
         except MissingExtensionError as error:
-            doubts: tuple[str, ...] = (f"errors in readings were not looked for ({error})",)
+            doubts = (f"errors in readings were not looked for ({error})",)
         else:
             doubts = checks.doubts_about_readings(self.design, self.x, self.marks)
         return (*self.certificate_doubts, *self.offset_doubts, *doubts)

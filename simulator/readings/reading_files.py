@@ -127,7 +127,7 @@ def read_readings(
     readings = replace(readings, uncertainty=uncertainty, beside=beside)
     readings = in_sequence(readings, design.influences)
     marks = tuple(row.mark for row in rows)
-    swapped: tuple[str, ...] = ()
+    swapped = ()
     if settings.swap_names:
         swap = service("ReadingChecks").with_names_swapped
         readings, swapped = swap(design, readings, x, marks)

@@ -7,7 +7,6 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from itertools import product
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from ballplate.planning import REST, SetUp, base_name, position_of, renamed
@@ -221,7 +220,7 @@ def _with_readings(candidate: Candidate, readings: tuple[ReadingGroup, ...]) -> 
     settings = {key: value for key, value in candidate.settings.items() if key not in GROUP}
     groups = []
     for reading in readings:
-        group: dict[str, Any] = {
+        group = {
             "probes": list(reading.probes),
             "balls": list(reading.balls),
             "repeats": reading.repeats,

@@ -66,7 +66,7 @@ def without_redone(
 def _planned(design: Design) -> Counter[Names]:
     """Return planned numbers of readings by names of position, ball and probe; at least 1."""
     readings = design.readings.expanded()
-    planned: Counter[Names] = _AtLeastOnce(
+    planned = _AtLeastOnce(
         (design.positions.names[k], design.balls.names[ball], design.probes.names[probe])
         for k, ball, probe in reading_keys(readings)
     )

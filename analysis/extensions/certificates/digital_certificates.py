@@ -20,7 +20,6 @@ from ballplate.simulator.inputs import (
     MOST_NAMES,
     ExperimentError,
     Mark,
-    Message,
     NamedMatrix,
     QuantityError,
     half_digit,
@@ -402,7 +401,7 @@ def _matrix(block: Element, count: int) -> NamedMatrix | None:
     names = tuple(f"value {k + 1}" for k in range(count))
     unit = unit_of_area(factors.pop()) if len(factors) == 1 else "um"
     matrix = NamedMatrix(names, values, rounding, False, tuple(marks), unit)
-    wrong: list[Message] = matrix_problems(matrix)
+    wrong = matrix_problems(matrix)
     if wrong:
         raise ExperimentError(wrong)
     return matrix

@@ -92,7 +92,7 @@ class CompensationTable(Result):
         return {"axis": "axis", "position, mm": "position", **parts}, rows
 
     def data(self) -> Data:
-        result_data: Data = {
+        result_data = {
             "title": self.title,
             "format": self.format.name,
             "states": self.sense,

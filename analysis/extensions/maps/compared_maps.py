@@ -284,7 +284,7 @@ def expected_map(
     (`stated`). Bandwidths are noise of single approaches, absent from maps.
     """
     described = Volumetric(machine)
-    model: ErrorModel = described.truth.model
+    model = described.truth.model
     temperature, deviations = described.lasting
     names = [parameter.name for parameter in model.parameters]
     root = np.zeros((len(names), len(deviations)))

@@ -8,7 +8,7 @@ import numpy as np
 from ballplate.results import Fit
 from ballplate.simulator.estimation import BallPlaces, displacements
 from ballplate.simulator.geometry import AXIS_NAMES, fit_motion
-from ballplate.simulator.machines import Array, Integers
+from ballplate.simulator.machines import Integers
 
 from .campaign_tests import orthonormal
 from .compared_maps import ComparedMap, MappedValues, motions, without_shared
@@ -88,7 +88,7 @@ def _estimated(side: ComparedMap, index: Integers) -> MappedValues:
     effects = np.zeros((n, d, balls, moved.own.shape[2]))
     effects[np.arange(n), :, index] = moved.own
     common = moved.common.reshape(n * d, -1)
-    root: Array = side.fit.sigma * np.concatenate([common, effects.reshape(n * d, -1)], axis=1)
+    root = side.fit.sigma * np.concatenate([common, effects.reshape(n * d, -1)], axis=1)
     root, shared = without_shared(root, side.absorbed)
     null = moved.null.reshape(n * d, -1)
     return MappedValues(moved.places.ravel(), root, null, moved.size.ravel(), shared)

@@ -182,7 +182,7 @@ def changes_of(experiment: Experiment, needed: Iterable[Edit]) -> Iterator[TextC
                 if str(entry["name"]) == name
             )
             settings = position_settings(experiment, places[name])
-            steps: Steps = ("positions", index)
+            steps = ("positions", index)
             if lacks_probes(experiment_settings["positions"][index]):
                 for group in settings.get("readings", [settings]):
                     group.pop("probes", None)

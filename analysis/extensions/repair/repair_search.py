@@ -338,7 +338,7 @@ class _Search:
         that is built up.
         """
         few = different(additions, self.seen)
-        sets: list[ChangeSet] = [
+        sets = [
             (few[i], few[k])
             for i, k in covering_pairs([self.seen[change] for change in few])
             if self.may_be((few[i], few[k]))

@@ -121,7 +121,7 @@ def _fields(steps: tuple[Step, ...], before: Any, after: Any) -> list[Edit]:
 
 def position_settings(experiment: Experiment, position: Position) -> dict[str, Any]:
     """Return a position in the form of a file."""
-    settings: dict[str, Any] = {"name": position.name}
+    settings = {"name": position.name}
     if len(experiment.artefacts) > 1:
         settings["artefact"] = position.artefact
     settings |= _placement(experiment, position)

@@ -25,7 +25,7 @@ def answers(problem: CertifiedProblem) -> dict[str, Any]:
     """
     experiment = load(problem.experiment_file)[0]
     drawn = predict(experiment)
-    parts: dict[str, Any] = {
+    parts = {
         "as_drawn": {
             "rank_deficiency": drawn.verdict.deficiency,
             "uncertainties": _uncertainties(drawn.quantities),

@@ -6,7 +6,6 @@ import re
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, fields
-from typing import Any
 
 from ballplate.simulator.inputs import (
     UNITS,
@@ -191,7 +190,7 @@ def _value(option: str, text: str, derivative: int, x: Column, y: Column) -> flo
             f'{option}: "{text}" has a decimal comma; write for example "{text.replace(",", ".")}"'
         )
     match = re.fullmatch(r"([+-]?[0-9.]+(?:[eE][+-]?[0-9]+)?)\s*([a-z]+)\s*/\s*([a-z]+)", plain)
-    units: Any = UNITS
+    units = UNITS
     with suppress(QuantityError):
         if match and match[2] in units[y.kind] and match[3] in units[x.kind]:
             return metres_or_radians(match[1], units[y.kind][match[2]] / units[x.kind][match[3]])

@@ -139,7 +139,7 @@ def ensure_as_read(document: DesignDocument) -> None:
     :raises ChangedOnDiskError: the file differs from its last reading or writing.
     """
     try:
-        content: bytes | None = document.path.read_bytes()
+        content = document.path.read_bytes()
     except FileNotFoundError:
         content = None
     if content != document.content:

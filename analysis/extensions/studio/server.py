@@ -18,7 +18,6 @@ from typing import Any
 from ballplate.simulator.inputs import ExperimentError
 from starlette.applications import Starlette
 from starlette.concurrency import run_in_threadpool
-from starlette.datastructures import Headers
 from starlette.requests import Request
 from starlette.responses import (
     HTMLResponse,
@@ -103,7 +102,7 @@ class Guard:
             await PlainTextResponse(reason, 403)(scope, receive, send)
 
     def _reason(self, request: Request) -> str | None:
-        headers: Headers = request.headers
+        headers = request.headers
         if headers.get("host", "") not in self.hosts:
             return "this address is not the studio's; use the one that the command has printed\n"
         origin = headers.get("origin")

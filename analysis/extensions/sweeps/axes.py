@@ -40,7 +40,7 @@ def read_axis(
     problems: Problems,
 ) -> SweepAxis | None:
     """Return an axis of the sweep file `root`; errors go to `problems`."""
-    here: Steps = ("axes", name)
+    here = ("axes", name)
     sources = [key for key in SOURCES if getattr(settings, key) is not None]
     if len(sources) != 1:
         fact = "has several sources of values" if sources else "has no values"

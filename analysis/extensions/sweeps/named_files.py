@@ -13,7 +13,7 @@ from ballplate.simulator.experiment import (
     model_modules,
     module_files,
 )
-from ballplate.simulator.inputs import ExperimentError, Node, Scalar
+from ballplate.simulator.inputs import ExperimentError, Scalar
 
 from .model import Sweep
 
@@ -40,7 +40,7 @@ def named_files(sweep: Sweep) -> list[Path]:
     def is_allowed(path: Path) -> bool:
         return any(path.resolve().is_relative_to(folder) for folder in allowed)
 
-    nodes: list[tuple[str, Node]] = [("", root) for root in sweep.trees.values()]
+    nodes = [("", root) for root in sweep.trees.values()]
     for axis in sweep.axes:
         nodes += [(path, node) for choice in axis.choices for path, node, _ in choice.changes]
     naming: dict[Path, Scalar] = {}
