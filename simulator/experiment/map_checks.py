@@ -119,16 +119,7 @@ def map_of_tree(
         coverage_factor=settings.coverage_factor,
         frame=settings.frame,
         temperatures=settings.temperatures,
-        left_out=tuple(
-            LeftOut(
-                left_out.name,
-                left_out.kind,
-                left_out.unit,
-                left_out.value,
-                left_out.standard_uncertainty,
-            )
-            for left_out in settings.left_out
-        ),
+        left_out=tuple(LeftOut(**left_out.model_dump()) for left_out in settings.left_out),
         data=None if data is None else MapData(**data.model_dump()),
         lack_of_fit=None if lack is None else LackOfFit(**lack.model_dump()),
         experiment=settings.experiment,

@@ -24,6 +24,8 @@ from .settings import describe, hint, shorten
 
 # Sizes of units in SI, by their names.
 Factors = Mapping[str, Fraction]
+# Units of several columns, or kinds of quantities.
+Units = Mapping[str, Factors]
 
 PI = Fraction("3.14159265358979323846264338327950288419716939937510582")
 
@@ -97,7 +99,7 @@ BASE_UNITS: Mapping[str, str] = {
     "ratio per time": "m/m/h",
 }
 # Kind of quantity → its units and an example for the messages.
-UNITS: Mapping[str, Factors] = {
+UNITS: Units = {
     "length": LENGTH_UNITS,
     "angle": ANGLE_UNITS,
     "ratio": RATIO_UNITS,

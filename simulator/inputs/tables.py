@@ -15,6 +15,7 @@ from .messages import MORE_ERRORS, MOST_MESSAGES, ExperimentError, Message, refu
 from .quantities import (
     LENGTH_UNITS,
     QuantityError,
+    Units,
     metres_or_radians,
     plain_number,
     plain_unit,
@@ -63,7 +64,7 @@ def read_table(
     problems: list[Message] | None = None,
     defaults: Mapping[str, str] = MappingProxyType({}),
     absent: float = 0.0,
-    units: Mapping[str, Mapping[str, Fraction]] = MappingProxyType({}),
+    units: Units = MappingProxyType({}),
     empty: Collection[str] = (),
 ) -> tuple[FileRow, ...]:
     """Return the rows of a comma-separated file whose first line names the columns.
@@ -323,7 +324,7 @@ def _columns(
     optional: Sequence[str],
     defaults: Mapping[str, str],
     example: str,
-    units: Mapping[str, Mapping[str, Fraction]],
+    units: Units,
 ) -> tuple[list[str], dict[str, Fraction]]:
     """Return the names of the columns without their units, and the factors of units."""
     messages = []

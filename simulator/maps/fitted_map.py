@@ -192,13 +192,6 @@ class FittedMap:
         points = rows if drawn is None else drawn
         return self._blanked(points[..., None, :], rows @ self.root)
 
-    def function_covariance(self, rows: Array, drawn: Array | None = None) -> Array:
-        """Return the covariance (k, k) of linear functions of b with derivatives `rows` (k, m);
-        NaN for those undetermined by `drawn` (k, m).
-        """
-        root = self.function_root(rows, drawn)
-        return root @ root.T
-
     def _blanked(self, rows: Array, values: Array) -> Array:
         return blank(values, rows @ self.undetermined, np.linalg.norm(rows * self.scale, axis=-1))
 

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
-from fractions import Fraction
 from pathlib import Path
 
 import numpy as np
@@ -18,12 +17,13 @@ from ..geometry.motions import AXIS_NAMES
 from ..inputs.decoding import END_OF_FILE, refuse_long_lines, text_and_encoding
 from ..inputs.extensions import optional_service
 from ..inputs.messages import ExperimentError, Message, refused
+from ..inputs.quantities import Units
 from ..inputs.tables import FileRow, header_names, header_texts, read_table
 from ..inputs.yamltree import GivenText, read_bytes
 from ..machines.protocol import Array
 
 Source = Path | GivenText
-Units = Mapping[str, Mapping[str, Fraction]]
+
 ROLES = ("position", "ball", "probe")
 
 

@@ -10,7 +10,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from fractions import Fraction
 from typing import ClassVar, Literal
 
 import numpy as np
@@ -19,7 +18,7 @@ from pydantic import Field
 from ...geometry.ball_layouts import Name
 from ...geometry.motions import AXIS_NAMES
 from ...inputs.messages import Steps
-from ...inputs.quantities import DURATION_UNITS, Duration, LengthDrift, RatioDrift
+from ...inputs.quantities import DURATION_UNITS, Duration, LengthDrift, RatioDrift, Units
 from ...inputs.settings import Forms, NonEmpty, Settings
 from ...machines.protocol import Array
 from ..lookup import References
@@ -204,7 +203,7 @@ class Drift(Influence):
         return self.listed
 
     @property
-    def columns(self) -> Mapping[str, Mapping[str, Fraction]]:
+    def columns(self) -> Units:
         """The time of each reading, from any zero on."""
         return {TIME: DURATION_UNITS}
 

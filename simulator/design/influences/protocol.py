@@ -11,13 +11,13 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass
-from fractions import Fraction
 from pathlib import Path
 from typing import ClassVar
 
 import numpy as np
 
 from ...inputs.messages import Steps
+from ...inputs.quantities import Units
 from ...inputs.settings import Settings
 from ...machines.protocol import Array, Integers, Unit
 from ..lookup import References
@@ -94,7 +94,7 @@ class Influence(ABC):
     """An influence quantity laid out for a design; a frozen dataclass of arrays."""
 
     @property
-    def columns(self) -> Mapping[str, Mapping[str, Fraction]]:
+    def columns(self) -> Units:
         """Columns of a file of readings that it uses, with the permitted units of each; the values
         of a reading are a `column` of `Disturbed`.
         """

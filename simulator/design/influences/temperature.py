@@ -18,7 +18,7 @@ from pydantic import Field
 
 from ...geometry.ball_layouts import Name
 from ...inputs.messages import Steps
-from ...inputs.quantities import Expansion, Temperature, TemperatureDifference
+from ...inputs.quantities import Expansion, Temperature, TemperatureDifference, Units
 from ...inputs.settings import Forms, NonEmpty, Settings
 from ...machines.protocol import Array, Unit
 from ..lookup import References
@@ -334,7 +334,7 @@ class Temperatures(Influence):
         return self.stated
 
     @property
-    def columns(self) -> Mapping[str, Mapping[str, Fraction]]:
+    def columns(self) -> Units:
         """Temperatures of single readings, where a file has them."""
         return {name: UNITS for part in self.parts for name in part.columns}
 
