@@ -128,7 +128,7 @@ class ReversalFit(FitResult):
         redundancy.
         """
         reversal, full = self.found, self.full
-        turn = number(float(np.degrees(self.turn)), 8)
+        turn = number(np.degrees(self.turn), 8)
         count = "five parameters" if self.offsets else "three parameters, no offsets"
         scale = "none (fitted, but not applied)" if self.scale == "none" else self.scale
         lines = [

@@ -196,9 +196,9 @@ class FitResult(Result):
     def notes_data(self) -> Data:
         """Notes, warnings and failure reason as plain data."""
         return {
-            "planned_but_not_read": list(self.observed.missing),
-            "read_but_not_planned": list(self.observed.unplanned),
-            "warnings": list(self.warnings),
+            "planned_but_not_read": self.observed.missing,
+            "read_but_not_planned": self.observed.unplanned,
+            "warnings": self.warnings,
             "complaint": self.complaint or None,
         }
 

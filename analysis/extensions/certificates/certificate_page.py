@@ -170,7 +170,7 @@ def _drawing(certificate: CertifiedBalls) -> str:
                 f'<text x="{x:.1f}" y="{y + 16:.1f}" font-size="9" text-anchor="middle"'
                 f' fill="#555">{escaped(name)}</text>'
             )
-    longest = number(1e6 * float(np.linalg.norm(apart, axis=1).max()), 3)
+    longest = number(1e6 * np.linalg.norm(apart, axis=1).max(), 3)
     return (
         f"<figure>{''.join(parts)}</svg><figcaption>From the drawing to where each ball is, the"
         " plate shifted and turned so that these are smallest, and U of x and y in the axes of the"

@@ -178,34 +178,32 @@ class CertifiedBalls(Result):
         return [*facts, "", *table, "", *lengths, "", *self.notes]
 
     def data(self) -> Data:
-        u = self.standard_uncertainties.tolist()
+        u = self.standard_uncertainties
         axes = "xyz"[: self.dimension]
         return {
             **{key.replace(" ", "_"): text for key, text in self.facts.items()},
             **picked(self, "coverage_factor", "coverage_probability"),
             "degrees_of_freedom": self.degrees_of_freedom,
             **picked(self, "reference_temperature", "scale_uncertainty"),
-            "left_out": list(self.left_out),
+            "left_out": self.left_out,
             "balls": {
                 name: {
                     axis: {"value": value, "standard_uncertainty": distance, "unit": "m"}
                     for axis, value, distance in zip(axes, place, uncertainties, strict=True)
                 }
-                for name, place, uncertainties in zip(
-                    self.names, self.coordinates.tolist(), u, strict=True
-                )
+                for name, place, uncertainties in zip(self.names, self.coordinates, u, strict=True)
             },
-            "covariance": {"unit": "m^2", "values": self.covariance.tolist()},
+            "covariance": {"unit": "m^2", "values": self.covariance},
             "distances": [
                 {
-                    "balls": list(distance.balls),
+                    "balls": distance.balls,
                     "value": distance.length,
                     "standard_uncertainty": distance.standard_uncertainty,
                     "unit": "m",
                 }
                 for distance in self.distances
             ],
-            "notes": list(self.notes),
+            "notes": self.notes,
         }
 
     def columns(self) -> MainTable:

@@ -100,8 +100,8 @@ class CompensationTable(Result):
         }
         if isinstance(self.table, AxisTables):
             result_data |= {
-                "probe_side": list(self.table.arrangement.probe_side),
-                "workpiece_side": list(self.table.arrangement.workpiece_side),
+                "probe_side": self.table.arrangement.probe_side,
+                "workpiece_side": self.table.arrangement.workpiece_side,
                 "levers_from": self.table.origin,
             }
         return {**result_data, "corrections": self.rows(), "warnings": self.remarks}

@@ -46,13 +46,13 @@ class ReadReport(Result):
         return {
             "experiment": self.label,
             "coordinates": self.imported.coordinates,
-            "told": list(self.told),
-            "remarks": list(self.remarks),
+            "told": self.told,
+            "remarks": self.remarks,
             "readings": [
                 {
                     **picked(reading, "position", "ball"),
                     "probe": reading.probe or None,
-                    "centre": list(reading.centre[: self.imported.dimension]),
+                    "centre": reading.centre[: self.imported.dimension],
                     "uncertainty": reading.uncertainty,
                 }
                 for reading in self.imported.readings

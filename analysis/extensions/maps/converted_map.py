@@ -134,8 +134,8 @@ class ConvertedMap(Result):
             shift, turn = (np.abs(part).max() for part in np.split(self.conversion.motion, [d]))
             lines.append(
                 "between the frames of the two models lies a rigid motion, which changes no length:"
-                f" a shift of {number(1e6 * float(shift), 3)} µm and a turn of"
-                f" {number(1e6 * float(turn), 3)} µrad about one axis at most"
+                f" a shift of {number(1e6 * shift, 3)} µm and a turn of"
+                f" {number(1e6 * turn, 3)} µrad about one axis at most"
             )
         return [*lines, "", *table_lines(COLUMNS, self._parameters)]
 

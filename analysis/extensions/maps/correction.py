@@ -285,7 +285,7 @@ class Correction(Result):
                 }
                 for length in self.lengths
             ],
-            "warnings": list(self.warnings),
+            "warnings": self.warnings,
         }
 
     def columns(self) -> MainTable:

@@ -210,7 +210,7 @@ def _curve_table(curves: Sequence[FunctionCurve], k: float) -> list[str]:
                 np.nanmax(curve.values),
                 k * np.nanmax(curve.uncertainties),
             )
-            values = [number(1e6 * float(value), 4) for value in ranges]
+            values = [number(1e6 * value, 4) for value in ranges]
             if np.isnan(curve.uncertainties).any():
                 values[2] += " in part"
         rows.append([curve.name, curve.meaning, along, *ends, *values, SHOWN[curve.unit]])

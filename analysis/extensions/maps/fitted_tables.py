@@ -88,7 +88,7 @@ def _largest(errors: VolumetricErrors, factor: float) -> list[str]:
     worst = int(determined[comparable(errors.resultant[determined]).argmax()])
     least = float(np.nanmax(errors.uncertainties))
     text = (
-        f"largest resultant {number(1e6 * float(errors.resultant[worst]))} µm at"
+        f"largest resultant {number(1e6 * errors.resultant[worst])} µm at"
         f" {point_text(errors.points[worst])} mm; largest U of a co-ordinate"
         f" {number(1e6 * factor * least, 3)} µm"
     )

@@ -178,10 +178,7 @@ def _class_targets(lengths: LengthMap) -> list[str] | None:
     if not lengths.settings.target.slope:
         return None
     ends = 1e6 * lengths.settings.target.at(lengths.edges)
-    return [
-        f"{number(float(a), 3)} to {number(float(b), 3)}"
-        for a, b in zip(ends, ends[1:], strict=False)
-    ]
+    return [f"{number(a, 3)} to {number(b, 3)}" for a, b in zip(ends, ends[1:], strict=False)]
 
 
 # Of the points, this many with the largest ratios, and as many with the smallest.

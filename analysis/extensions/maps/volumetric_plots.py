@@ -109,8 +109,7 @@ def draw_grid(
         )
         axes.legend(loc="upper left", borderaxespad=0.8)
         legend = [
-            f"{k + 1}: {number(1e6 * float(error), 3)} µm"
-            for k, error in enumerate(lengths.errors[:4])
+            f"{k + 1}: {number(1e6 * error, 3)} µm" for k, error in enumerate(lengths.errors[:4])
         ]
         words = f"length errors of the diagonals from the corners {', '.join(legend)}"
         figure.text(0.5, 0.025, words, ha="center", fontsize=8.5)
@@ -192,7 +191,7 @@ def draw_line(
         _finish(axes, f"{name}, mm", f"{quantity}, µm")
         worst = int(comparable(np.nan_to_num(errors.resultant)).argmax())
         subtitle = (
-            f"largest resultant {number(1e6 * float(errors.resultant[worst]))} µm at"
+            f"largest resultant {number(1e6 * errors.resultant[worst])} µm at"
             f" {positions[worst]:.6g} mm"
         )
         return save(figure, path, f"Volumetric errors {along}: {subtitle}")

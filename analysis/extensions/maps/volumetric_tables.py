@@ -59,7 +59,7 @@ def machine_lines(built: Volumetric) -> list[str]:
     rows = [["", "symbol", "error", "range", "random", "unit", "stated as"]]
     for function in along_axes(machine):
         name = function.error.name
-        random = "" if function.deviation is None else number(1e6 * float(function.deviation.max()))
+        random = "" if function.deviation is None else number(1e6 * function.deviation.max())
         range_text = "" if function.values is None else number(1e6 * function.range)
         rows.append(
             [
@@ -176,10 +176,10 @@ def diagonal_lines(errors: LengthErrors) -> list[str]:
 def length_line(errors: LengthErrors) -> str:
     """The length error of a single line."""
     u = errors.uncertainties
-    random = f", random {number(1e6 * float(u[0]))} µm" if u.any() else ""
+    random = f", random {number(1e6 * u[0])} µm" if u.any() else ""
     return (
         f"length {1e3 * errors.nominal[0]:.3f} mm, length error"
-        f" {number(1e6 * float(errors.errors[0]))} µm{random}"
+        f" {number(1e6 * errors.errors[0])} µm{random}"
     )
 
 
@@ -204,14 +204,13 @@ def extreme_lines(errors: VolumetricErrors) -> list[str]:
         for axis, v in zip(AXES, errors.points[worst].tolist(), strict=True)
     )
     bands = ", ".join(
-        f"{axis.upper()} {number(1e6 * float(np.ptp(errors.errors[:, k])))}"
-        for k, axis in enumerate(AXES)
+        f"{axis.upper()} {number(1e6 * np.ptp(errors.errors[:, k]))}" for k, axis in enumerate(AXES)
     )
     resultant = errors.resultant
     return [
         (
-            f"range in µm: {bands}, resultant {number(1e6 * float(np.ptp(resultant)))}; "
-            f"largest resultant {number(1e6 * float(resultant[worst]))} µm at {location}"
+            f"range in µm: {bands}, resultant {number(1e6 * np.ptp(resultant))}; "
+            f"largest resultant {number(1e6 * resultant[worst])} µm at {location}"
         ),
     ]
 

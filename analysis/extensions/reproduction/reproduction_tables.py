@@ -534,7 +534,7 @@ def _section_data(section: Section) -> Data:
     return {
         "section": section.name,
         **picked(section, "title", "agrees"),
-        "rests_on": list(section.rests_on),
+        "rests_on": section.rests_on,
         "ranks": [
             picked(rank, "design", "published", "ours", "gap", "agrees") for rank in section.ranks
         ],
@@ -610,7 +610,7 @@ def _figure_data(column: ComparedColumn, figure: ComparedFigure) -> Data:
         **picked(figure, "quantity", "unit", "published", "ours", "ratio", "within", "agrees"),
         "ratio_after_factor": figure.adjusted,
         "exception": figure.exception.key if figure.exception else None,
-        "rests_on": list(figure.rests_on),
+        "rests_on": figure.rests_on,
     }
 
 

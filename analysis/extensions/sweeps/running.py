@@ -108,7 +108,7 @@ class SweepResult(Result):
             "title": self.title,
             "store": str(self.store),
             **counts,
-            "shortcomings": list(self.shortcomings),
+            "shortcomings": self.shortcomings,
             "rows": self.rows(),
         }
 

@@ -75,7 +75,7 @@ def compared(results: ReportedSweep, reference: ReportedSweep, name: str) -> Sto
     for words, changed in (("smaller", ratio < 1 - SAME), ("larger", ratio > 1 + SAME)):
         if changed.any():
             ends = ratio[changed].min(), ratio[changed].max()
-            factor = " to ".join(dict.fromkeys(number(float(sweep), 3) for sweep in ends))
+            factor = " to ".join(dict.fromkeys(number(sweep, 3) for sweep in ends))
             sentences.append(
                 f"The average of {quantity} is {words} than in {name} in"
                 f" {number_of(int(changed.sum()), 'case')}, by a factor of {factor}."
@@ -177,8 +177,8 @@ def _table(
         value = results.value(column, row)
         entries = (
             Entry(number(1e6 * value, 4), value, results.cell(row), column),
-            Entry(number(1e6 * float(before[k]), 4)),
-            Entry(number(float(ratio[k]), 4)),
+            Entry(number(1e6 * before[k], 4)),
+            Entry(number(ratio[k], 4)),
         )
         table_rows.append(Row(results.labels(row), entries))
     headings = tuple(axis.name for axis in results.axes)
