@@ -10,12 +10,11 @@ from typing import Any
 import numpy as np
 from ballplate.simulator.geometry import AXIS_INDEX, IN_PLANE_AXES, rotation_matrix
 from ballplate.simulator.inputs import format_length, typed_length
-from numpy.typing import NDArray
+from ballplate.simulator.machines import Array
 
 from .machine_tables import table
 from .sheet_values import Plate
 
-Array = NDArray[np.float64]
 Settings = dict[str, Any]
 
 # Length of a stylus, at most a tenth of the shortest edge of the volume.
