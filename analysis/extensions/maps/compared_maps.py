@@ -163,12 +163,9 @@ class ComparedMap:
         )
 
     @cached_property
+    @single_threaded
     def held(self) -> tuple[str, ...]:
         """Motions of the frame and turns of the probe that no parameter can make."""
-        return self._held_motions()
-
-    @single_threaded
-    def _held_motions(self) -> tuple[str, ...]:
         d, volume = self.dimension, self.volume
         generator = np.random.default_rng(np.random.SeedSequence(0))
         count = POINTS + len(self.values)

@@ -38,7 +38,6 @@ from .volumetric_tables import (
     along_csv,
     along_data,
     along_lines,
-    diagonal_data,
     diagonal_lines,
     error_csv,
     error_data,
@@ -134,7 +133,9 @@ class ErrorsAtPoints(MachineErrors):
     def data(self) -> Data:
         return {
             **machine_data(self.machine),
-            "diagonals": diagonal_data(self.lengths),
+            "diagonals": [
+                {"diagonal": k, **row} for k, row in enumerate(length_data(self.lengths), 1)
+            ],
             self.places.kind: error_data(self.errors),
             **self.more_data(),
         }

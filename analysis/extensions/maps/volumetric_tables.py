@@ -77,7 +77,16 @@ def machine_lines(built: Volumetric) -> list[str]:
         if len(rows) > 1
         else ["no errors of axes"]
     )
-    other_rows = _single_numbers(built)
+    other_rows = [
+        [
+            parameter.name,
+            symbol(parameter.name) if parameter.name in SQUARENESS else "",
+            _meaning_text(parameter),
+            number(1e6 * value),
+            "ppm" if parameter.unit == "1" else SHOWN[parameter.unit],
+        ]
+        for parameter, value in _numbers(built)
+    ]
     lines += ["", *aligned(other_rows, [False, False, False, True, False])] if other_rows else []
     return [*lines, *(["", RANDOM] if built.is_random else [])]
 
@@ -132,20 +141,6 @@ def why_not_along(name: str, built: Volumetric, file: str) -> str:
             f" {listing(sorted(stated_names))})"
         )
     return f'{file} states no error "{name}"; {hint(name, stated_names)}'
-
-
-def _single_numbers(built: Volumetric) -> list[list[str]]:
-    """Squareness, expansion and droop at the reference point."""
-    return [
-        [
-            parameter.name,
-            symbol(parameter.name) if parameter.name in SQUARENESS else "",
-            _meaning_text(parameter),
-            number(1e6 * value),
-            "ppm" if parameter.unit == "1" else SHOWN[parameter.unit],
-        ]
-        for parameter, value in _numbers(built)
-    ]
 
 
 def _meaning_text(parameter: Parameter) -> str:
@@ -343,11 +338,6 @@ def machine_data(built: Volumetric) -> Data:
             for parameter, value in _numbers(built)
         },
     }
-
-
-def diagonal_data(errors: LengthErrors) -> list[Data]:
-    """Length errors of the body diagonals, in metres."""
-    return [{"diagonal": k + 1, **row} for k, row in enumerate(length_data(errors))]
 
 
 def length_data(errors: LengthErrors) -> list[Data]:
