@@ -93,8 +93,8 @@ class ReadingsSettings(Settings):
     coordinates: Coordinate | None = Field(
         None,
         description=(
-            "scale readings (default), ball centres, from which the measuring program has"
-            " subtracted the probe's offset, or part: ball centres in a part's co-ordinate"
+            "scale readings (default), ball centres, to which the measuring program has"
+            " added the probe's offset, or part: ball centres in a part's co-ordinate"
             " system, another in each position"
         ),
     )
