@@ -11,7 +11,7 @@ from .common import argument_type
 if TYPE_CHECKING:
     from ballplate.simulator.experiment.model import Experiment
 
-KEYS = ("columns", "unit", "decimal", "coordinates", "names", "swap_names")
+KEYS = ("columns", "unit", "decimal", "coordinates", "names", "fill_down", "sheet", "swap_names")
 
 
 def add_tables(parser: ArgumentParser) -> None:
@@ -48,6 +48,15 @@ def add_tables(parser: ArgumentParser) -> None:
             'how reports name features, such as "{position}_{ball}_{probe}"; points on a ball are'
             " numbered by {point} at the end; default: found out, and told"
         ),
+    )
+    parser.add_argument(
+        "--fill-down",
+        action="store_const",
+        const=True,
+        help="take the name above for a blank one, as below merged cells; default: refuse these",
+    )
+    parser.add_argument(
+        "--sheet", metavar="NAME", help="sheet of a workbook, or all; default: the only table"
     )
     parser.add_argument(
         "--swap-names",

@@ -45,6 +45,8 @@ class ColumnsSettings(Settings):
     x: Columns | None = Field(None, description=_COORDINATE)
     y: Columns | None = Field(None, description=_COORDINATE)
     z: Columns | None = Field(None, description=_COORDINATE)
+    axis: Name | None = Field(None, description="axes x, y and z of a table with one row per axis")
+    value: Name | None = Field(None, description="co-ordinates of a table with one row per axis")
     u: Name | None = Field(
         None, description="standard uncertainties of each co-ordinate; or =0.2 um, of all rows"
     )
@@ -82,6 +84,17 @@ class ReadingsSettings(Settings):
     )
     header: Annotated[int, Field(ge=0, strict=True)] | None = Field(
         None, description="number of the line with the names of columns, 0 without one"
+    )
+    fill_down: bool | None = Field(
+        None,
+        description=(
+            "true: blank names of position, ball and probe are those above, as below merged cells;"
+            " default: asked for"
+        ),
+    )
+    sheet: Text | None = Field(
+        None,
+        description="sheet of a workbook, or all: as several tables; default: the only table",
     )
     swap_names: bool | None = Field(
         None,

@@ -23,13 +23,14 @@ from ..inputs.yamltree import GivenText, read_bytes
 from ..machines.protocol import Array
 
 Source = Path | GivenText
-
+# Endings of workbooks, which an extension reads.
+WORKBOOKS = (".xlsx", ".xlsm")
 ROLES = ("position", "ball", "probe")
 
 
 @dataclass(frozen=True)
 class SourceText:
-    """A table of readings as text: its file or name, its content, and its encoding."""
+    """A table of readings as text: its file or name, its content, and its encoding or sheet."""
 
     source: Source
     text: GivenText
@@ -66,6 +67,20 @@ def source_text(source: Source, encoding: str | None = None) -> SourceText:
     return SourceText(source, GivenText(str(source), text.rstrip(END_OF_FILE)), encoding_used)
 
 
+def source_texts(source: Source, settings: ReadingsSettings) -> list[SourceText]:
+    """Return the tables of a file of readings: one, or those of a workbook's sheets.
+
+    :raises ExperimentError: it cannot be read, or is no text nor workbook.
+    """
+    reader = optional_service("OtherTables")
+    if reader and isinstance(source, Path) and source.suffix.lower() in WORKBOOKS:
+        tables: list[SourceText] = reader.of_workbook(source, settings.sheet)
+        return tables
+    if settings.sheet is not None:
+        raise refused(source, "is no workbook and has no sheets; leave readings.sheet out")
+    return [source_text(source, settings.encoding)]
+
+
 def source_rows(
     sources: Sequence[Source],
     design: Design,
@@ -83,7 +98,7 @@ def source_rows(
     :raises ExperimentError: an unreadable table, or ambiguous names.
     """
     _refuse_named_twice(sources)
-    tables = [source_text(source, settings.encoding) for source in sources]
+    tables = [table for source in sources for table in source_texts(source, settings)]
     names = {
         "position": design.positions.names,
         "ball": design.balls.names,
@@ -123,7 +138,9 @@ def named_rows(
 
     :raises ExperimentError: it cannot be read.
     """
-    table, axes = source_text(source, settings.encoding), AXIS_NAMES[:dimension]
+    (table, *others), axes = source_texts(source, settings), AXIS_NAMES[:dimension]
+    if others:
+        raise refused(source, "has several tables; name one sheet: readings: {sheet: …}")
     errors: list[Message] = []
     if _has_plain_columns(table, settings, axes, {}):
         rows = plain_rows(table, names, axes, errors, {}, empty)
@@ -154,7 +171,7 @@ def is_plain(table: SourceText, settings: ReadingsSettings, axes: Sequence[str])
     """Return whether a table may be a plain CSV file; stated columns or formats exclude it."""
     layout = (settings.columns, settings.separator, settings.decimal, settings.header)
     has_axes = table.encoding in ("", "UTF-8") and header_names(table.text) & set(axes)
-    return bool(has_axes) and all(choice is None for choice in layout)
+    return bool(has_axes) and layout == (None,) * 4 and not settings.fill_down
 
 
 def _has_plain_columns(

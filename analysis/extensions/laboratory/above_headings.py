@@ -7,13 +7,15 @@ from collections.abc import Iterable
 
 from ballplate.simulator.inputs import shorten
 
+from .heading_words import WORDS
 from .headings import HeadingError
 
 # Lines above the headings that say what all rows have.
 ABOVE = {
-    "position": r"position|pos|placement|set-?up|lage|aufstellung|stellung|messlage|aufspannung",
-    "probe": r"probe|stylus|tip|taster|taststift",
-    "unit": r"units?|einheit(?:en)?|(?:(?:all )?values|lengths?|(?:alle )?(?:werte|angaben)) in\b",
+    **{role: "|".join(WORDS[role]).replace(" ", "[ -]?") for role in ("position", "probe")},
+    "unit": "|".join(
+        (*WORDS["unit"], r"(?:(?:all )?values|lengths?|(?:alle )?(?:werte|angaben)) in\b")
+    ),
 }
 # Characters of such a line.
 LONGEST_LINE = 300

@@ -26,7 +26,6 @@ from ballplate.simulator.inputs import (
     metres_or_radians,
     parse_positive_length,
     plain_number,
-    plain_unit,
     power_of_ten,
     refuse_controls,
     refused,
@@ -37,17 +36,18 @@ from ballplate.simulator.machines import Array
 
 from .above_headings import said_above
 from .clock_times import ClockError, ReadTime, clock_time
-from .heading_words import folded, unit_of
-from .headings import TEXTS, Group, HeadedColumn, HeadingError, Vocabulary, missing_columns
+from .column_units import units_of_columns
+from .doubtful_commas import commas_of_both_kinds, doubtful_decimals
+from .heading_words import NOTHING, folded, quoted
+from .headings import TEXTS, Group, HeadedColumn, HeadingError, Vocabulary
+from .merged_cells import question
+from .missing_columns import missing_columns
 from .table_forms import (
     DECIMALS,
-    NOTHING,
     SEPARATORS,
     Form,
     NoFormError,
     chosen_form,
-    commas_of_both_kinds,
-    doubtful_decimals,
     forms_of,
 )
 
@@ -113,9 +113,13 @@ def read_any_table(
                 " numbers; write which under readings: decimal, or export with semicolons",
             )
     except NoFormError as error:
-        text = error.text or missing_columns(error.cells, words.axes)
+        text = error.text or missing_columns(error.cells, words, words.axes)
         raise refused(source, text, line=error.line) from None
     return _Reader(source, encoding, words, settings, form).read(is_possible)
+
+
+class AskedError(ExperimentError):
+    """A question about a table, whose answer may make it readable."""
 
 
 @dataclass(frozen=True)
@@ -133,13 +137,8 @@ class _Reader:
 
     def read(self, is_possible: Callable[[Array], bool]) -> TableRows:
         form = self.form
-        self._refuse_wrong()
-        try:
-            above = said_above(self.form.above)
-        except HeadingError as error:
-            raise self.error(str(error)) from None
+        above, units = self._asked()
         texts, texts_above = self._texts(above)
-        units = self._units(above)
         rows_found = [
             row for group in form.headings.groups for row in self._rows(group, texts, units)
         ]
@@ -149,24 +148,49 @@ class _Reader:
         self._refuse_doubtful(rows, is_possible)
         hints = self._of_positions(texts.get("position", ""))
         notes = (self._told(units, texts_above),)
-        return TableRows(tuple(rows), notes, diameters, hints, times=self._times())
+        times = tuple(
+            (Mark(str(self.source), line, 1), cells[column.place], clock_time(cells[column.place]))
+            for name, column in form.headings.roles.items()
+            if name in self.words.further and column.unit is None
+            for line, cells in form.rows
+            if cells[column.place].casefold() not in NOTHING
+        )
+        return TableRows(tuple(rows), notes, diameters, hints, times=times)
 
-    def _refuse_wrong(self) -> None:
+    def _asked(self) -> tuple[dict[str, str], dict[int, str]]:
+        """Return texts above the headings, and units by index of the columns of lengths.
+
+        :raises ExperimentError: wrong rows, or columns, names or units that are missing, all at
+            once.
+        """
         form, headings = self.form, self.form.headings
-        messages = [Message(str(self.source), line, 1, "", text) for line, text in form.wrong]
-        if len(messages) > MOST_MESSAGES:
-            messages = [*messages[:MOST_MESSAGES], replace(messages[-1], text=MORE_ERRORS)]
-        if not messages and not form.rows and form.empty:
-            text = f"{listing(self.words.axes)} are empty in all rows; enter values,"
-            text += " and remove rows without any"
-            raise self.error(text, form.empty[0])
-        if not messages and not form.rows:
-            raise self.error("no rows below the names of the columns; add at least one")
+        asked = [Message(str(self.source), line, 1, "", text) for line, text in form.wrong]
+        if len(asked) > MOST_MESSAGES:
+            asked = [*asked[:MOST_MESSAGES], replace(asked[-1], text=MORE_ERRORS)]
+        if not (asked or form.rows or form.blank):
+            text = "no rows below the names of the columns; add at least one"
+            if form.empty:
+                text = f"{listing(self.words.axes)} are empty in all rows; enter values,"
+                text += " and remove rows without any"
+            raise self.error(text, *form.empty[:1])
+        if form.blank:
+            # Faults of rows below may be of the blank cells.
+            lines = sorted({line for line, _ in form.blank})
+            names = dict.fromkeys(headings.name(place) for _, place in form.blank)
+            text = question(names, lines, bool(self.settings.fill_down))
+            asked = [*self.error(text, lines[0]).messages]
         if "ball" not in headings.roles:
-            text = missing_columns(headings.cells, ["ball"])
-            messages.insert(0, Message(str(self.source), max(form.header, 1), 1, "", text))
-        if messages:
-            raise ExperimentError(messages)
+            asked[:0] = self.error(missing_columns(headings.cells, self.words)).messages
+        try:
+            above = said_above(form.above)
+            units = units_of_columns(form, self.settings, above)
+        except HeadingError as error:
+            # The unit may be in a column that is read wrongly.
+            if form.blank or not form.wrong:
+                asked[:0] = self.error(str(error)).messages
+        if asked:
+            raise (AskedError if form.blank else ExperimentError)(asked)
+        return above, units
 
     def _texts(self, above: Mapping[str, str]) -> tuple[dict[str, str], list[str]]:
         """Return texts that apply to all rows without a column for them, and their sources.
@@ -191,7 +215,7 @@ class _Reader:
             elif role == "position":
                 name = Path(self.source.name).stem
                 if name == self.source.name:
-                    raise self.error(missing_columns(self.form.headings.cells, [role]))
+                    raise self.error(missing_columns(self.form.headings.cells, self.words))
                 texts[role] = name
                 notes.append(f'position "{shorten(name)}" by the name of the file')
         return texts, notes
@@ -216,57 +240,13 @@ class _Reader:
                 )
         if not headings.unused:
             return ()
-        names = listing(f'"{shorten(cell)}"' for cell in headings.unused)
+        names = quoted(headings.unused)
         text = (
             f'position "{shorten(position)}" is the name of the file; not used: {names}; if'
             " one of these holds the position, give --columns"
             f" position={shorten(headings.unused[0])}"
         )
         return (Message(str(self.source), max(self.form.header, 1), 1, "", text),)
-
-    def _units(self, above: Mapping[str, str]) -> dict[int, str]:
-        """Return units by index of the columns of lengths.
-
-        :raises ExperimentError: a column without a unit, or with two.
-        """
-        unit_stated = None if self.settings.unit is None else plain_unit(self.settings.unit)
-        once = unit_of(above.get("unit", "").rstrip("."))
-        if unit_stated and once and unit_stated != once:
-            raise self.error(
-                f"the table says that lengths are in {once}, the experiment file {unit_stated};"
-                " correct"
-                " readings.unit"
-            )
-        units: dict[int, str] = {}
-        without: list[int] = []
-        roles = self.form.headings.roles
-        axes = [axis for group in self.form.headings.groups for axis in group.axes]
-        other_columns = [roles[role] for role in ("u", "diameter") if role in roles]
-        lengths = [*axes, *(column for column in other_columns if column.constant is None)]
-        for column in lengths:
-            unit = column.unit or self.form.units.get(column.place) or unit_stated or once
-            if unit is None and column is roles.get("diameter") and units:
-                # Of what stands beside co-ordinates in one unit, as an uncertainty may not.
-                unit = next(iter(units.values())) if len(set(units.values())) == 1 else None
-            if unit is None and column is roles.get("u") and not without:
-                cells = self.form.headings.cells
-                named = f'"{shorten(cells[column.place])}"' if cells else str(column.place + 1)
-                raise self.error(
-                    f"the column {named} of uncertainties has no unit, which may be another than"
-                    " that of co-ordinates; write it in the heading, as in u_um"
-                )
-            if unit is None:
-                without.append(column.place)
-            else:
-                units[column.place] = unit
-        if without:
-            cells = self.form.headings.cells
-            names = listing(f'"{cells[i]}"' if cells else str(i + 1) for i in without)
-            raise self.error(
-                f"no unit is stated for the columns {names}; write it under readings: {{unit: mm}}"
-                " in the experiment file, or give --unit mm"
-            )
-        return units
 
     def _rows(
         self, group: Group, texts: Mapping[str, str], units: Mapping[int, str]
@@ -280,9 +260,10 @@ class _Reader:
         for name, names_known in self.words.further.items():
             if name in roles and (unit := roles[name].unit) is not None:
                 factors[roles[name].place] = names_known[unit], power_of_ten(names_known[unit])
-        places = {role: roles[role].place for role in TEXTS if role in roles}
-        rows = []
-        messages = []
+        constants = {**texts, **group.texts}
+        places = {role: c.place for role, c in roles.items() if c.constant is None}
+        rows: list[tuple[FileRow, float]] = []
+        messages: list[Message] = []
 
         def number(cells: Sequence[str], i: int, mark: Mark) -> float:
             factor, power = factors.get(i, (None, ""))
@@ -310,14 +291,10 @@ class _Reader:
             if all(cells[i].casefold() in NOTHING for i in axes):
                 continue
             mark = Mark(file, line, 1)
-            names = []
-            for role in TEXTS:
-                text = group.texts.get(role) or texts.get(role) or ""
-                if role in places and places[role] >= 0:
-                    text = text_of_cell(cells[places[role]])
-                    if not text:
-                        messages.append(mark.message("", f"no {role}; write its name"))
-                names.append(text)
+            names = tuple(
+                text_of_cell(cells[places[role]]) if role in places else constants.get(role, "")
+                for role in TEXTS
+            )
             x = [number(cells, i, mark) for i in axes]
             x.append(of_all if u is None else number(cells, u, mark))
             if "k" in roles and not math.isnan(x[-1]):
@@ -327,25 +304,10 @@ class _Reader:
                 for column in further
             ]
             size = math.nan if diameter is None else number(cells, diameter, mark)
-            rows.append((FileRow(mark, tuple(names), tuple(x)), size))
+            rows.append((FileRow(mark, names, tuple(x)), size))
         if messages:
             raise ExperimentError(messages)
         return rows
-
-    def _times(self) -> tuple[ReadTime, ...]:
-        """Clock times of rows, which have been read."""
-        clocks = [
-            column.place
-            for name, column in self.form.headings.roles.items()
-            if name in self.words.further and column.unit is None
-        ]
-        file = str(self.source)
-        return tuple(
-            (Mark(file, line, 1), cells[i], clock_time(cells[i]))
-            for line, cells in self.form.rows
-            for i in clocks
-            if cells[i].casefold() not in NOTHING
-        )
 
     def _refuse_doubtful(
         self, rows: Sequence[FileRow], is_possible: Callable[[Array], bool]
@@ -355,18 +317,21 @@ class _Reader:
         :raises ExperimentError: they could.
         """
         # Where commas separate columns, a point is no sign of thousands.
-        if self.settings.decimal is not None or self.form.separator == "comma":
+        form = self.form
+        is_clear = form.separator == "comma" and form.decimal == "point"
+        if self.settings.decimal is not None or is_clear:
             return
-        cell = doubtful_decimals(self.form)
+        cell = doubtful_decimals(form)
         x = np.array([row.lengths[: len(self.words.axes)] for row in rows])
         if cell and is_possible(1e3 * x):
-            digits_only = cell.replace(".", "").replace(",", "")
-            raise self.error(
-                f'"{cell}" could be {cell.replace(",", ".")} or {digits_only}, as could all'
-                " numbers here;"
-                f" write under readings: {{decimal: {self.form.decimal}}} if it is"
-                f" {cell.replace(',', '.')}, otherwise export without signs between thousands"
+            plain, digits_only = cell.replace(",", "."), cell.replace(".", "").replace(",", "")
+            other = "point" if form.decimal == "comma" else "comma"
+            text = (
+                f'"{cell}" could be {plain} or {digits_only}, as could all numbers here; give'
+                f" --decimal {form.decimal} if it is {plain}, --decimal {other} if it is"
+                f" {digits_only}, or readings: {{decimal: {form.decimal}}}"
             )
+            raise AskedError(self.error(text).messages)
 
     def _told(self, units: Mapping[int, str], notes_above: Sequence[str]) -> str:
         """Return a sentence on how the table was read."""
@@ -375,11 +340,16 @@ class _Reader:
         parts += [self.encoding] if self.encoding else []
         parts.append(f"header in line {form.header}" if form.header else "without header")
         parts.append(" and ".join(dict.fromkeys(units.values())))
-        named = {role: c for role, c in headings.roles.items() if c.place >= 0 and headings.cells}
+        parts += ["one row per axis"] if headings.by_axis else []
+        parts += [f"{form.between} between thousands"] if form.between else []
+        parts += [f"{form.filled} blank cells as above"] if form.filled else []
         parts += [
             f'{role} from "{shorten(headings.cells[column.place])}"'
-            for role, column in named.items()
-            if headings.cells[column.place].strip().casefold() != role or role == "k"
+            for role, column in headings.roles.items()
+            if column.place >= 0
+            and headings.cells
+            and (headings.cells[column.place].strip().casefold() != role or role == "k")
+            and (role != "unit" or form.units_of_rows)
         ]
         if "k" in headings.roles:
             parts.append("u is the expanded uncertainty divided by its coverage factor k")
@@ -390,8 +360,8 @@ class _Reader:
             parts.append(f"co-ordinates of {groups_text} side by side")
         parts += notes_above
         if headings.unused:
-            names = listing(f'"{shorten(cell)}"' for cell in headings.unused)
-            warm = any("temperature" in cell.casefold() for cell in headings.unused)
+            names = quoted(headings.unused)
+            warm = any("temp" in cell.casefold() for cell in headings.unused)
             parts.append(f"not used: {names}{f' ({TEMPERATURES})' if warm else ''}")
         if form.empty:
             parts.append(f"without co-ordinates, left out: line{_numbers(form.empty)}")

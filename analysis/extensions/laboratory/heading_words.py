@@ -4,70 +4,96 @@ from __future__ import annotations
 
 import re
 import unicodedata
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from fractions import Fraction
 from functools import lru_cache
 
-from ballplate.simulator.inputs import DURATION_UNITS, plain_unit
+from ballplate.simulator.inputs import DURATION_UNITS, listing, plain_unit, shorten
 
 # Characters of what may be a heading.
 LONGEST = 100
 
-# How headings write units that `LENGTH_UNITS` has under another name.
-UNITS: Mapping[str, str] = {
-    **{unit: unit for unit in ("m", "dm", "cm", "mm", "um", "nm", "in")},
-    **dict.fromkeys(("inch", "inches", "zoll", '"', "″"), "in"),
-    **dict.fromkeys(("micron", "microns", "micrometre", "micrometer", "mikrometer"), "um"),
-    **dict.fromkeys(("millimetre", "millimeter", "millimetres", "millimeters"), "mm"),
-    **dict.fromkeys(("metre", "meter", "metres", "meters"), "m"),
-}
+
+def _words(table: str) -> dict[str, tuple[str, ...]]:
+    """Return words by the role that begins each line of a table."""
+    words: dict[str, tuple[str, ...]] = {}
+    for line in table.strip().splitlines():
+        role, _, listed = line.strip().partition(": ")
+        words[role] = (*words.get(role, ()), *listed.split(", "))
+    return words
+
+
+# How headings write units, by their names in `LENGTH_UNITS`.
+_UNITS = _words("""
+    in: in, inch, inches, zoll, ", ″
+    um: um, micron, microns, micrometre, micrometer, mikrometer
+    mm: mm, millimetre, millimeter, millimetres, millimeters
+    m: m, metre, meter, metres, meters
+    dm: dm
+    cm: cm
+    nm: nm
+""")
+UNITS: Mapping[str, str] = {name: unit for unit, names in _UNITS.items() for name in names}
 _UNIT = "|".join(re.escape(unit) for unit in sorted(UNITS, key=len, reverse=True))
 _HEADING = re.compile(
     rf"(?P<name>.*?)(?:[\s_,;:]+|\s*(?=[\[(/]))(?:in\s+)?[\[(/]?\s*(?P<unit>{_UNIT})\.?\s*[\])]?"
 )
 
-# Words beside an axis that say no more than that it is what was measured.
-MEASURED = frozenset(
-    (
-        *("coordinate", "coordinates", "co", "ordinate", "koordinate", "coord", "value", "wert"),
-        *("actual", "act", "ist", "istwert", "measured", "meas", "gemessen", "messwert"),
-        *("centre", "center", "centro", "mitte", "mittelpunkt"),
-    )
-)
-WORDS: Mapping[str, tuple[str, ...]] = {
-    "position": (
-        *("position", "pos", "placement", "setup", "set up", "lage", "aufstellung"),
-        *("stellung", "messlage", "aufspannung", "plattenlage"),
-    ),
-    "ball": ("ball", "sphere", "kugel", "ball name", "sphere name", "kugelname", "bille", "esfera"),
-    "probe": ("probe", "stylus", "tip", "taster", "taststift", "probe name", "palpeur", "palpador"),
-    "diameter": ("diameter", "diam", "dia", "durchmesser", "sphere diameter", "ball diameter"),
-}
-# Only where no column has one of the words above.
-LESS_CLEAR: Mapping[str, tuple[str, ...]] = {
-    "position": (
-        "position no",
-        "position number",
-        "lage nr",
-        "pos nr",
-        "pos no",
-        "stellung nr",
-        "messlage nr",
-        "aufspannung nr",
-    ),
-    "ball": (
-        *("ball no", "ball number", "ball id", "sphere no", "kugel nr", "kugelnummer", "feature"),
-        *("element", "merkmal", "name", "label", "id", "no", "nr", "number", "nummer", "punkt"),
-    ),
-    "probe": ("stylus name", "tip name", "sensor", "probe no", "stylus no", "taster nr", "tip no"),
-    "diameter": ("d", "ø", "actual diameter", "diameter actual", "durchmesser ist"),
-}
+# Texts of cells that hold nothing.
+NOTHING = frozenset(("", "-", "--", "---", "n/a", "na", "nan", "none", "null"))
 
-# Other headings of times, which have no unit where they are those of a clock.
-OF_CLOCKS: Mapping[str, tuple[str, ...]] = {
-    "time": ("date time", "datetime", "timestamp", "time stamp", "zeit", "uhrzeit", "zeitstempel")
-}
+# In English, German, Swedish, French, Italian and Spanish.
+WORDS = _words("""
+    position: position, pos, placement, setup, set up, lage, aufstellung, stellung, messlage
+    position: aufspannung, plattenlage, läge, uppställning, uppspänning, pose, emplacement
+    position: posizione, piazzamento, posición, posicion
+    ball: ball, sphere, ball name, sphere name, kugel, kugelname, kula, bille, sphère, sfera
+    ball: esfera, bola
+    probe: probe, stylus, tip, probe name, taster, taststift, mätspets, tastspets, palpeur
+    probe: stylet, tastatore, stilo, palpador
+    diameter: diameter, diam, dia, durchmesser, sphere diameter, ball diameter, diamètre, diametro
+    diameter: diámetro
+    unit: unit, units, einheit, einheiten, enhet, unité, unités, unite, unità, unita, unidad
+""")
+# Only where no column has one of the words above.
+LESS_CLEAR = _words("""
+    position: position no, position number, position nr, lage nr, pos nr, pos no, stellung nr
+    position: messlage nr, aufspannung nr, läge nr
+    ball: ball no, ball number, ball id, sphere no, kugel nr, kugelnummer, kula nr, feature
+    ball: element, merkmal, name, label, id, no, nr, number, nummer, punkt, élément, elemento
+    ball: namn, nom, nome, nombre, numéro, numero
+    probe: stylus name, tip name, sensor, probe no, stylus no, taster nr, tip no, spets, punta
+    diameter: d, ø, actual diameter, diameter actual, durchmesser ist
+""")
+# Words that say no more than that a number is a measured one, of an axis, or of a point.
+_OF_AXES = _words("""
+    value: value, actual, act, measured, meas, wert, ist, istwert, gemessen, messwert, valeur
+    value: mesuré, mesurée, valore, misurato, misurata, valor, medido, medida, värde, mätvärde
+    value: uppmätt, mätt
+    axis: axis, achse, axe, asse, eje, axel, coordinate, koordinate, koordinat, coordonnée
+    axis: coordinata, coordenada
+    point: coordinates, co, ordinate, coord, coordonnées, centre, center, centro, centrum, mitte
+    point: mittelpunkt
+""")
+VALUES, AXIS_WORDS = _OF_AXES["value"], _OF_AXES["axis"]
+MEASURED = {word for words in _OF_AXES.values() for word in words}
+
+# Other headings of further columns. Those of times have no unit where they are of a clock.
+OTHER_HEADINGS = _words("""
+    time: date time, datetime, timestamp, time stamp, zeit, uhrzeit, zeitstempel, tid, klockslag
+    time: tidpunkt, heure, horodatage, temps, ora, tempo, hora, tiempo, date heure, data ora
+    time: fecha hora
+    temperature_artefact: plattentemperatur, temperatur platte, temperatur platta
+    temperature_artefact: température plaque, temperatura piastra, temperatura placa
+    temperature_scales: massstabstemperatur, temperatur massstab, temperatur skalor
+    temperature_scales: température règles, temperatura righe, temperatura reglas
+""")
 _CLOCK = re.compile(r"(?:hh?:mm(?::ss)?)?", re.IGNORECASE)
+
+
+def quoted(names: Iterable[str], limit: int = 8) -> str:
+    """Return names in quotation marks as a `listing`."""
+    return listing((f'"{shorten(name)}"' for name in names), limit)
 
 
 @lru_cache(maxsize=100_000)
@@ -113,7 +139,7 @@ def unit_of_further(cell: str, name: str) -> str | None:
     >>> unit_of_further("t_scales_degC", "t_scales"), unit_of_further("T scales [°C]", "t_scales")
     ('degC', 'degC')
     """
-    names = (folded(name), *OF_CLOCKS.get(name, ()))
+    names = (folded(name), *OTHER_HEADINGS.get(name, ()))
     if folded(cell[:LONGEST]) in names:
         return ""
     match = re.fullmatch(

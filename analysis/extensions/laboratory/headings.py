@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
 from functools import cached_property
@@ -12,13 +12,16 @@ from ballplate.simulator.experiment import ColumnsSettings
 from ballplate.simulator.inputs import hint, listing, shorten
 
 from .heading_words import (
+    AXIS_WORDS,
     LESS_CLEAR,
     LONGEST,
     MEASURED,
+    VALUES,
     WORDS,
     folded,
     heading,
     is_clock,
+    quoted,
     unit_of_further,
 )
 from .uncertainty_headings import FACTORS, headed_uncertainty
@@ -53,18 +56,25 @@ class Group:
 class Headings:
     """Columns of a table: by role, and of co-ordinates in `groups`, several in a wide table.
 
-    `cells` are the headings, empty in a table without; `unused` those of unused columns.
+    `cells` are the headings, empty in a table without; `unused` those of unused columns. `by_axis`
+    are the columns of axis and value of one row per axis, joined with co-ordinates behind the rest.
     """
 
     roles: Mapping[str, HeadedColumn]
     groups: tuple[Group, ...]
     cells: tuple[str, ...]
+    by_axis: tuple[int, int] | None = None
 
     @cached_property
     def used(self) -> frozenset[int]:
         """Indices of the columns in use."""
         columns = [*self.roles.values(), *(axis for group in self.groups for axis in group.axes)]
-        return frozenset(column.place for column in columns if column.constant is None)
+        places = [column.place for column in columns if column.constant is None]
+        return frozenset((*places, *(self.by_axis or ())))
+
+    def name(self, place: int) -> str:
+        """The heading of a column, or its number without one."""
+        return self.cells[place] if self.cells else str(place + 1)
 
     @property
     def unused(self) -> tuple[str, ...]:
@@ -109,17 +119,16 @@ def read_headings(cells: Sequence[str], words: Vocabulary) -> Headings | None:
     :raises HeadingError: it does so ambiguously, or lacks a stated column.
     """
     parsed = [heading(cell) for cell in cells]
-    columns_stated = words.stated
-    groups = _stated_groups(cells, words) or _found_groups(cells, words)
+    groups, by_axis = _stated_groups(cells, words) or _found_groups(cells, words), None
     if groups is None:
-        return None
-    columns_taken = {axis.place for group in groups for axis in group.axes}
-    roles = {}
-    for role in (*TEXTS, "u", "diameter"):
-        name = getattr(columns_stated, role, None)
-        if name is not None:
-            roles[role] = _stated_column(name, cells)
-            columns_taken.add(roles[role].place)
+        if (by_axis := _axis_and_value(cells, words)) is None:
+            return None
+        unit = parsed[by_axis[1]][1]
+        added = range(len(cells), len(cells) + len(words.axes))
+        groups = (Group(tuple(HeadedColumn(i, unit) for i in added), {}),)
+    columns_taken = {axis.place for group in groups for axis in group.axes} | {*(by_axis or ())}
+    roles = _stated_roles(cells, words)
+    columns_taken.update(column.place for column in roles.values())
     for name, units in words.further.items():
         units_found = {
             i: unit
@@ -129,14 +138,11 @@ def read_headings(cells: Sequence[str], words: Vocabulary) -> Headings | None:
         if len(units_found) > 1:
             raise HeadingError(_which(name, [cells[i] for i in units_found]))
         for i, unit in units_found.items():
-            if is_clock(unit, units):
-                roles[name] = HeadedColumn(i)
-                columns_taken.add(i)
-                continue
-            if unit not in units:
+            is_time = is_clock(unit, units)
+            if not is_time and unit not in units:
                 text = f'the unit in the column "{shorten(cells[i])}" is not known'
                 raise HeadingError(f"{text}; write {listing(units)}")
-            roles[name] = HeadedColumn(i, unit)
+            roles[name] = HeadedColumn(i, None if is_time else unit)
             columns_taken.add(i)
     for words_of in (WORDS, LESS_CLEAR):
         for role, words_known in words_of.items():
@@ -156,7 +162,26 @@ def read_headings(cells: Sequence[str], words: Vocabulary) -> Headings | None:
         _refuse_expanded(roles["u"], cells)
     else:
         roles |= _uncertainty(cells, columns_taken)
-    return Headings(roles, groups, tuple(cells))
+    names = (f"{cells[by_axis[1]]} {axis}" for axis in words.axes) if by_axis else ()
+    return Headings(roles, groups, (*cells, *names), by_axis)
+
+
+def _axis_and_value(cells: Sequence[str], words: Vocabulary) -> tuple[int, int] | None:
+    """Return the columns of axes and of values of a table of one row per axis, if it is one.
+
+    :raises HeadingError: several columns could be one of them.
+    """
+    columns = []
+    for role, known in (("axis", AXIS_WORDS), ("value", VALUES)):
+        stated = getattr(words.stated, role, None)
+        names = [(i, heading(cell)[0].split()) for i, cell in enumerate(cells)]
+        places = [i for i, name in names if name and {*known}.issuperset(name)]
+        if stated is not None:
+            places = [_stated_column(stated, cells).place]
+        if len(places) > 1:
+            raise HeadingError(_which(role, [cells[i] for i in places]))
+        columns += places
+    return (columns[0], columns[1]) if len(columns) == 2 else None
 
 
 def _uncertainty(cells: Sequence[str], columns_taken: set[int]) -> dict[str, HeadedColumn]:
@@ -240,18 +265,21 @@ def numbered_columns(words: Vocabulary, count: int) -> Headings:
             "without headings, give the numbers of columns: readings: {columns: {position: 1, ball:"
             " 2, x: 3, y: 4, z: 5}}"
         )
-    roles = {
+    return Headings(_stated_roles(cells, words), groups, ())
+
+
+def _stated_roles(cells: Sequence[str], words: Vocabulary) -> dict[str, HeadedColumn]:
+    return {
         role: _stated_column(name, cells)
         for role in (*TEXTS, "u", "diameter")
         if (name := getattr(words.stated, role, None)) is not None
     }
-    return Headings(roles, groups, ())
 
 
 def _which(role: str, cells: Sequence[str]) -> str:
     if len(set(cells)) == 1:
         return _twice(role, cells[0])
-    named = listing(f'"{shorten(cell)}"' for cell in cells)
+    named = quoted(cells)
     return (
         f"the columns {named} could all be {role}; say which: readings: {{columns: {{{role}:"
         f" {shorten(cells[0])}}}}}"
@@ -369,14 +397,4 @@ def _found_groups(cells: Sequence[str], words: Vocabulary) -> tuple[Group, ...] 
             words.beside_axes[beside],
         )
         for beside, axes in groups.items()
-    )
-
-
-def missing_columns(cells: Iterable[str], missing: Sequence[str]) -> str:
-    """Return advice for a table that lacks columns: the existing ones, and the entry to write."""
-    named = listing((f'"{shorten(cell)}"' for cell in cells if cell), 12)
-    mapping = ", ".join(f"{role}: …" for role in missing)
-    return (
-        f"columns found: {named or 'none'}; missing: {listing(missing)}; name them in the"
-        f" experiment file: readings: {{columns: {{{mapping}}}}}"
     )

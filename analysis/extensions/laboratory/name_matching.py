@@ -8,7 +8,7 @@ decide. Every match is reported.
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -17,11 +17,9 @@ from ballplate.simulator.geometry import fit_motion, fixes_pose
 from ballplate.simulator.inputs import FileRow, format_length, listing, shorten
 from ballplate.simulator.machines import Array, Integers
 
-from .heading_words import folded
+from .heading_words import folded, quoted
+from .probe_matching import Places, matched_probes
 from .symmetry import turns_onto_itself
-
-# Places (m, d) that rows of a file state.
-PlacesOf = Callable[[Sequence[FileRow]], Array]
 
 # A reading is of the ball whose place is nearer than this part of the distance to its nearest
 # neighbour; a position is the one whose readings are on average as near, and others twice as far.
@@ -43,7 +41,7 @@ class Names:
 
 
 def with_known_names(
-    rows: Sequence[FileRow], design: Design, places: PlacesOf | None
+    rows: Sequence[FileRow], design: Design, places: Places | None
 ) -> tuple[tuple[FileRow, ...], Names]:
     """Return rows with the names of the design, and notes on matched and unmatched names.
 
@@ -68,6 +66,13 @@ def with_known_names(
     rows = _matched_positions(rows, design, places, names)
     rows = _planned_probes(rows, design, names)
     rows = _matched_balls(rows, design, places, names)
+    if not names.asked:
+        by_offset, question = matched_probes(rows, design, places)
+        if question:
+            names.asked.append(question)
+        if by_offset:
+            names.told.append(f"probes matched by plan and place: {_pairs(by_offset, 8)}")
+        rows = _renamed(rows, 2, by_offset)
     return tuple(rows), names
 
 
@@ -153,7 +158,7 @@ def _planned_probes(rows: Sequence[FileRow], design: Design, names: Names) -> Se
 def _matched_positions(
     rows: Sequence[FileRow],
     design: Design,
-    places: PlacesOf | None,
+    places: Places | None,
     names: Names,
 ) -> Sequence[FileRow]:
     """Return rows whose positions are identified by number or location."""
@@ -174,7 +179,7 @@ def _matched_positions(
             how = "by number and location" if by_number else "by location"
             names.told.append(f"positions matched {how}: {_pairs(by_place, 8)}")
             return _renamed(rows, 0, by_place)
-    names_listed = listing(f'"{shorten(name)}"' for name in strange)
+    names_listed = quoted(strange)
     names.asked.append(
         f"the positions {names_listed} are not in the experiment, and their locations do not"
         f" identify them ({doubt}); write names of the experiment: {listing(names_known)}"
@@ -187,7 +192,7 @@ def _others_by_place(
     used: Sequence[str],
     strange: Sequence[str],
     design: Design,
-    places: PlacesOf | None,
+    places: Places | None,
     names: Names,
 ) -> Sequence[FileRow]:
     """Return rows of a table most of whose positions are known, with the others identified by
@@ -208,7 +213,7 @@ def _positions_by_place(
     rows: Sequence[FileRow],
     used: Sequence[str],
     design: Design,
-    places: PlacesOf,
+    places: Places,
     expected: Mapping[str, str],
 ) -> tuple[dict[str, str], str]:
     """Return the position nearest to each one of the table, or a reason why there is none.
@@ -274,7 +279,7 @@ def _nearest(seen_places: Array, places: Array, rank: int = 1) -> tuple[Array, I
 def _matched_balls(
     rows: Sequence[FileRow],
     design: Design,
-    places: PlacesOf | None,
+    places: Places | None,
     findings: Names,
 ) -> Sequence[FileRow]:
     """Return rows whose balls are identified by number or location, artefact by artefact."""
@@ -395,12 +400,12 @@ def _by_place(
     used: Sequence[str],
     balls: Integers,
     design: Design,
-    places: PlacesOf | None,
+    places: Places | None,
     findings: Names,
 ) -> dict[str, str]:
     """Match balls by the nearest nominal location, if each name has a different one."""
     names_known = [design.balls.names[b] for b in balls]
-    strange = listing(f'"{shorten(name)}"' for name in used if name not in names_known)
+    strange = quoted(name for name in used if name not in names_known)
     text = f"the balls {strange} are not in the experiment, nor numbers in reading order that fit"
     if places is None or len(balls) < 2:
         findings.asked.append(f"{text}; write the names that it has: {listing(names_known)}")

@@ -31,13 +31,14 @@ from ballplate.simulator.readings import (
     plain_rows,
 )
 
-from .any_table import TableRows, read_any_table
+from .any_table import AskedError, TableRows, read_any_table
 from .clock_times import wrong_times
 from .coordinate_kinds import controller_offsets
 from .heading_words import heading, is_clock
 from .headings import Vocabulary
 from .name_matching import with_known_names
 from .uncertainty_headings import headed_uncertainty
+from .workbooks import workbook_tables
 
 # A diameter is told that is further from others of its ball than so many times their usual
 # distance, and than this (m).
@@ -159,7 +160,7 @@ def any_table_rows(
     )
     try:
         return read_any_table(text, encoding, words, settings, is_possible)
-    except ExperimentError:
+    except ExperimentError as error:
         if (report := of_report(source, text)) is not None:
             return report
         from .other_files import what_it_is
@@ -167,7 +168,8 @@ def any_table_rows(
         # Who names columns knows what the file is.
         if settings.columns is None and (other_meaning := what_it_is(text)):
             raise refused(source, other_meaning, line=1) from None
-        if not wrong:
+        # Every line of a plain table would have the fault.
+        if not wrong or isinstance(error, AskedError):
             raise
     if not rows:
         raise ExperimentError(wrong)
@@ -224,3 +226,4 @@ class OtherTables:
 
     of_sources = staticmethod(any_source_rows)
     of_table = staticmethod(any_table_rows)
+    of_workbook = staticmethod(workbook_tables)

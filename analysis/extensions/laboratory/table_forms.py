@@ -10,13 +10,25 @@ from __future__ import annotations
 import csv
 import re
 from collections.abc import Collection, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property
 
 from ballplate.simulator.experiment import ReadingsSettings
 from ballplate.simulator.inputs import MOST_COLUMNS, MOST_MESSAGES, shorten
 
-from .heading_words import LONGEST, unit_of
-from .headings import HeadingError, Headings, Vocabulary, numbered_columns, read_headings
+from .axis_rows import joined_axes
+from .heading_words import LONGEST, NOTHING, unit_of
+from .headings import (
+    TEXTS,
+    HeadedColumn,
+    HeadingError,
+    Headings,
+    Vocabulary,
+    numbered_columns,
+    read_headings,
+)
+from .merged_cells import fill_down
+from .thousands import THOUSANDS, Row, without_thousands
 
 # What separates columns → how it is told. Blanks by themselves, and two or more where names have
 # single ones.
@@ -37,19 +49,8 @@ NUMBERS = {
     "point": re.compile(_DIGITS.format(r"\.[0-9]*", r"\.")),
     "comma": re.compile(_DIGITS.format(",[0-9]+", ",")),
 }
-# Numbers with signs between thousands: with decimals behind them, or several of them.
-_BETWEEN = r"'\u2019\s\u00a0\u202f"
-THOUSANDS = re.compile(
-    rf"[+-]?[0-9]{{1,3}}(?:(?:[.{_BETWEEN}][0-9]{{3}})+,[0-9]*|(?:[,{_BETWEEN}][0-9]{{3}})+\.[0-9]*"
-    rf"|(?:[{_BETWEEN}][0-9]{{3}})+|(?:\.[0-9]{{3}}){{2,}}|(?:,[0-9]{{3}}){{2,}})"
-)
-# What could be thousands just as well as three decimals.
-EITHER = re.compile(r"[+-]?[1-9][0-9]{0,2}[.,][0-9]{3}")
-OTHER_DECIMALS = "and others have decimal"
-NOTHING = frozenset(("", "-", "--", "---", "n/a", "na", "nan", "none", "null"))
 
 Line = tuple[int, str]
-Row = tuple[int, list[str]]
 
 
 @dataclass(frozen=True)
@@ -58,7 +59,8 @@ class Form:
 
     `units` are those of a line of units below the headings, by place. `empty` are the lines without
     any co-ordinate, `wrong` what keeps rows from being read so, by line. `above` are the lines
-    above the headings.
+    above the headings, `blank` the lines and columns of names without an entry. `filled` counts
+    names that are those above, `between` says what is between thousands.
     """
 
     separator: str
@@ -66,10 +68,20 @@ class Form:
     header: int
     headings: Headings
     units: dict[int, str]
-    rows: tuple[Row, ...]
-    empty: tuple[int, ...]
-    wrong: tuple[tuple[int, str], ...]
+    rows: Sequence[Row]
+    empty: Sequence[int]
+    wrong: Sequence[tuple[int, str]]
     above: tuple[str, ...]
+    blank: tuple[tuple[int, int], ...]
+    filled: int
+    between: str = ""
+
+    @cached_property
+    def units_of_rows(self) -> frozenset[str]:
+        """Units in a column of units; empty if there is none, or it has something else."""
+        column = self.headings.roles.get("unit")
+        units = {unit_of(cells[column.place]) for _, cells in self.rows if column is not None}
+        return frozenset() if None in units else frozenset(map(str, units))
 
     def content(self) -> tuple[object, ...]:
         """What it reads; of two forms with the same content either will do."""
@@ -77,11 +89,7 @@ class Form:
         texts = [c.place for c in self.headings.roles.values() if c.constant is None]
         sign = DECIMALS[self.decimal]
         return tuple(
-            (
-                *(cells[i] for i in texts),
-                *(cells[i].replace(sign, ".") for i in places if cells[i] not in NOTHING),
-            )
-            for _, cells in self.rows
+            tuple(cells[i].replace(sign, ".") for i in (*texts, *places)) for _, cells in self.rows
         )
 
 
@@ -137,9 +145,10 @@ def forms_of(lines: Sequence[Line], words: Vocabulary, settings: ReadingsSetting
         except NoFormError as error:
             reasons.append(error)
             continue
-        for decimal in decimals:
-            # Of a table of commas, they separate columns unless quoted.
-            forms.append(_form(lines, header, headings, separator, decimal, words.empty))
+        cells = _form_without_decimals(lines, header, headings, separator, settings)
+        # Of a table of commas, they separate columns unless quoted.
+        is_stated = settings.decimal is not None
+        forms += [_form(cells, decimal, words, is_stated) for decimal in decimals]
     if forms:
         return forms
     raise max(reasons, key=lambda error: len(error.cells))
@@ -187,26 +196,27 @@ def _is_number(cell: str) -> bool:
     return any(pattern.fullmatch(cell) for pattern in NUMBERS.values())
 
 
-def _form(
+def _form_without_decimals(
     lines: Sequence[Line],
     header: int,
     headings: Headings,
     separator: str,
-    decimal: str,
-    may_be_empty: Collection[str] = (),
+    settings: ReadingsSettings,
 ) -> Form:
-    """The rows below the headings, and faults of them in this form."""
+    """The cells below the headings, with names that continue those above if the settings say so;
+    as `empty` lines of another width that hold no number.
+    """
     sign = SEPARATORS[separator][0]
-    places = [axis.place for group in headings.groups for axis in group.axes]
-    needed = [*places, *(c.place for c in headings.roles.values() if c.constant is None)]
-    width = len(headings.cells) or max(needed) + 1
-    number = NUMBERS[decimal]
+    roles = {role: c.place for role, c in headings.roles.items() if c.constant is None}
+    axes = [axis.place for group in headings.groups for axis in group.axes]
+    places = [headings.by_axis[1]] if headings.by_axis else axes
+    needed = [*places, *roles.values()]
+    # Co-ordinates of rows per axis are written behind the cells of the table.
+    width = len(headings.cells) - len(axes) * bool(headings.by_axis) or max(needed) + 1
     units: dict[int, str] = {}
     rows: list[Row] = []
-    empty: list[int] = []
-    remarks = []
+    remarks: list[int] = []
     wrong: list[tuple[int, str]] = []
-    ball = headings.roles["ball"].place if "ball" in headings.roles else 0
     for line_number, text in _below(lines, header):
         if len(wrong) > MOST_MESSAGES:
             break
@@ -219,16 +229,48 @@ def _form(
             continue
         cells = _padded(cells, width, needed, sign)
         if len(cells) < width or (headings.cells and len(cells) > width):
-            if _holds_no_number(cells, places, number):
+            if _holds_no_number(cells, places):
                 remarks.append(line_number)
             else:
                 text = f"{len(cells)} columns instead of {width}; write one line per row"
                 wrong.append((line_number, text))
             continue
-        if all(i >= len(cells) or cells[i].casefold() in NOTHING for i in places):
+        rows.append((line_number, cells))
+    texts = [roles[role] for role in TEXTS if role in roles]
+    may_fill = [*texts, *(roles[role] for role in ("unit",) if role in roles)]
+    filled = fill_down(rows, may_fill) if settings.fill_down else 0
+    blank = tuple(
+        (line_number, place)
+        for line_number, cells in rows
+        for place in texts
+        if not cells[place] and not all(cells[i].casefold() in NOTHING for i in places)
+    )
+    if headings.by_axis and units:
+        units |= dict.fromkeys(axes, units[places[0]])
+    above = tuple(text for _, text in lines[: max(header, 0)])
+    line = lines[header][0] if header >= 0 else 0
+    return Form(separator, "", line, headings, units, rows, remarks, wrong, above, blank, filled)
+
+
+def _form(cells_below: Form, decimal: str, words: Vocabulary, is_stated: bool) -> Form:
+    """The rows below the headings, and faults of them in this form; the decimal sign may be
+    stated.
+    """
+    headings = cells_below.headings
+    places = [axis.place for group in headings.groups for axis in group.axes]
+    joined, wrong_axes = joined_axes(cells_below.rows, headings, words.axes)
+    joined, between = without_thousands(joined, places, DECIMALS[decimal], is_stated)
+    rows: list[Row] = []
+    empty: list[int] = []
+    remarks, wrong = [*cells_below.empty], [*cells_below.wrong, *wrong_axes]
+    ball = headings.roles.get("ball", HeadedColumn(0)).place
+    for line_number, cells in joined:
+        if len(wrong) > MOST_MESSAGES:
+            break
+        if all(cells[i].casefold() in NOTHING for i in places):
             (empty if cells[ball] else remarks).append(line_number)
             continue
-        if reason := _wrong_row(cells, headings, number, decimal, may_be_empty):
+        if reason := _wrong_row(cells, headings, NUMBERS[decimal], decimal, words.empty):
             wrong.append((line_number, reason))
         rows.append((line_number, cells))
     # In between they may say what is true of the rows below only.
@@ -236,10 +278,8 @@ def _form(
     text = "a line without co-ordinates among the rows; remove it, or move its text to a column"
     wrong += [(line_number, text) for line_number in remarks if line_number < last]
     empty = sorted((*empty, *(line_number for line_number in remarks if line_number > last)))
-    above = tuple(text for _, text in lines[: max(header, 0)])
-    line = lines[header][0] if header >= 0 else 0
-    return Form(
-        separator, decimal, line, headings, units, tuple(rows), tuple(empty), tuple(wrong), above
+    return replace(
+        cells_below, decimal=decimal, rows=rows, empty=empty, wrong=sorted(wrong), between=between
     )
 
 
@@ -269,7 +309,7 @@ def _padded(cells: list[str], width: int, needed: Sequence[int], sign: str) -> l
     return cells
 
 
-def _holds_no_number(cells: Sequence[str], places: Sequence[int], number: re.Pattern[str]) -> bool:
+def _holds_no_number(cells: Sequence[str], places: Sequence[int]) -> bool:
     """True if a line of another width is a remark, and no row that was cut off."""
     filled = [cell for cell in cells if cell]
     return len(cells) <= min(places) or (
@@ -305,7 +345,8 @@ def wrong_number(cell: str, name: str, decimal: str) -> str:
         return f'"{shorten(cell)}" has signs between thousands; write it without them'
     other_name = "comma" if decimal == "point" else "point"
     if NUMBERS[other_name].fullmatch(cell):
-        return f'"{cell}" has a decimal {other_name}, {OTHER_DECIMALS} {decimal}s; write one kind'
+        text = f'"{cell}" has a decimal {other_name}, and others have decimal {decimal}s'
+        return f"{text}; write one kind"
     return f'"{shorten(cell)}" is not a number; write for example "500{DECIMALS[decimal]}0003"'
 
 
@@ -316,8 +357,9 @@ def chosen_form(forms: Sequence[Form]) -> Form:
     """
     right = [form for form in forms if form.rows and not form.wrong]
     if not right:
-        # Of a number with thousands and decimals, the sign of the decimals is the last one.
-        return min(forms, key=lambda form: (_share_wrong(form), _of_other_decimals(form)))
+        return min(
+            forms, key=lambda form: len(form.wrong) / max(len(form.rows) + len(form.wrong), 1)
+        )
     first = right[0]
     for alternative in right[1:]:
         if alternative.content() != first.content():
@@ -328,46 +370,3 @@ def chosen_form(forms: Sequence[Form]) -> Form:
                 " readings: separator",
             )
     return first
-
-
-def _share_wrong(form: Form) -> float:
-    return len(form.wrong) / max(len(form.rows) + len(form.wrong), 1)
-
-
-def _of_other_decimals(form: Form) -> int:
-    """How many rows are wrong for the sign of their decimals alone."""
-    return sum(OTHER_DECIMALS in text for _, text in form.wrong)
-
-
-def doubtful_decimals(form: Form) -> str:
-    """A number of a table all of whose numbers could have thousands as well as three decimals;
-    empty where one number tells.
-    """
-    sign = DECIMALS[form.decimal]
-    doubtful = ""
-    for _, cells in form.rows:
-        for group in form.headings.groups:
-            for axis in group.axes:
-                cell = cells[axis.place]
-                if sign not in cell:
-                    if len(cell.lstrip("+-")) > 3:
-                        return ""
-                elif not EITHER.fullmatch(cell):
-                    return ""
-                else:
-                    doubtful = doubtful or cell
-    return doubtful
-
-
-def commas_of_both_kinds(form: Form) -> bool:
-    """True if commas may separate decimals as well as columns: all co-ordinates are whole numbers,
-    and as many numbers as these stand in columns that nothing is taken from.
-    """
-    if form.separator != "comma" or not form.headings.unused:
-        return False
-    used = [axis.place for group in form.headings.groups for axis in group.axes]
-    spare = [i for i in range(len(form.headings.cells)) if i not in form.headings.used]
-    if not all(re.fullmatch(r"[+-]?[0-9]*", row[i]) for _, row in form.rows for i in used):
-        return False
-    whole = [i for i in spare if all(re.fullmatch("[0-9]+", row[i]) for _, row in form.rows)]
-    return len(whole) >= len(form.headings.groups[0].axes)

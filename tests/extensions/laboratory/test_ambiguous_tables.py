@@ -101,19 +101,29 @@ def test_thousands_that_would_be_outside_the_machine_are_none(experiment: Experi
     assert numbers(read(EITHER.replace("_um", "_mm"), experiment)) == [612.345, 100.234, 250.001]
 
 
-@pytest.mark.parametrize(
-    "cell", ["1.012,5", "1,012.5", "1'012.5", "1 012,5", "1\u00a0012,5", "1.012.345"]
-)
-def test_signs_between_thousands_are_refused_in_words(experiment: Experiment, cell: str) -> None:
+@pytest.mark.parametrize("cell", ["1,012.5", "1'012.5", "1.0125,5", "1.012.5"])
+def test_signs_between_thousands_of_two_kinds_are_refused_in_words(
+    experiment: Experiment, cell: str
+) -> None:
     text = HEAD + f"z low;r1c1;down;{cell};100,2;250\nz low;r1c2;down;5,25;100,2;250\n"
-    assert f'2:1: "{" ".join(cell.split())}" has signs between thousands' in asked(text, experiment)
+    assert f'2:1: "{cell}"' in asked(text, experiment)
+
+
+@pytest.mark.parametrize(
+    "cell", ["1.012,5", "1 012,5", "1\u00a0012,5", "1\u202f012,5", "1'012,5", "1\u2019012,5"]
+)
+def test_signs_between_thousands_are_read(experiment: Experiment, cell: str) -> None:
+    text = HEAD + f"z low;r1c1;down;{cell};100,2;250\nz low;r1c2;down;5,25;100,2;250\n"
+    found = read(text, experiment)
+    assert numbers(found) == [1012.5, 100.2, 250.0, 5.25, 100.2, 250.0]
+    assert "between thousands" in found.told[0]
+    # All of a column have them, or none.
+    mixed = asked(text.replace("5,25", "1125,5"), experiment)
+    assert f'"{" ".join(cell.split())}" {wording.HAS_SIGNS_BETWEEN_THOUSANDS}' in mixed
 
 
 @pytest.mark.parametrize("signs", [".,", ",.", "',", "'."])
-def test_beside_thousands_decimals_are_not_said_to_be_of_two_kinds(
-    experiment: Experiment, signs: str
-) -> None:
-    """Every number is written in one and the same way."""
+def test_thousands_and_decimals_of_any_signs(experiment: Experiment, signs: str) -> None:
     rows = [("-0.1", "100.25", "1012.5"), ("1000.5", "0.5", "-1012.5"), ("3.25", "1100.0", "7.5")]
     text = HEAD
     for k, row in enumerate(rows, start=1):
@@ -122,9 +132,20 @@ def test_beside_thousands_decimals_are_not_said_to_be_of_two_kinds(
             for cell in row
         ]
         text += f"z low;r1c{k};down;{';'.join(cells)}\n"
-    told = asked(text, experiment)
-    assert told.count(wording.HAS_SIGNS_BETWEEN_THOUSANDS) == 3
-    assert "others have decimal" not in told
+    found = read(text, experiment)
+    assert numbers(found) == [float(cell) for row in rows for cell in row]
+
+
+QUOTED = 'position,ball,probe,x_um,y_um,z_um\nz low,r1c1,down,"612,345","100,234","250,001"\n'
+
+
+@pytest.mark.parametrize("table", [EITHER, QUOTED])
+def test_thousands_are_asked_for_once(experiment: Experiment, table: str) -> None:
+    """In a table of commas as well, where they are quoted; each answer gives one meaning."""
+    question = asked(table, experiment)
+    assert question.count("\n") == 0 and wording.DECIMAL_COMMA_IF in question
+    assert numbers(read(table, experiment, decimal="comma")) == [0.612345, 0.100234, 0.250001]
+    assert numbers(read(table, experiment, decimal="point")) == [612.345, 100.234, 250.001]
 
 
 def test_two_kinds_of_decimals(experiment: Experiment) -> None:
@@ -170,7 +191,7 @@ def test_lengths_without_a_unit(experiment: Experiment) -> None:
 def test_columns_that_are_missing_are_named_beside_those_there(experiment: Experiment) -> None:
     text = "Lage;Taster;X [mm];Y [mm];Z [mm]\nz low;down;1,5;2,5;3\n"
     assert (wording.COLUMNS_FOUND_MISSING) in asked(text, experiment)
-    assert 'columns found: "A", "B", "C"; missing: x, y, z' in asked("A;B;C\n1;2;3\n", experiment)
+    assert wording.MISSING_BALL_AND_AXES in asked("A;B;C\n1;2;3\n", experiment)
 
 
 def test_columns_by_name_number_and_constant(experiment: Experiment) -> None:
@@ -212,7 +233,7 @@ def test_rows_that_were_cut_off(experiment: Experiment) -> None:
         (HEAD.encode(), "no rows below"),
         (b"\xff\xfe", "the file is empty"),
         (b"", "the file is empty"),
-        (b"nothing of the kind\n", "missing: x, y, z"),
+        (b"nothing of the kind\n", "missing: ball, x, y, z"),
     ],
 )
 def test_files_that_are_no_tables(

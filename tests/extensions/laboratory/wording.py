@@ -3,6 +3,7 @@
 ALONG_THE_PARTS_AXES_DISAGREE = "along the part's axes disagree, .* write the names"
 ARE_NOT_AMONG_THE_POINTS = '"2 7" are not among the 6 points of the set'
 ARE_NOT_IN_THE_EXPERIMENT = "are not in the experiment"
+ARE_SAID_TO_BE_IN = 'lengths of "X'
 AS_BALL_CENTRES = "as ball centres, but only to 50 mm as scale readings, the default"
 AS_SCALE_READINGS = "as scale readings, but only to 50 mm as ball centres, which is stated"
 A_DOCUMENT_TYPE_DOCTYPE = (
@@ -25,18 +26,23 @@ COULD_ALL_BE = "could all be x; say which"
 CO_ORDINATES_ARE_TAKEN_FOR_BALL = "co-ordinates are interpreted as ball centres, as in reports"
 CO_ORDINATES_WHICH_IS_NO_MULTIPLE = "19 co-ordinates, which is no multiple of 3"
 DATES_WITHOUT_A = "dates without a zone, and others are times of a day"
+DECIMAL_COMMA_IF = "--decimal comma if it is 612.345, --decimal point if it is 612345"
 DIMENSION_FLATNESS_OF_PLANE = "left: 1 dimension (flatness of plane), 1 sphere (no row Z)"
 DIMENSION_POSITION_OF_SPHERE = "1 dimension (position of sphere), 1 dimension (location of plane)"
 DIVIDED_BY_ITS_COVERAGE_FACTOR = "divided by its coverage factor"
 DOES_NOT_SAY_WHICH_UNCERTAINTY = "does not say which uncertainty it is"
 EXCHANGE_THE_NAMES_OF_POSITIONS = "exchange the names of positions"
+FITS_THE_PROBE_RIGHT = "fits the probe right, not left; correct the name of the probe"
 GIVE_THEM_WITH_CERTIFICATE = "give them with --certificate"
 HAS_A_DECIMAL = '3:1: "2.25" has a decimal point, and others have decimal commas'
 HAS_MORE_THAN_MB = "f: has more than 0 MB; leave some of it out"
 HAS_SIGNS_BETWEEN_THOUSANDS = "has signs between thousands"
+IS_DAMAGED_OR_NO_WORKBOOK = "is no workbook, damaged or too large"
 IS_NOT_IN_THE_ENCODING = "is not in the encoding utf-8"
+IS_NO_AXIS = '"w" is no axis; write x, y, z'
 IS_NO_TIME = "is no time of a clock"
 IS_NO_TIME_OF_A_CLOCK = '"12.5" is no time of a clock; write 10:05:30 or'
+IS_NO_WORKBOOK = "is no workbook and has no sheets"
 IS_UM_IN_ALL_ROWS = "u is 0.35 um in all rows"
 IS_WHERE_BALL_SHOULD = "is where ball .* should be; correct its name"
 ITS_NUMBERS_ARE_NOT_BELOW = "report:4:1: its numbers are not below the 6 headings"
@@ -45,9 +51,14 @@ LEAVE_THE_COLUMN_OUT = "leave the column out"
 LENGTHS_ARE_IN = "lengths are in in, the experiment file mm"
 LOW_THE_READINGS_FIT_THE_PLATE = "z low: the readings fit the plate turned by 180"
 MAY_HAVE_BEEN_CUT_OFF = "may have been cut off"
+MISSING_BALL_AND_AXES = (
+    'columns found: "A", "B", "C"; missing: ball, x, y, z (and position, probe, unless stated'
+)
+MISSING_BALL_AND_POSITION = "missing: ball (and position, unless stated elsewhere)"
 MM_IN_THE_MIDDLE = "22 mm in the middle"
 MORE_THAN_ELEMENTS = "f:1:12: more than 3 elements; leave some out"
 NOTHING_IS_FILLED = "x, y, z are empty in all"
+NOR_ONE_ABOVE_IT = 'merged-en.csv:2:1: no "Position", nor one above it'
 NOT_RECOGNISED_AS_QIF_RESULTS = (
     "report: not recognised as QIF results, DMIS output, PC-DMIS report, Calypso table; "
     "state its format with --from (qif, dmis, pcdmis, calypso)"
@@ -62,13 +73,24 @@ NO_NAMES_OF_THE_EXPERIMENT = (
 )
 NO_NAMES_OF_THE_EXPERIMENT_2 = "no names of the experiment in r1c1"
 NO_POINTS_WITH_THE_ID = 'no points with the id "13" in clear'
+NO_POSITION_OR_PROBE = (
+    'merged-en.csv:3:1: no "Position" or "Probe" in line 3 and 83 more; if it is the name above, as'
+    " below merged cells, give --fill-down"
+)
+NO_POSITION_OR_PROBE_2 = 'no "Position" or "Probe" in line 2 and 84 more'
 NO_RULE_PARTS_THE_NAMES_INTO = "no rule parts the names P_1, P_1_2_3 into position"
+NO_SHEET = 'no sheet "Friday"; tables: "Monday", "Tuesday"'
 NO_TIME_AND_OTHER_ROWS_HAVE = "no time, and other rows have one"
 NO_UNITS_OF_THIS_DIMENSION = "no UNITS= of this dimension"
 NO_UNIT_IS_STATED = 'no unit is stated for the columns "x", "y", "z"'
+NO_UNIT_IS_STATED_2 = 'no unit is stated for the columns "X", "Y", "Z"'
+NO_UNIT_IS_STATED_FOR_THE_ISTWERT = (
+    'no unit is stated for the columns "X-Istwert", "Y-Istwert", "Z-Istwert"'
+)
 NO_WRITE_A = "lab.csv:6:1: no x; write a number, or remove the line"
 OTHERWISE_THE_NAMES_OF_BALLS = "otherwise correct the names of balls"
 PART_CO_ORDINATES_DO_NOT_TELL = "part co-ordinates cannot confirm the numbering"
+NO_Y_WRITE = "2:1: no y; write a number"
 PLACED_BY_THE_NOMINAL_POSES = "placed by the nominal poses"
 PLANNED_BUT_NOT_READ = "planned but not read (3)"
 PLANNED_BUT_NOT_READ_2 = "planned but not read"
@@ -112,8 +134,16 @@ THE_NAMES_OF_BALLS = (
 )
 THE_NAME_CAN_BE_PARTED = 'the name "z_low_r1c1" can be parted as {position}_{ball} in several ways'
 THE_NAME_OF_THE_FILE = 't.csv:1:1: position "t" is the name of the file'
+THE_PROBES_ARE_NOT_IN_THE_EXPERIMENT = (
+    'the probes "T1", "T2", "T3", "T4", "T5" are not in the experiment, and neither the plan nor'
+)
+THE_SHEETS_HAVE_TABLES = 'the sheets "Monday", "Tuesday" have tables; give --sheet'
 THIS_IS_A = "report: this is a table, which needs no import; ballplate fit reads it"
 THIS_IS_A_DMIS = "this is a DMIS program, not a report"
 THIS_IS_A_REPORT = "this is a report of a measuring program (DMIS output), and no table"
 TOO_FEW_BALLS_WERE_READ = "too few balls were read in z high"
 TO_THE_LAST_DIGIT = "to the last digit"
+WORKBOOKS_NEED_OPENPYXL = (
+    "workbooks need openpyxl; install it with: python -m pip install 'ballplate[xlsx]'"
+)
+X_AGAIN = "3:1: x again, in the reading of line 2, which lacks others"
