@@ -74,6 +74,7 @@ def design_page(contents: DesignContents) -> str:
             "Uncertainties",
             joined([uncertainty_table(run), task_table(run), _influences(run)]),
         ),
+        PageSection("assumptions", "What is assumed", _assumptions(run)),
         PageSection(
             "lengths",
             "Lengths throughout the volume",
@@ -286,6 +287,24 @@ def _influences(run: QuotedData) -> Html:
         rows.append([name, stated_text, u, unit])
     heads = ["influence quantity", "u stated", "u after the readings", "unit"]
     return table("influences", "Influence quantities", heads, rows, (0, 3))
+
+
+def _assumptions(run: QuotedData) -> Html:
+    """Section on what the prediction takes for granted: U6 without it, and what states it."""
+    if "assumptions" not in run:
+        return Html()
+    table_of = run.at("assumptions")
+    rows = [["all of these", "", table_of.micro("average"), table_of.micro("maximum"), ""]]
+    for effect in table_of.at("assumptions").each():
+        values = [
+            effect.micro("average"),
+            effect.micro("maximum"),
+            effect.number("ratio", digits=3),
+        ]
+        rows.append([effect.text("assumed"), effect.text("instead"), *values])
+    heads = ["assumed", "U6 in µm if instead", "u average", "u maximum", "times"]
+    command = "ballplate run --assumptions prints the entries of the file that state each."
+    return joined([table("assumptions", "Assumptions", heads, rows, (0, 1)), note(command)])
 
 
 def _reliability(quoted: Mapping[str, QuotedData], unreliable: str) -> Html:

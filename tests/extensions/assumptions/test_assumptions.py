@@ -269,3 +269,12 @@ def test_undetermined_lengths_have_no_table() -> None:
     assert prediction.assumptions is None
     with pytest.raises(ValueError, match="undetermined"):
         bp.assumptions(path)
+
+
+def test_the_page_has_all_rows() -> None:
+    prediction = bp.run(small_quickstart())
+    page = bp.page(prediction)
+    for k, effect in enumerate(prediction.assumptions.effects):
+        assert f">{effect.assumption.assumed}<" in page
+        path = f'value="{effect.average!r}" data-path="/run/assumptions/assumptions/{k}/average"'
+        assert path in page
