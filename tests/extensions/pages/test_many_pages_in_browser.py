@@ -183,5 +183,5 @@ def test_a_page_of_a_hundred_thousand_settings_is_light(tmp_path: Path) -> None:
     with browser(CHROMIUM, tmp_path) as tab:
         tab.open(path)
         assert tab.value("document.querySelectorAll('*').length") < 15_000
-        assert "of 99899 settings meet" in tab.value("document.querySelector('.verdict').innerText")
+        assert "of 99899 cases meet" in tab.value("document.querySelector('.verdict').innerText")
         assert_quiet(tab)
