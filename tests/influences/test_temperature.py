@@ -350,7 +350,7 @@ def test_more_parameters_than_there_is_room_for_are_refused(
     monkeypatch.setattr("ballplate.simulator.experiment.influences.MOST_SHARED", shared)
     lay_out(experiment)
     monkeypatch.setattr("ballplate.simulator.experiment.influences.MOST_SHARED", shared - 1)
-    with pytest.raises(ExperimentError, match=rf"their 16 parameters make {shared} besides"):
+    with pytest.raises(ExperimentError, match=rf"their 16 parameters make {shared} in addition"):
         lay_out(experiment)
 
 
