@@ -310,8 +310,6 @@ def _on_terminal(action: Callable[[], int], folder: Path) -> tuple[int, str]:
             sys.stdout, sys.stderr = (
                 os.fdopen(i, "w", buffering=1, encoding="utf-8") for i in (1, 2)
             )
-            # A command that asked a question would wait for an answer for ever.
-            os.dup2(os.open(os.devnull, os.O_RDONLY), 0)
             sys.path.insert(0, str(TOP))
             status = action()
             sys.stdout.flush()
