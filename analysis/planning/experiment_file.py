@@ -21,12 +21,12 @@ from ballplate.simulator.experiment.variants import variant_trees
 from ballplate.simulator.inputs.messages import ExperimentError, format_path, in_one_line
 from ballplate.simulator.inputs.problems import Problems
 from ballplate.simulator.inputs.quantities import format_duration
+from ballplate.simulator.inputs.yaml_writing import PlainDumper, yaml_text
 from ballplate.simulator.inputs.yamltree import (
     LOADER,
     Node,
     parse_tree,
     read_text,
-    resolve_scalar,
     to_list,
     to_python,
 )
@@ -310,23 +310,13 @@ class _FlowList(list[Any]):
     """A list that is written in one line, or as few as there are."""
 
 
-class _Dumper(yaml.SafeDumper):
+class _Dumper(PlainDumper):
+    quote = '"'
+
     def increase_indent(self, flow: bool = False, indentless: bool = False) -> None:
         super().increase_indent(flow, False)
 
-    def ignore_aliases(self, data: Any) -> bool:
-        return True
 
-
-def _represent_text(dumper: yaml.SafeDumper, text: str) -> yaml.ScalarNode:
-    try:
-        is_text = resolve_scalar(text) is text
-    except ValueError:
-        is_text = False
-    return dumper.represent_scalar("tag:yaml.org,2002:str", text, style=None if is_text else '"')
-
-
-_Dumper.add_representer(str, _represent_text)
 _Dumper.add_representer(
     _Flow,
     lambda dumper, data: dumper.represent_mapping(
@@ -345,14 +335,7 @@ def _section(key: str, value: Any) -> str:
         value = {name: _in_line(entry) for name, entry in value.items()}
     elif isinstance(value, list):
         value = [_in_line(entry) for entry in value]
-    text = yaml.dump(
-        {key: value},
-        Dumper=_Dumper,
-        default_flow_style=False,
-        sort_keys=False,
-        allow_unicode=True,
-        width=200,
-    )
+    text = yaml_text({key: value}, width=200, dumper=_Dumper)
     return f"\n{text}".rstrip("\n") if isinstance(value, dict | list) else text.rstrip("\n")
 
 

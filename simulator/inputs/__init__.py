@@ -93,6 +93,7 @@ if TYPE_CHECKING:
     from .trust import OPENED, UNKNOWN, Trust
     from .unusable import UnusableError
     from .validation import validated
+    from .yaml_writing import yaml_text
     from .yamltree import (
         LOADER,
         GivenText,
@@ -107,7 +108,6 @@ if TYPE_CHECKING:
         read_bytes,
         read_text,
         read_tree,
-        resolve_scalar,
         to_list,
         to_python,
         utf8_text,

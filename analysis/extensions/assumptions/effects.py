@@ -4,16 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
-import yaml
 from ballplate.presentation import Data, MainTable, Result, aligned, given, number, picked
 from ballplate.simulator.computing import single_threaded
 from ballplate.simulator.design import Design, State
 from ballplate.simulator.estimation import linearise, moved, newton_step
 from ballplate.simulator.experiment import Experiment, lay_out, placed_only
-from ballplate.simulator.inputs import ExperimentError
+from ballplate.simulator.inputs import ExperimentError, yaml_text
 from ballplate.simulator.machines import Array, ErrorModel
 from ballplate.simulator.readings import simulated_readings
 from ballplate.uncertainty import Quantity, evaluation_points, uncertainties
@@ -26,11 +24,6 @@ LARGE = 2.0
 
 # Points between which systematic errors of lengths are computed.
 MOST_POINTS = 100
-
-
-class _WithoutAliases(yaml.SafeDumper):
-    def ignore_aliases(self, data: Any) -> bool:
-        return True
 
 
 @dataclass(frozen=True)
@@ -53,14 +46,7 @@ class AssumptionEffect:
     @property
     def entries(self) -> str:
         """The entries of the file that state it, as YAML; each replaces that of its key."""
-        return yaml.dump(
-            dict(self.assumption.changes),
-            Dumper=_WithoutAliases,
-            sort_keys=False,
-            default_flow_style=None,
-            allow_unicode=True,
-            width=100,
-        )
+        return yaml_text(dict(self.assumption.changes), None, 100)
 
 
 @dataclass(frozen=True, repr=False)

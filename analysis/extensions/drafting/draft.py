@@ -8,8 +8,7 @@ from string import Template
 from typing import Any
 
 import numpy as np
-import yaml
-from ballplate.simulator.inputs import LengthFunction, Target, typed_length
+from ballplate.simulator.inputs import LengthFunction, Target, typed_length, yaml_text
 
 from .data_sheet import DataSheet
 from .machine_tables import chain_words, table
@@ -95,8 +94,7 @@ def _certificate(standard: LengthFunction) -> str:
 
 def _flow(content: Any) -> str:
     """Return content of a file in one line."""
-    text: str = yaml.safe_dump(content, default_flow_style=True, sort_keys=False, width=10**6)
-    return text.strip()
+    return yaml_text(content, flow_style=True).strip()
 
 
 def _entries(items: Iterable[Settings]) -> str:

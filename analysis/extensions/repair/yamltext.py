@@ -17,8 +17,8 @@ from ballplate.simulator.inputs import (
     format_path,
     parse_tree,
     refused,
-    resolve_scalar,
     to_python,
+    yaml_text,
 )
 
 # What ends a line for YAML's parser.
@@ -74,7 +74,7 @@ def flow(value: Any) -> str:
     >>> flow({"name": "z low", "corner": {"x": "0 mm"}, "probes": ["a, b", "1e-3"]})
     "{name: z low, corner: {x: 0 mm}, probes: ['a, b', '1e-3']}"
     """
-    return _dumped([value], flow_style=True)[1:-1]
+    return yaml_text([value], flow_style=True).strip()[1:-1]
 
 
 def with_changes(text: str, file: str, changes: Iterable[TextChange]) -> str:
@@ -138,32 +138,8 @@ def _as_read(value: Any) -> Any:
     return tuple(map(_as_read, value)) if isinstance(value, list | tuple) else value
 
 
-class _Dumper(yaml.SafeDumper):
-    """YAML writer that quotes texts with another meaning under YAML 1.1 or 1.2."""
-
-    def ignore_aliases(self, data: Any) -> bool:
-        return True
-
-
-def _represented(dumper: yaml.SafeDumper, text: str) -> yaml.ScalarNode:
-    style = None if resolve_scalar(text) == text else "'"
-    return dumper.represent_scalar("tag:yaml.org,2002:str", text, style=style)
-
-
-_Dumper.add_representer(str, _represented)
-_Dumper.add_representer(tuple, _Dumper.represent_list)
-
-
-def _dumped(value: Any, flow_style: bool = False) -> str:
-    text = yaml.dump(
-        value,
-        Dumper=_Dumper,
-        default_flow_style=flow_style,
-        width=float("inf"),
-        sort_keys=False,
-        allow_unicode=True,
-    )
-    return str(text).removesuffix("\n...\n").strip()
+def _key(name: str) -> str:
+    return yaml_text(name).removesuffix("\n...\n").strip()
 
 
 def _spans(text: str, file: str) -> _Text:
@@ -299,13 +275,13 @@ def _with_entry(text: _Text, into: _Span, value: Any, key: str | None = None) ->
     if key is None:
         is_block = not into.entries[-1][2].is_flow and into.entries[-1][2].kind == "mapping"
         if is_block and isinstance(value, dict):
-            written = f"{new_line}  ".join(f"{_dumped(k)}: {flow(v)}" for k, v in value.items())
+            written = f"{new_line}  ".join(f"{_key(k)}: {flow(v)}" for k, v in value.items())
         else:
             written = flow(value)
         return f"{whole[:end]}{new_line}- {written}{whole[end:]}"
-    written = f"{_dumped(key)}: {flow(value)}"
+    written = f"{_key(key)}: {flow(value)}"
     if isinstance(value, list | tuple) and len(value) > 1 and isinstance(value[0], dict):
-        written = f"{_dumped(key)}:" + "".join(f"{new_line}  - {flow(item)}" for item in value)
+        written = f"{_key(key)}:" + "".join(f"{new_line}  - {flow(item)}" for item in value)
     return f"{whole[:end]}{new_line}{written}{whole[end:]}"
 
 

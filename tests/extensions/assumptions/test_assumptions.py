@@ -106,6 +106,21 @@ def test_a_plan_has_the_table_of_its_choice(tmp_path: Path) -> None:
         assert planned[name].average == pytest.approx(own[name].average, rel=1e-9), name
 
 
+def test_a_name_that_looks_like_a_number_stays_a_name(tmp_path: Path) -> None:
+    text = yaml.safe_dump(small_sections(), sort_keys=False)
+    path = tmp_path / "e.yaml"
+    path.write_text(text.replace("front", "'1e-3'"), encoding="utf-8")
+    tips = by_name(bp.assumptions(path))["tips"]
+    changed = tmp_path / "changed.yaml"
+    changed.write_text(
+        yaml.safe_dump({**small_sections(), "probes": None}, sort_keys=False)
+        .replace("front", "'1e-3'")
+        .replace("probes: null\n", tips.entries),
+        encoding="utf-8",
+    )
+    assert bp.run(changed)["U6"].average == pytest.approx(tips.average, rel=1e-9)
+
+
 def by_name(table: Assumptions) -> dict[str, Any]:
     return {effect.assumption.name: effect for effect in table.effects}
 
