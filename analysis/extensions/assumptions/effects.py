@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from ballplate.presentation import Data, MainTable, Result, aligned, given, number, picked
-from ballplate.simulator.computing import single_threaded
+from ballplate.simulator.computing import evenly_spread, single_threaded
 from ballplate.simulator.design import Design, State
 from ballplate.simulator.estimation import linearise, moved, newton_step
 from ballplate.simulator.experiment import Experiment, lay_out, placed_only
@@ -228,8 +228,7 @@ def _lengths(design: Design, model: ErrorModel, state: State) -> Array:
     many.
     """
     places = evaluation_points(design)
-    count = len(places.points)
-    some = np.unique(np.linspace(0, count - 1, min(count, MOST_POINTS)).round().astype(int))
+    some = evenly_spread(len(places.points), MOST_POINTS)
     points = places.points[some]
     points = points + model.error(points, state.a, state.probes[places.probes[some]])
     first, second = np.triu_indices(len(points), 1)

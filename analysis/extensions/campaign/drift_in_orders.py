@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from ballplate.planning import OrderName, RunSheet, in_time, without_drift
-from ballplate.simulator.computing import single_threaded
+from ballplate.simulator.computing import evenly_spread, single_threaded
 from ballplate.simulator.design import (
     Design,
     DriftSettings,
@@ -161,7 +161,7 @@ def effects_on_distances(design: Design, p: int) -> tuple[Array, Array, Array]:
     each of the last p influence parameters (m, p), and the covariance (p, p) of these parameters.
     """
     linearisation, every = linearise(design), evaluation_points(design)
-    chosen = np.unique(np.linspace(0, len(every.points) - 1, MOST_POINTS).round().astype(int))
+    chosen = evenly_spread(len(every.points), MOST_POINTS)
     places = replace(every, points=every.points[chosen], probes=every.probes[chosen])
     functions = linear_functions(linearisation, Distances(places))
     drifts = LinearFunctions(

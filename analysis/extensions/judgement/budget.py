@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from ballplate.presentation import Data, MainTable, Result, aligned, number, picked
 from ballplate.results import Fit, Grouping, few_degrees_of_freedom
-from ballplate.simulator.computing import comparable, single_threaded
+from ballplate.simulator.computing import comparable, evenly_spread, single_threaded
 from ballplate.simulator.estimation import (
     Coordinates,
     Distances,
@@ -267,8 +267,7 @@ def _figures(
 
 def _some(places: Any) -> MeasuredPoints:
     """Return evenly chosen places, at most `MOST_PLACES`."""
-    count = len(places.points)
-    chosen = np.unique(np.linspace(0, count - 1, min(count, MOST_PLACES)).round().astype(int))
+    chosen = evenly_spread(len(places.points), MOST_PLACES)
     return MeasuredPoints(places.points[chosen], places.probes[chosen])
 
 

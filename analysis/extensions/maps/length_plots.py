@@ -21,6 +21,7 @@ from ballplate.presentation import (
     placed_axes,
     save,
 )
+from ballplate.simulator.computing import evenly_spread
 from ballplate.simulator.design import Flags
 from ballplate.simulator.machines import Array
 
@@ -52,9 +53,7 @@ def draw_lengths(lengths: GroupedLengths, path: str | Path | None = None) -> Fig
     marked, meaning = marks(ratios)
     levels = np.zeros(1, np.int64)
     if len(counts) == 3:
-        levels = np.unique(
-            np.linspace(0, counts[2] - 1, min(counts[2], MOST_SLICES)).round().astype(int)
-        )
+        levels = evenly_spread(counts[2], MOST_SLICES)
     columns = min(len(levels), IN_A_ROW) if len(levels) != 4 else 2
     rows = -(-len(levels) // columns)
     span = lengths.design.machine.volume.size

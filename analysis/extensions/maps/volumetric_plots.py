@@ -30,9 +30,9 @@ from ballplate.presentation import (
     round_number,
     save,
 )
-from ballplate.simulator.computing import comparable
+from ballplate.simulator.computing import comparable, evenly_spread
 from ballplate.simulator.design import Volume
-from ballplate.simulator.machines import AXES, Array, Integers, meaning, symbol
+from ballplate.simulator.machines import AXES, Array, meaning, symbol
 
 from .volumetric_errors import AlongAxis, LengthErrors, VolumetricErrors
 
@@ -138,14 +138,9 @@ def draw_points(
 def _face(axes: Axes, face: Array, colour: str, width: float, is_near: bool) -> None:
     """Lines of a face (n, m, 2) of the grid."""
     for lines in (face, face.transpose(1, 0, 2)):
-        chosen = lines[_spread(len(lines), MOST_LINES)] if is_near else lines[[0, -1]]
-        for line in chosen[:, _spread(lines.shape[1], MOST_ON_LINE)]:
+        chosen = lines[evenly_spread(len(lines), MOST_LINES)] if is_near else lines[[0, -1]]
+        for line in chosen[:, evenly_spread(lines.shape[1], MOST_ON_LINE)]:
             axes.plot(*line.T, color=colour, linewidth=width, linestyle="-" if is_near else ":")
-
-
-def _spread(count: int, most: int) -> Integers:
-    """Return `most` evenly spread indices, or all, both ends included."""
-    return np.unique(np.linspace(0, count - 1, min(count, most)).round().astype(int))
 
 
 def draw_line(

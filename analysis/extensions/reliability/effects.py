@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-from ballplate.simulator.computing import first_largest_of_columns
+from ballplate.simulator.computing import evenly_spread, first_largest_of_columns
 from ballplate.simulator.design import Design, offset_sensitivity
 from ballplate.simulator.estimation import (
     Coordinates,
@@ -106,7 +106,9 @@ def changes_of(
         return lambda balls: changes
     if isinstance(places, MeasuredPoints):
         chosen = (
-            np.arange(len(moves.places)) if wanted.pairs is not None else evenly(len(moves.places))
+            np.arange(len(moves.places))
+            if wanted.pairs is not None
+            else evenly_spread(len(moves.places), MOST_PLACES)
         )
         pairs = (
             np.stack(np.triu_indices(len(chosen), 1), axis=1)
@@ -123,7 +125,7 @@ def changes_of(
     cached: dict[bytes, Changes] = {}
 
     def among(balls: Integers) -> Changes:
-        selection = evenly(len(moves.places))
+        selection = evenly_spread(len(moves.places), MOST_PLACES)
         further = np.setdiff1d(np.flatnonzero(np.isin(places.labels, balls)), selection)
         first, second = np.triu_indices(len(selection), 1)
         ends = np.stack(
@@ -153,21 +155,10 @@ def across_probes(design: Design) -> Distances | None:
     probes = np.unique(design.tasks.probes)
     if set(probes.tolist()) <= {design.evaluation.probe}:
         return None
-    points = design.evaluation.points[evenly(len(design.evaluation.points))]
+    points = design.evaluation.points[evenly_spread(len(design.evaluation.points), MOST_PLACES)]
     points = points[:: max(-(-len(points) * len(probes) // MOST_PLACES), 1)]
     each = np.repeat(probes, len(points))
     return Distances(MeasuredPoints(np.tile(points, (len(probes), 1)), each))
-
-
-def evenly(count: int) -> Integers:
-    """Return up to `MOST_PLACES` evenly spread indices of `count`.
-
-    >>> evenly(3).tolist(), len(evenly(1000)), int(evenly(1000)[-1])
-    ([0, 1, 2], 200, 999)
-    """
-    if count <= MOST_PLACES:
-        return np.arange(count)
-    return np.linspace(0, count - 1, MOST_PLACES).round().astype(np.int64)
 
 
 def _direct(linearisation: Linearisation, places: MeasuredPoints, biases: Patterns) -> csc_array:

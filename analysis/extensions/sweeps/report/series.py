@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from ballplate.simulator.computing import evenly_spread
 from ballplate.simulator.machines import Array, Integers
 
 from ..store_columns import symbol_column
@@ -153,8 +154,7 @@ def evenly(axis: ReportAxis, most: int) -> list[int]:
         if axis.numbers
         else np.arange(len(axis.labels))
     )
-    chosen = np.unique(np.linspace(0, len(order) - 1, min(most, len(order))).round().astype(int))
-    return [int(i) for i in order[chosen]]
+    return [int(i) for i in order[evenly_spread(len(order), most)]]
 
 
 def setting_words(results: ReportedSweep, axes: Sequence[int], values: Integers) -> str:
