@@ -86,13 +86,10 @@ class Prediction(Result):
         was not computed, or without the extension.
         """
         lengths = self.quantities.get("U6")
+        if lengths is None or self.experiment is None or np.isnan(lengths.average):
+            return None
         effects = optional_service("assumption_effects")
-        if lengths is None or effects is None or self.experiment is None:
-            return None
-        if np.isnan(lengths.average):
-            return None
-        found: PredictedAssumptions = effects(self.experiment, lengths)
-        return found
+        return None if effects is None else effects(self.experiment, lengths)
 
     @property
     def tasks(self) -> tuple[TaskUncertainty, ...]:
