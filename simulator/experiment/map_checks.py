@@ -18,6 +18,7 @@ from ..inputs.trust import Trust
 from ..inputs.validation import validated
 from ..inputs.yamltree import Mapping as MappingNode
 from ..inputs.yamltree import Node, to_python
+from ..inputs.yamltree import Sequence as SequenceNode
 from ..machines.custom import CustomModelError
 from ..machines.protocol import Array, ErrorModel
 from ..machines.settings import (
@@ -61,7 +62,7 @@ def map_of_tree(
     problems.add_empty()
     # Before the kind of the error model, which is unknown without its extension.
     stated = root.items.get("extensions")
-    check_installed(() if stated is None else to_python(stated), problems)
+    check_installed(to_python(stated) if isinstance(stated, SequenceNode) else (), problems)
     if problems.messages:
         return None
     settings = validated(MapSettings, root, problems)

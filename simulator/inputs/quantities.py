@@ -524,10 +524,11 @@ def parse_common_part(value: object) -> LengthFunction:
     >>> parse_common_part("0.5 um/m")
     LengthFunction(constant=0.0, slope=5e-07)
     """
-    with suppress(QuantityError):
+    try:
         parse_ratio(value)
-        return parse_length_function(f"0 um + {value}")
-    return parse_length_function(value)
+    except QuantityError:
+        return parse_length_function(value)
+    return parse_length_function(f"0 um + {value}")
 
 
 def exact_ratio(value: str) -> Fraction:

@@ -181,6 +181,12 @@ EDITS: dict[str, tuple[Callable[[str], str], str, int, str]] = {
         1,
         "contradicts sigma, whose square times",
     ),
+    "extensions": (
+        lambda text: text.replace("error_model:", "extensions: 5\nerror_model:", 1),
+        "extensions:",
+        1,
+        "found the number 5",
+    ),
     "version": (lambda text: text.replace("map: 1", "map: 2"), "map:", 1, "found the number 2"),
     "key": (lambda text: text.replace("frame:", "fame:"), "fame:", 1, "unknown key"),
     "twice": (

@@ -201,6 +201,11 @@ def test_a_wrong_part_in_common_is_refused(
         written(tmp_path, item)
 
 
+def test_a_negative_part_in_common_is_told_as_such(tmp_path: Path) -> None:
+    with pytest.raises(bp.ExperimentError, match="negative part"):
+        written(tmp_path, distances(standard_uncertainty="1 um", common="-1 um/m"))
+
+
 def test_simulated_certificates_share_the_part_in_common(tmp_path: Path) -> None:
     """Of lengths with nothing but one common ratio, all differ from nominal by the same ratio."""
     item = distances(standard_uncertainty="0.0001 um", common="10 um/m")
