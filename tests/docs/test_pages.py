@@ -19,6 +19,8 @@ from ballplate.cli import parser
 from ballplate.simulator.experiment.json_schema import schema
 from ballplate.simulator.experiment.machine_sections import machine_schema
 
+from tests.reference.schemas import description
+
 DOCS = Path("docs")
 GUARD = (DOCS / "how-to/guard-designs.md").read_text(encoding="utf-8")
 
@@ -61,10 +63,6 @@ def test_the_pages_need_nothing_from_elsewhere(built: Path) -> None:
                 assert other in pages and name in pages[other].names, (path.name, address)
 
 
-def definition(whole: dict[str, Any], value: dict[str, Any]) -> dict[str, Any]:
-    return dict(whole["$defs"][value["$ref"].rpartition("/")[2]])
-
-
 def test_reference_pages_have_everything(built: Path) -> None:
     for page, whole in (("file-format", schema()), ("machine-files", machine_schema())):
         format_page = Page(built / f"reference/{page}.html").text
@@ -72,9 +70,8 @@ def test_reference_pages_have_everything(built: Path) -> None:
             for key, value in section["properties"].items():
                 assert key in format_page
                 # Typography aside.
-                # A key of an extension is described by its definition.
-                shown = value if "description" in value else definition(whole, value)
-                assert re.sub(r"\W+", " ", shown["description"]) in re.sub(
+                described = description(whole, value)
+                assert described and re.sub(r"\W+", " ", described) in re.sub(
                     r"\W+", " ", format_page
                 ), (key, value)
     command_page = Page(built / "reference/commands.html").text

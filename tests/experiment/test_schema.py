@@ -8,6 +8,8 @@ from ballplate.simulator.experiment.json_schema import schema
 from ballplate.simulator.experiment.sections import ExperimentSettings
 from ballplate.simulator.geometry.artefacts import ARTEFACTS
 
+from tests.reference.schemas import description
+
 DOCUMENTED = [
     "title",
     "description",
@@ -87,18 +89,12 @@ def test_it_is_a_plain_schema_of_the_right_draft() -> None:
             assert part["$ref"].removeprefix("#/$defs/") in written["$defs"]
 
 
-def definition(written: dict[str, Any], value: dict[str, Any]) -> dict[str, Any]:
-    return dict(written["$defs"][value["$ref"].rpartition("/")[2]]) if "$ref" in value else {}
-
-
 def test_sections_are_closed_and_described() -> None:
     written = schema()
     for name, section in {"": written, **written["$defs"]}.items():
         assert section["additionalProperties"] is False, name
         for key, value in section["properties"].items():
-            # A key of an extension is described by its definition.
-            shown = value if "description" in value else definition(written, value)
-            assert shown.get("description"), (name, key)
+            assert description(written, value), (name, key)
 
 
 def test_every_kind_of_artefact() -> None:
