@@ -99,9 +99,9 @@ class Prediction(Result):
     def headline(self) -> str:
         count = 0 if self.advice is None else len(self.advice.missed)
         missed = [f"{number_of(count, 'goal')} missed"] if count else []
-        doubled = [] if self.assumptions is None else filter(None, [self.assumptions.warning])
-        lengths = length_headline(self.quantities)
-        return ", ".join([rank_words(self.verdict), *lengths, *doubled, *missed])
+        doubled = "" if self.assumptions is None else self.assumptions.warning
+        parts = [rank_words(self.verdict), *length_headline(self.quantities), doubled, *missed]
+        return ", ".join(filter(None, parts))
 
     def lines(self) -> list[str]:
         lines = [*self.table_lines(), *(() if self.advice is None else self.advice.lines)]

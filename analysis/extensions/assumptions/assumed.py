@@ -80,8 +80,10 @@ def _certificates(experiment: Experiment, stated: Mapping[str, Any]) -> Predicti
     for entry in items:
         # Items of artefacts that are not placed are not used.
         item = used.pop(0) if used and _is_stated(used[0], entry) else None
-        is_independent = item is not None and _is_independent(experiment, item)
-        changed.append(_with_common(entry, item, stated) if is_independent else entry)
+        if item is not None and _is_independent(experiment, item):
+            changed.append(_with_common(entry, item, stated))
+        else:
+            changed.append(entry)
     differing = [new for new, old in zip(changed, items, strict=True) if new != old]
     if not differing:
         return None
@@ -115,7 +117,7 @@ def _is_independent(experiment: Experiment, item: Calibration) -> bool:
 
 
 def _with_common(
-    entry: Mapping[str, Any], item: Calibration | None, stated: Mapping[str, Any]
+    entry: Mapping[str, Any], item: Calibration, stated: Mapping[str, Any]
 ) -> dict[str, Any]:
     """Return an item with a part that its values have in common: that which grows with length."""
     if "common" in stated:
@@ -130,11 +132,17 @@ def _with_common(
     return {**entry, "correlation": CORRELATION}
 
 
-def _influence(experiment: Experiment, *added: dict[str, Any]) -> dict[str, Any] | None:
-    """Return the influence quantities with others, None where one of their kind is stated."""
+def _unless_stated(
+    experiment: Experiment, assumption: tuple[str, str, str, str], *added: dict[str, Any]
+) -> PredictionAssumption | None:
+    """Return an assumption that further influence quantities drop, None where one of their kind is
+    stated; name, assumed, instead and source are given.
+    """
     before = _section(experiment, "influences") or []
-    kinds = {entry.get("kind") for entry in before}
-    return None if kinds & {entry["kind"] for entry in added} else {"influences": [*before, *added]}
+    kinds = {entry["kind"] for entry in added}
+    if not added or any(entry.get("kind") in kinds for entry in before):
+        return None
+    return PredictionAssumption(*assumption, {"influences": [*before, *added]})
 
 
 def _temperature(experiment: Experiment, stated: Mapping[str, Any]) -> PredictionAssumption | None:
@@ -148,50 +156,36 @@ def _temperature(experiment: Experiment, stated: Mapping[str, Any]) -> Predictio
         "scale_expansion": expansion,
         "scale_temperature": measured,
     }
-    changes = _influence(experiment, added)
-    if changes is None:
-        return None
-    return PredictionAssumption(
-        "temperature",
-        "temperatures exactly known",
-        f"known to {u}, in all positions alike and in each",
-        "thermometers of a measuring room; both of steel",
-        changes,
-    )
+    instead = f"known to {u}, in all positions alike and in each"
+    source = "thermometers of a measuring room; both of steel"
+    words = ("temperature", "temperatures exactly known", instead, source)
+    return _unless_stated(experiment, words, added)
 
 
 def _sag(experiment: Experiment, stated: Mapping[str, Any]) -> PredictionAssumption | None:
     u = stated.get("sag", "0.3 um")
     plates = [name for name, entry in experiment.artefacts.items() if entry.role == "plate"]
     added = [{"kind": "sag", "artefact": name, "standard_uncertainty": u} for name in plates]
-    changes = _influence(experiment, *added) if added else None
-    if changes is None:
-        return None
     source = "a steel plate of half a metre on three supports"
-    return PredictionAssumption("sag", "rigid plates", f"largest sag known to {u}", source, changes)
+    words = ("sag", "rigid plates", f"largest sag known to {u}", source)
+    return _unless_stated(experiment, words, *added)
 
 
 def _drift(experiment: Experiment, stated: Mapping[str, Any]) -> PredictionAssumption | None:
     u = stated.get("drift", "0.3 um/h")
-    changes = _influence(experiment, {"kind": "drift", "axes": {"standard_uncertainty": u}})
-    if changes is None:
-        return None
     source = "test of environmental drift, ISO 230-3"
-    return PredictionAssumption(
-        "drift", "no drift", f"known to {u} along each axis", source, changes
-    )
+    words = ("drift", "no drift", f"known to {u} along each axis", source)
+    added = {"kind": "drift", "axes": {"standard_uncertainty": u}}
+    return _unless_stated(experiment, words, added)
 
 
 def _reindexing(experiment: Experiment, stated: Mapping[str, Any]) -> PredictionAssumption | None:
-    u = stated.get("reindexing", "0.3 um")
-    added = {"kind": "re-indexing", "standard_uncertainty": u}
-    changes = _influence(experiment, added)
-    if changes is None or _section(experiment, "head") is None:
+    if _section(experiment, "head") is None:
         return None
+    u = stated.get("reindexing", "0.3 um")
     source = "data sheets of indexing heads"
-    return PredictionAssumption(
-        "re-indexing", "exact re-indexing", f"known to {u} each time", source, changes
-    )
+    words = ("re-indexing", "exact re-indexing", f"known to {u} each time", source)
+    return _unless_stated(experiment, words, {"kind": "re-indexing", "standard_uncertainty": u})
 
 
 def _scatter(experiment: Experiment, stated: Mapping[str, Any]) -> PredictionAssumption | None:

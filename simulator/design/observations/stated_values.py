@@ -110,14 +110,12 @@ def check_keys(settings: Any, steps: Steps, references: References) -> bool:
     for key, fits, instead in (
         ("result", digital, "goes with values in a DCC (XML)"),
         ("coverage_factor", of_file and not digital, "goes with values in a CSV file"),
-        ("covariance", not digital, OWN_COVARIANCE),
-        ("common", not digital, OWN_COVARIANCE),
-        ("correlation", not digital, OWN_COVARIANCE),
+        *((key, not digital, OWN_COVARIANCE) for key in JOINT_KEYS),
     ):
         if getattr(settings, key, None) is not None and not fits:
             references.problems.add((*steps, key), f"{instead}; remove it", of_key=True)
             is_right = False
-    joint = [key for key in JOINT_KEYS if getattr(settings, key, None) is not None]
+    joint = _joint_keys(settings)
     for key in joint[1:]:
         text = f"{joint[0]} states how values are correlated already; remove one of the two"
         references.problems.add((*steps, key), text, of_key=True)
@@ -125,9 +123,14 @@ def check_keys(settings: Any, steps: Steps, references: References) -> bool:
     return is_right
 
 
+def _joint_keys(settings: Any) -> list[str]:
+    """Return the keys of an item that state how its values are correlated."""
+    return [key for key in JOINT_KEYS if getattr(settings, key, None) is not None]
+
+
 def joint_key(settings: Any) -> str:
     """Return the key of an item that states how its values are correlated, or "values"."""
-    return next((key for key in JOINT_KEYS if getattr(settings, key, None) is not None), "values")
+    return next(iter(_joint_keys(settings)), "values")
 
 
 def value_name(names: tuple[str, str], is_pair: bool) -> str:
