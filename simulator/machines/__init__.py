@@ -23,7 +23,7 @@ if TYPE_CHECKING:
         true_volumetric,
     )
     from .empirical import USUAL_OFFSET, EmpiricalModel
-    from .empirical_settings import OF_BASIS, EmpiricalSettings
+    from .empirical_settings import EmpiricalSettings, has_polynomials
     from .error_names import AXIS_ERRORS, SQUARENESS_ERRORS, SquarenessError
     from .kinematic import ErrorFunction, KinematicModel, carried_vectors, error_function
     from .kinematic_settings import FunctionsSettings, KinematicSettings

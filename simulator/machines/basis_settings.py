@@ -114,7 +114,8 @@ class SplineSettings(Settings):
         return Spline(self.order, with_boundaries(self.knots, self.features, self.order), ends=ends)
 
 
-BasisSettings = Forms[Literal["chebyshev", "monomial"], SplineSettings, SplineSettings]
+Polynomials = Literal["chebyshev", "monomial"]
+BasisSettings = Forms[Polynomials, SplineSettings, SplineSettings]
 BASIS = (
     "Univariate functions: chebyshev or monomial polynomials, or B-splines as {order: 4, knots:"
     " [0.5]}, also with features: [0.3], slopes: {start: 0, end: 0} or periodic: true."

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Annotated, Literal, Self
+from typing import Annotated, Any, Literal, Self
 
 import numpy as np
-from pydantic import Field, model_validator
+from pydantic import ConfigDict, Discriminator, Field, Tag, model_validator
 
 from ..inputs.settings import Forms, Settings
 from .bases import Basis
@@ -15,6 +15,7 @@ from .empirical import FrameError, empirical_model
 from .model_kinds import Corner, ErrorModelKind
 from .protocol import ErrorModel
 from .terms import (
+    VARIABLES,
     WITH_CONSTANT,
     Products,
     Radial,
@@ -29,7 +30,7 @@ from .terms import (
 
 Centres = Annotated[int, Field(ge=2, le=8)]
 MOST_INTERIOR = 6
-OF_BASIS: dict[str, Callable[[Basis], Products]] = {
+OF_BASIS: dict[str, Callable[..., Products]] = {
     "sums": sums,
     "univariate": univariate,
     "tensor": tensor,
@@ -84,15 +85,60 @@ TERMS = (
     " functions, quadratic polynomials, full tensor products, or radial basis functions as"
     " {centres: [3, 3, 3], constant: 0.5}."
 )
-COEFFICIENTS = "Coefficients of each univariate polynomial, the constant included."
+_Count = Annotated[int, Field(ge=2, le=12)]
+
+
+class BasisByAxis(Settings):
+    """Univariate functions of x, y and z."""
+
+    # An empty mapping states splines without knots along all axes.
+    model_config = ConfigDict(json_schema_extra={"minProperties": 1})
+
+    x: BasisSettings = Field(default="chebyshev", description="functions of x")
+    y: BasisSettings = Field(default="chebyshev", description="functions of y")
+    z: BasisSettings = Field(default="chebyshev", description="functions of z")
+
+    @model_validator(mode="before")
+    @classmethod
+    def _no_key_of_all_axes(cls, stated: Any) -> Any:
+        for key in stated:
+            if key in SplineSettings.model_fields:
+                raise ValueError(f'"{key}" is a key of splines; move it into x, y or z')
+        return stated
+
+
+class CoefficientsByAxis(Settings):
+    """Coefficients of univariate polynomials of x, y and z, the constant included."""
+
+    x: _Count = Field(default=3, description="coefficients of polynomials of x")
+    y: _Count = Field(default=3, description="coefficients of polynomials of y")
+    z: _Count = Field(default=3, description="coefficients of polynomials of z")
+
+
+def _basis_form(value: Any) -> str:
+    stated = value.keys() if isinstance(value, dict) else ()
+    is_by_axis = isinstance(value, BasisByAxis) or not set(VARIABLES).isdisjoint(stated)
+    return "<axes>" if is_by_axis else "<one>"
+
+
+AnyBasis = Annotated[
+    Annotated[BasisSettings, Tag("<one>")] | Annotated[BasisByAxis, Tag("<axes>")],
+    Discriminator(_basis_form),
+]
+AnyCoefficients = Forms[_Count, CoefficientsByAxis, CoefficientsByAxis]
+COEFFICIENTS = (
+    "Coefficients of each univariate polynomial, the constant included; by axis as {x: 5, y: 3, z:"
+    " 2}."
+)
+BASIS_BY_AXIS = f"{BASIS[:-1]}; by axis as {{x: {{order: 4}}, y: monomial}}."
 
 
 class RotationFunctionsSettings(Settings):
     """Functions of x, y and z for the rotations."""
 
     terms: TermsSettings = Field(default="sums", description=TERMS)
-    basis: BasisSettings = Field(default="chebyshev", description=BASIS)
-    coefficients: int = Field(default=3, ge=2, le=12, description=COEFFICIENTS)
+    basis: AnyBasis = Field(default="chebyshev", description=BASIS_BY_AXIS)
+    coefficients: AnyCoefficients = Field(default=3, description=COEFFICIENTS)
 
     @model_validator(mode="after")
     def _what_belongs_together(self) -> Self:
@@ -105,8 +151,8 @@ class EmpiricalSettings(Settings):
 
     kind: Literal["empirical"] = Field(description="six functions of x, y and z")
     terms: TermsSettings = Field(default="sums", description=TERMS)
-    basis: BasisSettings = Field(default="chebyshev", description=BASIS)
-    coefficients: int = Field(default=3, ge=2, le=12, description=COEFFICIENTS)
+    basis: AnyBasis = Field(default="chebyshev", description=BASIS_BY_AXIS)
+    coefficients: AnyCoefficients = Field(default=3, description=COEFFICIENTS)
     rotations: Literal["linearised", "full"] = Field(
         default="linearised",
         description=(
@@ -130,27 +176,53 @@ class EmpiricalSettings(Settings):
         return self
 
 
+def _by_axis(stated: Any) -> list[Any]:
+    """Return the values for x, y and z of a key that states one for all or each."""
+    if isinstance(stated, BasisByAxis | CoefficientsByAxis):
+        return [getattr(stated, axis) for axis in VARIABLES]
+    return [stated] * 3
+
+
+def has_polynomials(settings: EmpiricalSettings | RotationFunctionsSettings) -> bool:
+    """True if the functions along some axis are polynomials of stated numbers of coefficients."""
+    return settings.terms in tuple(OF_BASIS) and not all(
+        isinstance(basis, SplineSettings) for basis in _by_axis(settings.basis)
+    )
+
+
 def _check(settings: EmpiricalSettings | RotationFunctionsSettings) -> None:
     """Refuse keys that contradict each other.
 
     :raises ValueError: some do.
     """
-    terms, basis = settings.terms, settings.basis
+    terms, coefficients = settings.terms, settings.coefficients
+    bases = _by_axis(settings.basis)
     if isinstance(terms, RadialSettings):
         without(settings, ("basis", "coefficients"), "radial basis functions")
     elif terms == "quadratic":
         without(settings, ("basis", "coefficients"), "quadratic terms")
-    elif isinstance(basis, SplineSettings):
+    elif not has_polynomials(settings):
         without(settings, ("coefficients",), "splines, which have an order and knots")
-    if terms == "tensor" and isinstance(basis, SplineSettings) and basis.slopes is not None:
+    elif isinstance(coefficients, CoefficientsByAxis):
+        for axis, basis in zip(VARIABLES, bases, strict=True):
+            if isinstance(basis, SplineSettings):
+                without(coefficients, (axis,), f"splines along {axis}")
+    if terms != "tensor":
+        return
+    if any(isinstance(basis, SplineSettings) and basis.slopes is not None for basis in bases):
         raise ValueError(
             "full tensor products have the factors x, y and z, whose slope is not 0; remove slopes"
         )
-    if terms == "tensor" and basis_of(basis, settings.coefficients).interior().size > MOST_INTERIOR:
+    if any(basis.interior().size > MOST_INTERIOR for basis in _bases(settings)):
         raise ValueError(
             f"full tensor products have at most {MOST_INTERIOR + 2} functions along an axis; give"
             " fewer, or sums"
         )
+
+
+def _bases(settings: EmpiricalSettings | RotationFunctionsSettings) -> tuple[Basis, ...]:
+    """Return the univariate functions of x, y and z."""
+    return tuple(map(basis_of, _by_axis(settings.basis), _by_axis(settings.coefficients)))
 
 
 def _terms(settings: EmpiricalSettings | RotationFunctionsSettings) -> Terms:
@@ -158,7 +230,7 @@ def _terms(settings: EmpiricalSettings | RotationFunctionsSettings) -> Terms:
         return settings.terms.terms()
     if settings.terms == "quadratic":
         return quadratic()
-    return OF_BASIS[settings.terms](basis_of(settings.basis, settings.coefficients))
+    return OF_BASIS[settings.terms](*_bases(settings))
 
 
 def _empirical(settings: EmpiricalSettings, lower: Corner, upper: Corner) -> ErrorModel:

@@ -76,11 +76,9 @@ class Products:
 
     def quoted(self) -> Quoted:
         """Return coefficients of monomials; splines remain unchanged, with t and 1 among them."""
-        if any(isinstance(axis, Spline) for axis in self.axes):
+        if all(isinstance(axis, Spline) for axis in self.axes):
             return Quoted(self.names, np.eye(len(self.names)))
-        by_axis = [
-            axis.quoted_whole(variable) for axis, variable in zip(self.axes, VARIABLES, strict=True)
-        ]
+        by_axis = list(map(_quoted, self.axes, VARIABLES))
         rows = {}
         for powers in product(*(range(len(quoted.names)) for quoted in by_axis)):
             row = np.array(
@@ -104,60 +102,80 @@ class Products:
         return Quoted(tuple(rows), matrix)
 
 
-def sums(basis: Basis) -> Products:
+def _quoted(basis: Basis, variable: str) -> Quoted:
+    """Return 1, the variable and its interior functions by monomials, or as splines."""
+    if not isinstance(basis, Spline):
+        return basis.quoted_whole(variable)
+    size = basis.interior().size
+    names = ("", variable, *(f"s{k + 1}({variable})" for k in range(size)))
+    return Quoted(names, np.eye(2 + size))
+
+
+def _axes(bases: tuple[Basis, ...]) -> tuple[tuple[Basis, Basis, Basis], list[range]]:
+    """Return the families of x, y and z, of three or of one for all, and indices of the functions
+    of each.
+    """
+    x, y, z = bases * (3 // len(bases))
+    return (x, y, z), [range(2 + basis.interior().size) for basis in (x, y, z)]
+
+
+def sums(*bases: Basis) -> Products:
     """Return sums of tensor products without redundancy: 1, x, y, z, xy, xz, yz and, for each
     interior function s and variable such as x, s(x), s(x) y, s(x) z.
+
+    `bases` are one family for all axes or those of x, y and z.
+
+    >>> sums(Spline(3), Monomial(2), Monomial(2)).names[7:]
+    ('s1(x)', 's1(x)*y', 's1(x)*z')
     """
-    inner = range(2, 2 + basis.interior().size)
+    axes, indices = _axes(bases)
     factors = [(0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1), (1, 1, 0), (1, 0, 1), (0, 1, 1)]
     for axis in range(3):
         across = [k for k in range(3) if k != axis]
-        for index in inner:
+        for index in indices[axis][2:]:
             for linear in (None, *across):
                 term = [0, 0, 0]
                 term[axis] = index
                 if linear is not None:
                     term[linear] = 1
                 factors.append((term[0], term[1], term[2]))
-    return Products((basis, basis, basis), tuple(factors))
+    return Products(axes, tuple(factors))
 
 
-def univariate(basis: Basis) -> Products:
+def univariate(*bases: Basis) -> Products:
     """Return plain sums of univariate functions: 1, x, y, z and the interior functions of each.
 
     >>> univariate(Spline(3)).names
     ('1', 'x', 'y', 'z', 's1(x)', 's1(y)', 's1(z)')
     """
+    axes, indices = _axes(bases)
     units = np.eye(3, dtype=int)
     rows = [np.zeros(3, int), *units]
-    rows += [index * unit for unit in units for index in range(2, 2 + basis.interior().size)]
-    return Products((basis, basis, basis), tuple((int(i), int(j), int(k)) for i, j, k in rows))
+    rows += [index * unit for unit, own in zip(units, indices, strict=True) for index in own[2:]]
+    return Products(axes, tuple((int(i), int(j), int(k)) for i, j, k in rows))
 
 
 def no_terms() -> Products:
     """Return no functions."""
-    basis = Monomial(2)
-    return Products((basis, basis, basis), ())
+    return Products(_axes((Monomial(2),))[0], ())
 
 
 def quadratic() -> Products:
     """Return all polynomials of degree 2: 1, x, y, z, xy, xz, yz and s(x) = x - x^2, s(y),
     s(z).
     """
-    basis = Monomial(3)
-    factors = [term for term in _triples(3) if sum(term) <= 2]
-    return Products(
-        (basis, basis, basis), tuple(sorted(factors, key=lambda term: (max(term), sum(term))))
+    products = tensor(Monomial(3))
+    factors = sorted(
+        (term for term in products.factors if sum(term) <= 2),
+        key=lambda term: (max(term), sum(term)),
     )
+    return Products(products.axes, tuple(factors))
 
 
-def tensor(basis: Basis) -> Products:
+def tensor(*bases: Basis) -> Products:
     """Return all products of a function of x, one of y and one of z."""
-    return Products((basis, basis, basis), tuple(_triples(2 + basis.interior().size)))
-
-
-def _triples(count: int) -> list[tuple[int, int, int]]:
-    return [(i, j, k) for i in range(count) for j in range(count) for k in range(count)]
+    axes, (x, y, z) = _axes(bases)
+    return Products(axes, tuple(product(x, y, z)))
 
 
 RadialName = Literal[

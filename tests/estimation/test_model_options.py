@@ -128,6 +128,13 @@ PRODUCTS = [
     lambda t: t[:, 0] * t[:, 1], lambda t: t[:, 0] * t[:, 2], lambda t: t[:, 1] * t[:, 2]
 ]  # fmt: skip
 ALL_OF_DEGREE_2 = [*LINEAR, *PRODUCTS, *SQUARES[::2]]
+# Powers of x and splines of order 3 along y, each also times both other co-ordinates.
+WITH_LINEAR = [
+    lambda t, f=f, k=k, j=j: f(t[:, k]) * (t[:, j] if j != k else 1.0)  # type: ignore[misc]
+    for k, functions in ((0, powers(4)[1:]), (1, splines(3, (0.4,))[1:]))
+    for f in functions
+    for j in range(3)
+]
 
 # Settings, dimension, and the same as columns.
 OPTIONS: dict[str, tuple[dict[str, Any], int, list[Column]]] = {
@@ -151,6 +158,18 @@ OPTIONS: dict[str, tuple[dict[str, Any], int, list[Column]]] = {
         {"kind": "empirical", "terms": "univariate", "coefficients": 4},
         3,
         empirical([*LINEAR, *SQUARES], [*LINEAR, *SQUARES], *CORNERS[3]),
+    ),
+    "functions by axis": (
+        {"kind": "empirical", "terms": "sums",
+         "basis": {"x": "monomial", "y": {"order": 3, "knots": [0.4]}},
+         "coefficients": {"x": 4, "z": 2},
+         "rotation_functions": {"terms": "univariate", "coefficients": {"x": 2, "z": 4}}},
+        3,
+        empirical(
+            [*LINEAR, *PRODUCTS, *WITH_LINEAR],
+            [*LINEAR, lambda t: t[:, 1] ** 2, lambda t: t[:, 2] ** 2, lambda t: t[:, 2] ** 3],
+            *CORNERS[3],
+        ),
     ),
     "smaller rotations": (
         {"kind": "empirical", "terms": "quadratic",

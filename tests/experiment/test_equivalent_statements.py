@@ -722,6 +722,10 @@ PAIRS: dict[str, Pair] = {
             | {"rotation_functions": {"terms": "univariate", "coefficients": 3}}
         },
     ),
+    "functions of an empirical model by axis": Pair(
+        {"error_model": EMPIRICAL},
+        {"error_model": EMPIRICAL | {"basis": {"y": "chebyshev"}, "coefficients": {"x": 3}}},
+    ),
     "empirical model in splines": Pair(
         {"error_model": EMPIRICAL},
         {"error_model": {"kind": "empirical", "terms": "univariate", "basis": SPLINE}},

@@ -105,6 +105,23 @@ SECTIONS = [
         '5:14: error_model: "coefficients" has no meaning with quadratic terms; remove it']),
     ("error_model: {kind: kinematic}", "error_model: {kind: empirical, terms: {centres: [3, 1, 3]}}", [
         "5:53: error_model.terms.centres[1]: the number 1 is out of range; give one at least 2"]),
+    ("error_model: {kind: kinematic}", "error_model: {kind: empirical, coefficients: [3, 4, 3]}", [
+        "5:46: error_model.coefficients: expected a mapping, key: value, found a list (Coefficients of each univariate polynomial, the constant included; by axis as {x: 5, y: 3, z: 2})"]),
+    ("error_model: {kind: kinematic}", "error_model: {kind: empirical, coefficients: {x: 3, z: 1}}", [
+        "5:56: error_model.coefficients.z: the number 1 is out of range; give one at least 2"]),
+    ("error_model: {kind: kinematic}", "error_model: {kind: empirical, coefficients: {x: 3, w: 3}}", [
+        "5:53: error_model.coefficients.w: unknown key; known: y, z"]),
+    ("error_model: {kind: kinematic}", "error_model: {kind: empirical, basis: {y: {order: 3}, order: 3}}", [
+        '5:39: error_model.basis: "order" is a key of splines; move it into x, y or z']),
+    ("error_model: {kind: kinematic}", "error_model: {kind: empirical, basis: {x: monomial, y: {order: 1}, z: spline}}", [
+        "5:64: error_model.basis.y.order: the number 1 is out of range; give one at least 2",
+        '5:71: error_model.basis.z: unknown value "spline"; allowed: chebyshev, monomial']),
+    ("error_model: {kind: kinematic}", "error_model: {kind: empirical, basis: {y: {order: 3}}, coefficients: {y: 3}}", [
+        '5:14: error_model: "y" has no meaning with splines along y; remove it']),
+    ("error_model: {kind: kinematic}", "error_model: {kind: empirical, terms: quadratic, basis: {y: {order: 3}}}", [
+        '5:14: error_model: "basis" has no meaning with quadratic terms; remove it']),
+    ("error_model: {kind: kinematic}", "error_model: {kind: empirical, terms: tensor, coefficients: {y: 9}}", [
+        "5:14: error_model: full tensor products have at most 8 functions along an axis; give fewer, or sums"]),
     ("error_model: {kind: kinematic}", "error_model: {kind: empirical, terms: tensor, coefficients: 9}", [
         "5:14: error_model: full tensor products have at most 8 functions along an axis; give fewer, or sums"]),
     ("error_model: {kind: kinematic}",

@@ -82,6 +82,14 @@ MODELS: dict[str, tuple[dict[str, Any], dict[str, Any]]] = {
     ),
     "plane": (IN_PLANE, {"kind": "kinematic", **SMALL}),
     "empirical": (IN_SPACE, {"kind": "empirical", "terms": "quadratic"}),
+    "functions by axis": (
+        IN_SPACE,
+        {
+            "kind": "empirical",
+            "basis": {"y": {"order": 3}},
+            "coefficients": {"x": 3, "z": 2},
+        },
+    ),
     "estimated probe": (IN_SPACE | {"probes": FREE}, {"kind": "metric"}),
     "machine file": (IN_SPACE, {"kind": "machine", "file": "machine.yaml"}),
     "python": (IN_SPACE, {"kind": "python", "object": "MODULE:build"}),

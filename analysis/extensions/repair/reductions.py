@@ -10,11 +10,11 @@ from typing import Any
 from ballplate.simulator.experiment import Experiment
 from ballplate.simulator.geometry import GridSettings, SquareSettings
 from ballplate.simulator.machines import (
-    OF_BASIS,
     EmpiricalSettings,
     KinematicSettings,
     MachineFileSettings,
     SplineSettings,
+    has_polynomials,
 )
 
 from .changes import Change, ChangeKind, with_artefact
@@ -77,27 +77,26 @@ def fewer_coefficients(experiment: Experiment) -> Iterator[Change]:
             # Of one coefficient there would be no rotational errors at all.
             ("rotation_coefficients", 2, "coefficients of rotational errors"),
         )
-    elif isinstance(model, EmpiricalSettings) and model.terms in tuple(OF_BASIS):
-        keys = (
-            ()
-            if isinstance(model.basis, SplineSettings)
-            else (("coefficients", 2, "coefficients"),)
-        )
+    elif isinstance(model, EmpiricalSettings) and has_polynomials(model):
+        keys = (("coefficients", 2, "coefficients"),)
     elif isinstance(model, MachineFileSettings):
         keys = (("knots", 0, "interior knots"),)
     for key, least, words in keys:
-        now = getattr(model, key)
-        for value in range(now - 1, max(now - MOST_COEFFICIENTS_LESS, least) - 1, -1):
-            new = model.model_copy(update={key: value})
-            apply = partial(replace, error_model=new)
-            coefficients = (
-                words
-                if value != 1
-                else words.replace("coefficients", "coefficient").replace("knots", "knot")
-            )
-            description = (
-                f"estimate {value} {coefficients} instead of {now}, holding the others at zero"
-            )
-            yield Change(
-                ChangeKind.MODEL, description, float(now - value), frozenset({"model"}), apply
-            )
+        stated = getattr(model, key)
+        along = {"": stated} if isinstance(stated, int) else stated.model_dump(exclude_unset=True)
+        for axis, now in along.items():
+            for value in range(now - 1, max(now - MOST_COEFFICIENTS_LESS, least) - 1, -1):
+                new: Any = stated.model_copy(update={axis: value}) if axis else value
+                apply = partial(replace, error_model=model.model_copy(update={key: new}))
+                coefficients = (
+                    words
+                    if value != 1
+                    else words.replace("coefficients", "coefficient").replace("knots", "knot")
+                )
+                description = (
+                    f"estimate {value} {coefficients}{axis and f' along {axis}'} instead of {now},"
+                    " holding the others at zero"
+                )
+                yield Change(
+                    ChangeKind.MODEL, description, float(now - value), frozenset({"model"}), apply
+                )

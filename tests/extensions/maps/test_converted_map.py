@@ -93,6 +93,19 @@ def test_what_a_poorer_model_loses_is_told() -> None:
     assert wording.CANNOT_FOLLOW_THE_OLD_ONE_EXACTLY in found.lines()[3]
 
 
+def test_a_model_with_functions_by_axis_contains_one_of_the_same_degrees() -> None:
+    """Splines of order 3 without knots are the polynomials of three coefficients."""
+    by_axis = "{kind: empirical, basis: {x: {order: 4}, y: {order: 3}}, coefficients: {z: 3}}"
+    found = bp.convert(fitted(), by_axis)
+    assert found.is_exact
+    points = np.random.default_rng(2).random((30, 3))
+    before, after = (corrected(one, points)[0] for one in (fitted(), found.map))
+    np.testing.assert_allclose(before, after, atol=1e-14)
+    back = bp.convert(found.map, "{kind: empirical, coefficients: 4}")
+    np.testing.assert_allclose(corrected(back.map, points)[0], before, atol=1e-14)
+    assert not bp.convert(fitted(), by_axis.replace("z: 3", "z: 2")).is_exact
+
+
 def test_what_is_undetermined_stays_so() -> None:
     old = fitted(deficient=True)
     assert old.undetermined.shape[1] > 0

@@ -19,6 +19,7 @@ from ballplate.extensions.repair.covering import different
 from ballplate.extensions.repair.judging import examine, judge
 from ballplate.extensions.repair.mending import mended, to_write
 from ballplate.extensions.repair.offers import offers
+from ballplate.extensions.repair.reductions import fewer_coefficients
 from ballplate.extensions.repair.repair_search import Repair, Repairs, repairs
 from ballplate.extensions.repair.repair_tables import repair_lines
 from ballplate.extensions.repair.screening import rank_of, seen_by
@@ -381,6 +382,24 @@ def loaded(said: dict[str, Any], folder: Path) -> Experiment:
     path.write_text(yaml.safe_dump(said), encoding="utf-8")
     (found,) = load(path)
     return found
+
+
+def test_coefficients_are_reduced_along_each_axis_of_polynomials(tmp_path: Path) -> None:
+    said = one_plane()
+    said["error_model"] = {"kind": "empirical", "basis": {"y": {"order": 3}},
+                           "coefficients": {"x": 4, "z": 3}}  # fmt: skip
+    changes = list(fewer_coefficients(loaded(said, tmp_path)))
+    assert [one.words.partition(" instead")[0] for one in changes] == [
+        "estimate 3 coefficients along x",
+        "estimate 2 coefficients along x",
+        "estimate 2 coefficients along z",
+    ]
+    changed = [one.apply(loaded(said, tmp_path)).error_model for one in changes]
+    for model, counts in zip(
+        changed, ({"x": 3, "z": 3}, {"x": 2, "z": 3}, {"x": 4, "z": 2}), strict=True
+    ):
+        said["error_model"]["coefficients"] = counts
+        assert model == loaded(said, tmp_path).error_model
 
 
 @pytest.mark.parametrize("trap", sorted(TRAPS))
