@@ -33,6 +33,7 @@ if TYPE_CHECKING:
         moved,
         newton_step,
     )
+    from .held import holding
     from .initial import initial_state
     from .linearisation import LinearFunctions, Linearisation, linearise
     from .spheres import FEWEST_POINTS, FLAT, SphereFit, closest_sphere, fit_sphere

@@ -23,6 +23,9 @@ EXCHANGED = {
     for first, second in (pair, pair[::-1])
 }
 
+# Entries of the file whose changes add parameters.
+ADDING = {"probes", "influences", "error_model"}
+
 
 @dataclass(frozen=True)
 class PredictionAssumption:
@@ -39,6 +42,11 @@ class PredictionAssumption:
     source: str
     changes: Mapping[str, Any]
     is_systematic: bool = False
+
+    @property
+    def adds_parameters(self) -> bool:
+        """True if the changes only add parameters to those that are estimated."""
+        return not self.is_systematic and self.changes.keys() <= ADDING
 
 
 def assumptions_of(experiment: Experiment) -> list[PredictionAssumption]:

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from ballplate.presentation import Data, MainTable, Result, aligned, given, number, picked
 from ballplate.simulator.computing import evenly_spread, single_threaded
-from ballplate.simulator.design import Design, State
-from ballplate.simulator.estimation import linearise, moved, newton_step
+from ballplate.simulator.design import Design, State, shared_layout
+from ballplate.simulator.estimation import holding, linearise, moved, newton_step
 from ballplate.simulator.experiment import Experiment, lay_out, placed_only
 from ballplate.simulator.inputs import ExperimentError, yaml_text
 from ballplate.simulator.machines import Array, ErrorModel
@@ -156,10 +157,14 @@ def predicted_assumptions(experiment: Experiment) -> Assumptions:
 @single_threaded
 def assumption_effects(experiment: Experiment, lengths: Quantity) -> Assumptions:
     """Return the effects of all assumptions of a prediction on its U6, `lengths`."""
+    assumptions = assumptions_of(experiment)
+    together = _together(experiment, [each for each in assumptions if not each.is_systematic])
+    found = {} if together is None else _with_parameters(experiment, together, assumptions)
     effects, left_out = [], []
-    for assumption in assumptions_of(experiment):
+    for assumption in assumptions:
         try:
-            effects.append(_effect(experiment, assumption, lengths))
+            quantity = found.get(assumption.name)
+            effects.append(_effect(experiment, assumption, lengths, together, quantity))
         except ExperimentError as error:
             left_out.append((assumption.name, error.messages[0].text))
     # Undetermined distances cost more than any uncertainty.
@@ -174,30 +179,86 @@ def assumption_effects(experiment: Experiment, lengths: Quantity) -> Assumptions
     )
 
 
+def _together(
+    experiment: Experiment, assumptions: Sequence[PredictionAssumption]
+) -> Experiment | None:
+    """Return the experiment without all assumptions at once; None if no file can state that."""
+    stated, entries = len(experiment.influences), dict[str, Any]()
+    for assumption in assumptions:
+        for key, value in assumption.changes.items():
+            # Influence quantities are added to those of the file, other entries replaced.
+            entries[key] = [*entries[key], *value[stated:]] if key in entries else value
+    try:
+        return _with_choice(experiment, experiment.with_(entries))
+    except ExperimentError:
+        return None
+
+
+def _with_parameters(
+    experiment: Experiment, together: Experiment, assumptions: Sequence[PredictionAssumption]
+) -> dict[str, Quantity]:
+    """Return U6 without each assumption that further parameters drop, by name: from one
+    linearisation with the parameters of all, in which those of the others are held.
+    """
+    added = [each for each in assumptions if each.adds_parameters]
+    try:
+        at = linearise(lay_out(_entries_of(together, experiment, added)))
+    except ExperimentError:
+        return {}
+    layout, stated = at.layout, len(experiment.influences)
+    present = {parameter.name for parameter in lay_out(experiment).once(shared_layout).parameters}
+    further = {p.name: k for k, p in enumerate(layout.parameters) if p.name not in present}
+    influences, found = iter(at.design.influences[stated:]), {}
+    for assumption in added:
+        kinds = assumption.changes.get("influences", ())[stated:]
+        names = {
+            p.name
+            for _, influence in zip(kinds, influences, strict=False)
+            for p in influence.parameters
+        }
+        part = layout.offsets if "probes" in assumption.changes else layout.model
+        held = [
+            column
+            for name, column in further.items()
+            if (name not in names if kinds else not part.start <= column < part.stop)
+        ]
+        without = holding(at, np.array(held, np.int64))
+        found[assumption.name] = uncertainties(without, symbols=("U6",))["U6"]
+    return found
+
+
+def _entries_of(
+    together: Experiment, experiment: Experiment, assumptions: Sequence[PredictionAssumption]
+) -> Experiment:
+    """Return the experiment with the entries that some assumptions change."""
+    keys = {key for assumption in assumptions for key in assumption.changes}
+    return replace(experiment, **{key: getattr(together, key) for key in keys})
+
+
 def _effect(
-    experiment: Experiment, assumption: PredictionAssumption, lengths: Quantity
+    experiment: Experiment,
+    assumption: PredictionAssumption,
+    lengths: Quantity,
+    together: Experiment | None,
+    found: Quantity | None,
 ) -> AssumptionEffect:
-    """Return the effect of an assumption.
+    """Return the effect of an assumption, without which U6 is `found` if that is computed.
 
     :raises ExperimentError: the experiment cannot be changed so.
     """
-    changed = _with_choice(experiment, experiment.with_(assumption.changes))
+    bias = None
     if assumption.is_systematic:
-        bias = _bias(experiment, changed)
-        average, maximum = (
-            float(np.hypot(value, part))
-            for value, part in zip((lengths.average, lengths.maximum), bias, strict=True)
-        )
-        ratio = average / lengths.average
-        return AssumptionEffect(assumption, average, maximum, lengths.undetermined, ratio, bias)
-    found = uncertainties(linearise(lay_out(changed)), symbols=("U6",))["U6"]
-    return AssumptionEffect(
-        assumption,
-        found.average,
-        found.maximum,
-        found.undetermined,
-        found.average / lengths.average,
-    )
+        changed = _with_choice(experiment, experiment.with_(assumption.changes))
+        bias, found = _bias(experiment, changed), lengths
+    elif found is None:
+        if together is None:
+            changed = _with_choice(experiment, experiment.with_(assumption.changes))
+        else:
+            changed = _entries_of(together, experiment, [assumption])
+        found = uncertainties(linearise(lay_out(changed)), symbols=("U6",))["U6"]
+    average, maximum = np.hypot((found.average, found.maximum), bias or (0.0, 0.0)).tolist()
+    ratio = average / lengths.average
+    return AssumptionEffect(assumption, average, maximum, found.undetermined, ratio, bias)
 
 
 def _with_choice(experiment: Experiment, changed: Experiment) -> Experiment:

@@ -67,6 +67,11 @@ def random_sections(seed: int) -> dict[str, Any]:
         sections["influences"] = [{"kind": "drift", "axes": {"standard_uncertainty": "1 um/h"}}]
     if seed % 5 == 0:
         sections["probes"]["down"] = {"offset": ["0 mm", "0 mm", "-90 mm"], "reference": True}
+    if seed % 7 == 1:
+        # Heavier than readings by more than plain transformations keep apart.
+        sections["calibration"].append({**calibration, "standard_uncertainty": "0.01 nm"})
+    if seed % 2 == 0:
+        sections["head"] = {"tip": ["0 mm", "0 mm", "-50 mm"]}
     return sections
 
 
