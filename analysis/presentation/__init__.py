@@ -17,7 +17,6 @@ if TYPE_CHECKING:
         amount_of,
         as_data,
         ascii_units,
-        csv_lines,
         finite,
         fixed,
         given,
@@ -67,7 +66,7 @@ if TYPE_CHECKING:
         sticks,
     )
     from .table import Block, Entry, Row, Table
-    from .table_columns import ROUNDING, MainTable, by_axis, table_lines
+    from .table_columns import ROUNDING, MainTable, by_axis, table_csv, table_lines
     from .vectors import Vectors, draw_vectors
 
 __getattr__, __dir__ = lazily(__name__, __file__)

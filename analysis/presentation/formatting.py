@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import fields, is_dataclass
 from typing import Any
 
-import numpy as np
 from ballplate.simulator.computing.rounding import printable
 
 # Plain data, as JSON has it once `as_data` has made it so.
@@ -181,13 +180,6 @@ def records(**columns: Any) -> list[Data]:
     [{'x': 1, 'y': 'a'}, {'x': 2, 'y': 'b'}]
     """
     return [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
-
-
-def csv_lines(heads: Iterable[str], *columns: np.ndarray) -> Iterator[str]:
-    """Yield numbers (m,) or (m, k) as lines of CSV with twelve digits; NaN is empty."""
-    yield ",".join(heads)
-    for row in np.column_stack(columns).tolist():
-        yield ",".join("" if value != value else f"{value + 0.0:.12g}" for value in row)
 
 
 def by_name(items: Iterable[Any], *names: str) -> dict[str, Data]:

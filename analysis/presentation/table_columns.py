@@ -10,14 +10,16 @@ function.
 
 from __future__ import annotations
 
+import io
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from itertools import repeat
 from typing import Any
 
+from ballplate.simulator.inputs.spreadsheets import CsvWriter
 from ballplate.simulator.machines.protocol import Array
 
-from .formatting import Data, aligned, amount_of, number, to_uncertainty, unit_of
+from .formatting import Data, aligned, amount_of, ascii_units, number, to_uncertainty, unit_of
 
 FACTORS = {"mm": 1e3, "µm": 1e6, "µrad": 1e6, "ppm": 1e6, "arcsec": math.degrees(3600.0)}
 
@@ -71,6 +73,28 @@ def table_rows(columns: Columns, items: Sequence[Any] = (), in_units: bool = Fal
             cells = zip(values, factors, strict=False)
             used[heading] = [cell * by if isinstance(cell, float) else cell for cell, by in cells]
     return [dict(zip(used, row, strict=True)) for row in zip(*used.values(), strict=True)]
+
+
+def table_csv(columns: Columns, items: Sequence[Any] = ()) -> list[str]:
+    """Return a table as lines of CSV in the units of its headings, numbers with twelve digits; NaN
+    and None are empty.
+
+    >>> table_csv({"point": ["A"], "error x, µm": [2e-7], "k": [2.0]})
+    ['point,error_x_um,k', 'A,0.2,2']
+    """
+    heads, cells = [], []
+    for heading, _, values, _, factors in _columns_read(columns, items):
+        heads.append(ascii_units(heading).replace(", ", "_").replace(" ", "_"))
+        cells.append(map(_cell, values, factors))
+    text = io.StringIO()
+    CsvWriter(text).writerows([heads, *zip(*cells, strict=True)])
+    return text.getvalue().splitlines()
+
+
+def _cell(value: Any, factor: float) -> Any:
+    if not isinstance(value, float):
+        return value
+    return "" if math.isnan(value) else f"{factor * value + 0.0:.12g}"
 
 
 def _columns_read(

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import io
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from ballplate.presentation import (
@@ -17,10 +16,10 @@ from ballplate.presentation import (
     ascii_units,
     number,
     picked,
+    table_csv,
     table_lines,
 )
 from ballplate.simulator.geometry import AXIS_NAMES
-from ballplate.simulator.inputs import CsvWriter
 from ballplate.simulator.maps import FittedMap
 
 from .error_functions import (
@@ -41,8 +40,6 @@ ARCSECOND = np.pi / 180.0 / 3600.0
 
 # Lines of a function that the text has where there are many: those along the edges of the volume.
 MOST_LINES = 12
-
-HEADS = ("error", "line", "position_mm", "value", "U", "k", "unit")
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -132,22 +129,21 @@ class ErrorCurves(Result):
             for error in numbers
         ]
 
-    def point_lines(self) -> Iterator[str]:
-        """Yield all curves and numbers as lines of a CSV file; undetermined cells are empty."""
-        text = io.StringIO()
-        writer = CsvWriter(text)
-        writer.writerow(HEADS)
-        for row in self.rows():
-            along = row["position"] * (1.0 if self._is_fraction(row) else 1e3)
-            cells = [_cell(value) for value in (along, 1e6 * row["value"], 1e6 * row["U"])]
-            unit = ascii_units(SHOWN[row["unit"]])
-            writer.writerow([row["error"], row["line"], *cells, f"{self.k:g}", unit])
-        yield from text.getvalue().splitlines()
-
-    def _is_fraction(self, row: dict[str, Any]) -> bool:
-        return any(
-            curve.axis is None for curve in self.functions.curves if curve.name == row["error"]
-        )
+    def point_lines(self) -> list[str]:
+        """Return all curves and numbers as lines of a CSV file; undetermined cells are empty."""
+        fractions = {curve.name for curve in self.functions.curves if curve.axis is None}
+        columns = {
+            "error": "error",
+            "line": "line",
+            "position_mm": lambda row: (
+                row["position"] * (1.0 if row["error"] in fractions else 1e3)
+            ),
+            "value": lambda row: 1e6 * row["value"],
+            "U": lambda row: 1e6 * row["U"],
+            "k": lambda row: f"{row['k']:g}",
+            "unit": lambda row: ascii_units(SHOWN[row["unit"]]),
+        }
+        return table_csv(columns, self.rows())
 
     @property
     def warnings(self) -> tuple[str, ...]:
@@ -183,10 +179,6 @@ def _row(
 ) -> Data:
     keys = ("error", "line", "position", "value", "U", "k", "unit")
     return dict(zip(keys, (name, line, position, value, u, k, unit), strict=True))
-
-
-def _cell(value: float) -> str:
-    return "" if np.isnan(value) else f"{value + 0.0:.12g}"
 
 
 def _curve_table(curves: Sequence[FunctionCurve], k: float) -> list[str]:

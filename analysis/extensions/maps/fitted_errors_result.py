@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -15,7 +15,6 @@ from ballplate.presentation import (
     Data,
     MainTable,
     Result,
-    by_axis,
     given,
     records,
 )
@@ -31,11 +30,11 @@ from .fitted_errors import (
     fitted_lengths,
 )
 from .fitted_tables import (
+    error_columns,
     error_lines,
     head_lines,
     length_lines,
     map_data,
-    point_csv,
     realisation_lines,
 )
 from .map_places import MapPlaces, PlacesAsked, map_places
@@ -44,6 +43,7 @@ from .part_tables import budget_data, budget_lines
 from .realisations import Draws, Realisations
 from .volumetric_errors import LengthErrors, VolumetricErrors
 from .volumetric_plots import draw_grid, draw_line, draw_points
+from .volumetric_tables import errors_csv
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -149,17 +149,8 @@ class FittedErrorMap(Result):
 
     def columns(self) -> MainTable:
         """One row for each point, in metres."""
-        errors, k = self.errors, self.fitted.coverage_factor
-        columns = {
-            **self._of_table(),
-            **by_axis("{}, mm", errors.points),
-            **by_axis("error {}, µm", errors.errors),
-            **by_axis("U {}, µm", k * errors.uncertainties),
-            "resultant, µm": errors.resultant,
-            "k": [k] * len(errors.points),
-            "unit": ["m"] * len(errors.points),
-        }
-        return columns, ()
+        columns = error_columns(self.errors, self.fitted.coverage_factor)
+        return {**self._of_table(), **columns, "unit": ["m"] * len(self.errors.points)}, ()
 
     def _of_table(self) -> dict[str, list[str]]:
         """Return names and probes of tabulated points."""
@@ -169,8 +160,8 @@ class FittedErrorMap(Result):
 
     def point_lines(self) -> Iterator[str]:
         """The points alone as lines of a CSV file, in units that its columns name."""
-        k, names = self.fitted.coverage_factor, self.places.names_of_points
-        return point_csv(self.errors, k, self.realisations, names)
+        columns = partial(error_columns, factor=self.fitted.coverage_factor)
+        return errors_csv(self.errors, self.realisations, columns, self.places.names_of_points)
 
     @property
     def warnings(self) -> tuple[str, ...]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -12,7 +12,7 @@ from ballplate.simulator.maps import FittedMap, verdict_data, verdict_line
 
 from .realisations import Realisations
 from .volumetric_errors import LengthErrors, VolumetricErrors
-from .volumetric_tables import CONVENTION, millimetres, point_text, tables_csv, with_drawn
+from .volumetric_tables import CONVENTION, millimetres, point_text
 
 UNDETERMINED = "undetermined"
 
@@ -100,6 +100,17 @@ def _largest(errors: VolumetricErrors, factor: float) -> list[str]:
     ]
 
 
+def error_columns(errors: VolumetricErrors, factor: float) -> Data:
+    """Columns of errors point by point, with their expanded uncertainties."""
+    return {
+        **by_axis("{}, mm", errors.points),
+        **by_axis("error {}, µm", errors.errors),
+        **by_axis("U {}, µm", factor * errors.uncertainties),
+        "resultant, µm": errors.resultant,
+        "k": [factor] * len(errors.points),
+    }
+
+
 def realisation_lines(realisations: Realisations, names: Sequence[str]) -> list[str]:
     """Return the largest error and the length errors of each realisation; CSV and JSON have all
     points.
@@ -118,24 +129,3 @@ def realisation_lines(realisations: Realisations, names: Sequence[str]) -> list[
         *table,
         f"drawn from seed {realisations.draws.seed}; --format csv and --json have all points",
     ]
-
-
-def point_csv(
-    errors: VolumetricErrors,
-    factor: float,
-    realisations: Realisations | None,
-    names: Sequence[str] = (),
-) -> Iterator[str]:
-    """Yield errors as lines of a CSV file; with realisations a column numbers them, 0 for the
-    estimate, which alone has uncertainties.
-    """
-    letters = "xyz"[: errors.points.shape[1]]
-    heads = [f"{letter}_mm" for letter in letters]
-    heads += [f"error_{letter}_um" for letter in letters]
-    heads += [f"U_{letter}_um" for letter in letters]
-    k = np.full(len(errors.points), factor)
-    tables = [
-        [1e3 * errors.points, 1e6 * error, 1e6 * factor * u, 1e6 * np.linalg.norm(error, axis=1), k]
-        for error, u in with_drawn(errors.errors, errors.uncertainties, realisations)
-    ]
-    return tables_csv([*heads, "resultant_um", "k"], tables, realisations is not None, names)

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from itertools import islice
 from math import comb, prod
 
 import numpy as np
-from ballplate.presentation import csv_lines
+from ballplate.presentation import by_axis, table_csv
 from ballplate.simulator.computing import (
     ProgressStep,
     Report,
@@ -19,7 +18,7 @@ from ballplate.simulator.computing import (
 from ballplate.simulator.design import Design, Flags
 from ballplate.simulator.estimation import MeasuredPoints, displacements, linearise
 from ballplate.simulator.experiment import Experiment, lay_out
-from ballplate.simulator.geometry import AXIS_NAMES, even_grid
+from ballplate.simulator.geometry import even_grid
 from ballplate.simulator.inputs import QuantityError, hint, parse_length_function
 from ballplate.simulator.machines import Array, Integers
 from ballplate.uncertainty import PairTile, expansion, pair_tiles
@@ -156,24 +155,18 @@ def length_pairs(
 def pair_csv(experiment: Experiment, settings: LengthMapSettings) -> Iterator[str]:
     """Yield one row per length; undetermined cells are empty."""
     points, tiles = length_pairs(experiment, settings)
-    axes = AXIS_NAMES[: points.shape[1]]
-    heads = [
-        *(f"{axis}{end}_mm" for end in (1, 2) for axis in axes),
-        "length_mm,u_um,expanded_um,target_um",
-    ]
     for k, tile in enumerate(tiles):
-        u = np.where(tile.is_open, np.nan, 1e6 * tile.uncertainties)
-        lines = csv_lines(
-            heads,
-            1e3 * points[tile.first],
-            1e3 * points[tile.second],
-            1e3 * tile.lengths,
-            u,
-            settings.coverage_factor * u,
-            1e6 * settings.target.at(tile.lengths),
-        )
-        # The heads stand above the first lengths alone.
-        yield from islice(lines, int(k > 0), None)
+        u = np.where(tile.is_open, np.nan, tile.uncertainties)
+        columns = {
+            **by_axis("{}1, mm", points[tile.first]),
+            **by_axis("{}2, mm", points[tile.second]),
+            "length, mm": tile.lengths,
+            "u, µm": u,
+            "expanded, µm": settings.coverage_factor * u,
+            "target, µm": settings.target.at(tile.lengths),
+        }
+        # The headings stand above the first lengths alone.
+        yield from table_csv(columns)[int(k > 0) :]
 
 
 def _tiles(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -12,11 +12,12 @@ from ballplate.presentation import (
     Data,
     MainTable,
     Result,
-    csv_lines,
+    by_axis,
     number,
     percent,
     picked,
     records,
+    table_csv,
     table_lines,
     uncertainty_words,
 )
@@ -29,13 +30,8 @@ from .length_plots import draw_lengths
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-AXES = "xyz"
 # What of a group says of which lengths it is.
 HEADS = ("from", "to", "direction", "point")
-POINT_COLUMNS = (
-    "lengths,undetermined,u_average_um,u_maximum_um,ratio_average,ratio_maximum,share_within,"
-    "share_expanded_within"
-)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -232,21 +228,21 @@ def _table(
     return table_lines({k: v for k, v in columns.items() if k not in without})
 
 
-def point_csv(lengths: LengthMap) -> Iterator[str]:
-    """Yield one row per point of the grid: the lengths that start or end there."""
-    axes = AXES[: lengths.design.dimension]
+def point_csv(lengths: LengthMap) -> list[str]:
+    """Return one row per point of the grid: the lengths that start or end there."""
     groups = lengths.by_point
-    return csv_lines(
-        [*(f"{axis}_mm" for axis in axes), POINT_COLUMNS],
-        1e3 * lengths.points,
-        groups.count,
-        groups.undetermined,
-        1e6 * groups.average,
-        1e6 * groups.maximum,
-        groups.average_ratio,
-        groups.maximum_ratio,
-        groups.share(),
-        groups.share(True),
+    return table_csv(
+        {
+            **by_axis("{}, mm", lengths.points),
+            "lengths": groups.count,
+            "undetermined": groups.undetermined,
+            "u average, µm": groups.average,
+            "u maximum, µm": groups.maximum,
+            "ratio average": groups.average_ratio,
+            "ratio maximum": groups.maximum_ratio,
+            "share within": groups.share(),
+            "share expanded within": groups.share(True),
+        }
     )
 
 

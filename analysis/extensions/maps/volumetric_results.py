@@ -4,7 +4,7 @@ along its axis.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -14,7 +14,6 @@ from ballplate.presentation import (
     Data,
     MainTable,
     Result,
-    by_axis,
 )
 from ballplate.simulator.experiment import load_machine
 from ballplate.simulator.inputs import Message
@@ -39,9 +38,10 @@ from .volumetric_tables import (
     along_data,
     along_lines,
     diagonal_lines,
-    error_csv,
+    error_columns,
     error_data,
     error_lines,
+    errors_csv,
     length_data,
     length_line,
     machine_data,
@@ -69,7 +69,7 @@ class MachineErrors(Result):
     def warnings(self) -> tuple[str, ...]:
         return self.doubts
 
-    def point_lines(self) -> Iterator[str]:
+    def point_lines(self) -> Iterable[str]:
         """The points alone as lines of a CSV file, in units that its columns name."""
         raise NotImplementedError
 
@@ -142,18 +142,11 @@ class ErrorsAtPoints(MachineErrors):
 
     def columns(self) -> MainTable:
         """One row for each point, in metres."""
-        errors = self.errors
-        columns = {
-            **by_axis("{}, mm", errors.points),
-            **by_axis("error {}, µm", errors.errors),
-            "resultant, µm": errors.resultant,
-            **by_axis("random {}, µm", errors.uncertainties),
-            "unit": ["m"] * len(errors.points),
-        }
-        return columns, ()
+        return {**error_columns(self.errors), "unit": ["m"] * len(self.errors.points)}, ()
 
-    def point_lines(self) -> Iterator[str]:
-        return error_csv(self.errors, self.realisations, self.places.names_of_points)
+    def point_lines(self) -> Iterable[str]:
+        names = self.places.names_of_points
+        return errors_csv(self.errors, self.realisations, error_columns, names)
 
     def plot(self, path: str | Path | None = None) -> Figure:
         """The errors as vectors, magnified, seen from the front and above."""
@@ -211,7 +204,7 @@ class ErrorAlongAxis(MachineErrors):
         columns = zip(*(data[name] for name in names), strict=True)
         return [dict(zip(names, row, strict=True)) | {"unit": data["unit"]} for row in columns]
 
-    def point_lines(self) -> Iterator[str]:
+    def point_lines(self) -> Iterable[str]:
         return along_csv(self.along)
 
     def plot(self, path: str | Path | None = None) -> Figure:

@@ -2,26 +2,24 @@
 
 from __future__ import annotations
 
-import io
-from collections.abc import Iterator, Sequence
-from itertools import islice
+from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
 from ballplate.presentation import (
     SHOWN,
     Data,
     aligned,
-    ascii_units,
     by_axis,
-    csv_lines,
     fixed,
+    given,
     number,
     picked,
     records,
+    table_csv,
     table_lines,
 )
 from ballplate.simulator.computing import comparable
-from ballplate.simulator.inputs import CsvWriter, format_length, hint, listing
+from ballplate.simulator.inputs import format_length, hint, listing
 from ballplate.simulator.machines import (
     AXES,
     NAMES,
@@ -123,7 +121,7 @@ def _stated_as(along: AlongAxis) -> str:
 
 def why_not_along(name: str, built: Volumetric, file: str) -> str:
     """Why there is no parametric error of that name along an axis."""
-    stated_names = {error.name for error in built.machine.errors}
+    stated_names = [error.name for error in built.machine.errors]
     value = {
         parameter.name: f"{number(1e6 * size)} {SHOWN[parameter.unit]}"
         for parameter, size in _numbers(built)
@@ -251,54 +249,30 @@ def _line_stated(along: AlongAxis) -> str:
     return "at the reference point (no line stated)" if along.error.line is None else ""
 
 
-def error_csv(
-    errors: VolumetricErrors, realisations: Realisations | None, names: Sequence[str] = ()
-) -> Iterator[str]:
-    """Errors as lines of a CSV file."""
-    heads = [*(f"{axis}_mm" for axis in AXES), *(f"error_{axis}_um" for axis in AXES)]
-    heads += ["resultant_um", *(f"random_{axis}_um" for axis in AXES)]
-    tables = [
-        [1e3 * errors.points, 1e6 * error, 1e6 * np.linalg.norm(error, axis=1), 1e6 * deviation]
-        for error, deviation in with_drawn(errors.errors, errors.uncertainties, realisations)
-    ]
-    return tables_csv(heads, tables, realisations is not None, names)
-
-
-def with_drawn(
-    errors: Array, uncertainties: Array, realisations: Realisations | None
-) -> list[tuple[Array, Array]]:
-    """Return errors (m, d) with their uncertainties, then realisations without any."""
-    drawn = [] if realisations is None else list(realisations.errors)
-    none = np.full_like(uncertainties, np.nan)
-    return [(errors, uncertainties), *((error, none) for error in drawn)]
-
-
-def tables_csv(
-    heads: Sequence[str],
-    tables: Sequence[Sequence[Array]],
-    numbered: bool,
+def errors_csv(
+    errors: VolumetricErrors,
+    realisations: Realisations | None,
+    columns: Callable[[VolumetricErrors], Data],
     names: Sequence[str] = (),
 ) -> Iterator[str]:
-    """Yield tables of the same columns as lines of one CSV file, with `names` of points; if
-    `numbered`, the first column is the realisation, 0 for the estimate.
+    """Yield the columns of errors as lines of a CSV file, with `names` of points; with
+    realisations, which have no uncertainties, the first column numbers them, 0 for the estimate.
     """
-    yield ",".join([*(["realisation"] if numbered else []), *(["point"] if names else []), *heads])
-    labels = io.StringIO()
-    CsvWriter(labels).writerows([name] for name in names)
-    quoted = [f"{label}," for label in labels.getvalue().splitlines()] or [""] * len(tables[0][0])
-    for i, columns in enumerate(tables):
-        for name, line in zip(quoted, islice(csv_lines([], *columns), 1, None), strict=True):
-            yield (f"{i}," if numbered else "") + name + line
+    none = np.full_like(errors.uncertainties, np.nan)
+    drawn = [] if realisations is None else list(realisations.errors)
+    tables = [errors, *(VolumetricErrors(errors.points, values, none) for values in drawn)]
+    points = given(point=list(names))
+    for i, table in enumerate(tables):
+        numbers = {"realisation": [i] * len(table.points)} if len(tables) > 1 else {}
+        # The headings stand above the first table alone.
+        yield from table_csv({**numbers, **points, **columns(table)})[int(i > 0) :]
 
 
-def along_csv(along: AlongAxis) -> Iterator[str]:
+def along_csv(along: AlongAxis) -> list[str]:
     """A parametric error along its axis as lines of a CSV file."""
-    columns = _curve_columns(along, along.error.name)
-    return csv_lines(
-        ["position_mm", *(f"{name}_{ascii_units(_unit(along))}" for name in columns)],
-        1e3 * along.positions,
-        *(1e6 * values for values in columns.values()),
-    )
+    curves = _curve_columns(along, along.error.name)
+    columns = {f"{name}, {_unit(along)}": values for name, values in curves.items()}
+    return table_csv({"position, mm": along.positions, **columns})
 
 
 def _curve_columns(along: AlongAxis, name: str) -> dict[str, Array]:
@@ -337,6 +311,16 @@ def machine_data(built: Volumetric) -> Data:
             }
             for parameter, value in _numbers(built)
         },
+    }
+
+
+def error_columns(errors: VolumetricErrors) -> Data:
+    """Columns of errors point by point."""
+    return {
+        **by_axis("{}, mm", errors.points),
+        **by_axis("error {}, µm", errors.errors),
+        "resultant, µm": errors.resultant,
+        **by_axis("random {}, µm", errors.uncertainties),
     }
 
 
