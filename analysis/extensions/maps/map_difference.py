@@ -8,12 +8,13 @@ from dataclasses import dataclass
 from datetime import date
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from ballplate.presentation import Data, Result, aligned, number, picked, records
+from ballplate.presentation import Data, Result, aligned, number, picked, records, table_lines
 from ballplate.results import FEW
 from ballplate.simulator.computing import comparable
+from ballplate.simulator.machines import Array
 from ballplate.simulator.maps import InCommon, verdict_data, verdict_line
 
 from .campaign_tests import TOO_ALIKE, TOO_RARE
@@ -196,14 +197,15 @@ class MapDifference(Result):
         )
 
     def _motion_table(self) -> list[str]:
-        motion, k = self.comparison.motion, self.coverage_factor
-        rows = [["free motion of the frame", "", "U", ""]]
-        values = zip(motion.names, motion.values, motion.standard_uncertainties, strict=True)
-        for name, value, u in values:
-            unit = "µm" if name.startswith("shift") else "µrad"
-            value_text = "undetermined" if math.isnan(u) else number(1e6 * value)
-            rows.append([name, value_text, number(1e6 * k * u), unit])
-        return [*aligned(rows, [False, True, True, False]), *map(self._held_line, self._measured())]
+        motion = self.comparison.motion
+        u = motion.standard_uncertainties
+        columns = [
+            ("free motion of the frame", list(motion.names)),
+            ("", (np.where(np.isnan(u), np.nan, motion.values), _determined)),
+            ("U", 1e6 * self.coverage_factor * u),
+            ("", ["µm" if name.startswith("shift") else "µrad" for name in motion.names]),
+        ]
+        return [*table_lines(columns), *map(self._held_line, self._measured())]
 
     def _measured(self) -> tuple[ComparedMap, ...]:
         return tuple(side for side in (self.first, self.second) if not side.is_expected)
@@ -228,13 +230,10 @@ class MapDifference(Result):
     def _shown_groups(self) -> tuple[FigureGroup, ...]:
         """Return the groups of values, with all error functions as one."""
         comparison = self.comparison
-        lengths, plates = (
-            comparison.lengths,
-            tuple(compared_part.figures for compared_part in comparison.plates),
-        )
-        of_functions = [compared_part.figures for compared_part in comparison.functions]
-        joined = (_joined(of_functions),) if of_functions else ()
-        return (*lengths, comparison.places, *joined, *plates)
+        plates = (plate.figures for plate in comparison.plates)
+        functions = [function.figures for function in comparison.functions]
+        joined = (_joined(functions),) if functions else ()
+        return (*comparison.lengths, comparison.places, *joined, *plates)
 
     def _tested_lines(self) -> list[str]:
         lines = [*_group_table(self._shown_groups()), ""]
@@ -258,47 +257,37 @@ class MapDifference(Result):
         return [*lines, ""]
 
     def _length_table(self) -> list[str]:
-        years = self.years
-        k = self.coverage_factor
-        heads = ["length", "difference, µm", "U, µm", "E_n"]
-        rows = [heads + (["µm per year", "U, µm per year"] if years else [])]
-        for group in self.comparison.lengths:
-            for place in _shown_places(group):
-                value, u = group.differences[place], group.standard_uncertainties[place]
-                is_open = math.isnan(u)
-                row = [
-                    f"{group.kind}: {group.names[place]}",
-                    "undetermined" if is_open else number(1e6 * value),
-                    number(1e6 * k * u),
-                    number(group.normalised[place], 3),
-                ]
-                if years:
-                    rate = math.nan if is_open else value / years
-                    row += [number(1e6 * rate), number(1e6 * k * u / abs(years))]
-                rows.append(row)
-        return aligned(rows, [False] + [True] * (len(rows[0]) - 1))
+        years, k = self.years, self.coverage_factor
+        columns: dict[str, Any] = {
+            "length": lambda row: f"{row['kind']}: {row['figure']}",
+            "difference, µm": ("difference", _determined),
+            "U, µm": lambda row: k * row["standard uncertainty"],
+            "E_n": ("E_n", 3),
+        }
+        if years:
+            columns["µm per year"] = lambda row: 1e6 * row["difference"] / years
+            columns["U, µm per year"] = lambda row: (
+                1e6 * k * row["standard uncertainty"] / abs(years)
+            )
+        shown = ((group, place) for group in self.comparison.lengths for place in _places(group))
+        return table_lines(columns, [_row(group, place) for group, place in shown])
 
     def _function_table(self) -> list[str]:
-        rows = [["error function", "largest |E_n|", "at", "chi-squared", "of", "p"]]
-        for function in self.comparison.functions:
-            place, test = function.figures.largest, function.test
-            value = math.nan if place is None else abs(float(function.figures.normalised[place]))
-            rows.append(
-                [
-                    f"{function.name} {function.axis}",
-                    "undetermined" if place is None else number(value, 3),
-                    "" if place is None else function.figures.names[place].partition(" at ")[2],
-                    "" if test is None else number(test.statistic),
-                    "" if test is None else str(test.dimensions),
-                    "" if test is None else _chance(test.p),
-                ]
-            )
+        columns = {
+            "error function": lambda function: f"{function.name} {function.axis}",
+            "largest |E_n|": ("figures.largest_size", 3),
+            "at": lambda function: function.figures.largest_name.partition(" at ")[2],
+            "chi-squared": "test.statistic",
+            "of": "test.dimensions",
+            "p": ("test.p", _chance),
+        }
+        table = table_lines(columns, self.comparison.functions, unknown="undetermined")
         count = sum(function.test is not None for function in self.comparison.functions)
         remark = (
             f"({count} tests: the smallest p of as many is below {LEVEL / max(count, 1):.2g} once"
             f" in {round(1 / LEVEL)} without a change)"
         )
-        return [*aligned(rows, [False, True, False, True, True, True]), remark]
+        return [*table, remark]
 
     def data(self) -> Data:
         comparison, motion = self.comparison, self.comparison.motion
@@ -337,27 +326,14 @@ class MapDifference(Result):
 
     def rows(self) -> list[Data]:
         """Return one row per compared or undetermined value."""
-        table = []
-        for group in self.comparison.groups:
-            normalised, is_compared = group.normalised, group.is_compared
-            for k, name in enumerate(group.names):
-                u = float(group.standard_uncertainties[k])
-                is_open = math.isnan(u)
-                if not is_open and not is_compared[k]:
-                    continue
-                difference = math.nan if is_open else float(group.differences[k])
-                row = {
-                    "kind": group.kind,
-                    "figure": name,
-                    "difference": difference,
-                    "standard uncertainty": u,
-                    "unit": group.unit,
-                    "E_n": float(normalised[k]),
-                }
-                if self.years:
-                    row["per year"] = difference / self.years
-                table.append(row)
-        return table
+        rows = [
+            _row(group, place)
+            for group in self.comparison.groups
+            for place in np.flatnonzero(group.is_compared | group.is_undetermined).tolist()
+        ]
+        if self.years:
+            rows = [row | {"per year": row["difference"] / self.years} for row in rows]
+        return rows
 
     def plot(self, path: str | Path | None = None) -> Figure:
         """Draw differences at points of the volume as magnified vectors, and E_n of lengths and
@@ -377,11 +353,27 @@ def _chance(p: float) -> str:
     return "below 1e-6" if p < 1e-6 else number(p, 2)
 
 
+def _determined(difference: float) -> str:
+    return "undetermined" if math.isnan(difference) else number(1e6 * difference)
+
+
 def _share(share: float) -> str:
     return f"{100.0 * share:.1f} %"
 
 
-def _shown_places(group: FigureGroup) -> list[int]:
+def _row(group: FigureGroup, place: int) -> Data:
+    u = float(group.standard_uncertainties[place])
+    return {
+        "kind": group.kind,
+        "figure": group.names[place],
+        "difference": math.nan if math.isnan(u) else float(group.differences[place]),
+        "standard uncertainty": u,
+        "unit": group.unit,
+        "E_n": float(group.normalised[place]),
+    }
+
+
+def _places(group: FigureGroup) -> list[int]:
     """Return indices of the lengths of a group that are printed singly."""
     if len(group.names) <= TOLD:
         return list(range(len(group.names)))
@@ -392,31 +384,22 @@ def _shown_places(group: FigureGroup) -> list[int]:
 
 def _joined(groups: Sequence[FigureGroup]) -> FigureGroup:
     """Groups of several units as one, of differences in their own standard uncertainties."""
-    compared = [group.is_compared | np.isnan(group.standard_uncertainties) for group in groups]
-    open_ = [
-        np.isnan(group.standard_uncertainties[w]) for group, w in zip(groups, compared, strict=True)
-    ]
-    u = np.where(np.concatenate(open_), np.nan, 1.0)
-    normalised = [
-        group.normalised[is_compared] for group, is_compared in zip(groups, compared, strict=True)
-    ]
-    names = (
-        name
-        for group, is_compared in zip(groups, compared, strict=True)
-        for name, is_in in zip(group.names, is_compared, strict=True)
-        if is_in
-    )
-    chances = [
-        group.chances[is_compared] for group, is_compared in zip(groups, compared, strict=True)
-    ]
+    chosen = [group.is_compared | group.is_undetermined for group in groups]
+
+    def joined(name: str) -> Array:
+        return np.concatenate(
+            [getattr(group, name)[part] for group, part in zip(groups, chosen, strict=True)]
+        )
+
     k = groups[0].coverage_factor
+    names = (np.array(group.names)[part] for group, part in zip(groups, chosen, strict=True))
     return FigureGroup(
         "error functions",
         "1",
-        tuple(names),
-        k * np.concatenate(normalised),
-        u,
-        np.concatenate(chances),
+        tuple(np.concatenate(list(names)).tolist()),
+        k * joined("normalised"),
+        np.where(joined("is_undetermined"), np.nan, 1.0),
+        joined("chances"),
         k,
     )
 
@@ -424,7 +407,6 @@ def _joined(groups: Sequence[FigureGroup]) -> FigureGroup:
 def _group_table(groups: Sequence[FigureGroup]) -> list[str]:
     rows = [["figures", "compared", "|E_n| > 1", "by chance", "largest |E_n|", "at"]]
     for group in groups:
-        place = group.largest
         count = str(group.count)
         if group.undetermined:
             count += f" ({group.undetermined} undetermined)"
@@ -437,8 +419,8 @@ def _group_table(groups: Sequence[FigureGroup]) -> list[str]:
                 count,
                 share,
                 _share(group.by_chance) if group.count else "",
-                "" if place is None else number(abs(float(group.normalised[place])), 3),
-                "" if place is None else group.names[place],
+                number(group.largest_size, 3) if group.count else "",
+                group.largest_name,
             ]
         )
     return aligned(rows, [False, True, True, True, True, False])

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from ballplate.simulator.computing import blank, comparable, single_threaded
@@ -45,15 +47,18 @@ class FigureGroup:
 
     @property
     def undetermined(self) -> int:
-        return int(np.isnan(self.standard_uncertainties).sum())
+        return int(self.is_undetermined.sum())
 
     @property
+    def is_undetermined(self) -> Flags:
+        return np.isnan(self.standard_uncertainties)
+
+    @cached_property
     def is_compared(self) -> Flags:
         u = self.standard_uncertainties
-        largest = np.nanmax(u, initial=0.0)
-        return ~np.isnan(u) & (u > HELD * largest)
+        return np.asarray(u > HELD * np.nanmax(u, initial=0.0))
 
-    @property
+    @cached_property
     def normalised(self) -> Array:
         """E_n (m,): difference over expanded uncertainty; NaN if excluded from the comparison."""
         u = np.where(self.is_compared, self.standard_uncertainties, np.nan)
@@ -75,6 +80,16 @@ class FigureGroup:
         if not self.count:
             return None
         return int(comparable(np.nan_to_num(np.abs(self.normalised))).argmax())
+
+    @property
+    def largest_size(self) -> float:
+        """The largest |E_n|; NaN without a comparison."""
+        return math.nan if self.largest is None else abs(float(self.normalised[self.largest]))
+
+    @property
+    def largest_name(self) -> str:
+        """Name of the difference with the largest |E_n|; empty without a comparison."""
+        return "" if self.largest is None else self.names[self.largest]
 
 
 @dataclass(frozen=True)
