@@ -116,9 +116,11 @@ def run(options: Namespace) -> int:
 
 def _second(options: Namespace) -> tuple[FittedMap | None, bool]:
     """The map of the second campaign, and whether there is something to complain of."""
-    if _is_map(options.after[0]):
+    from .fit_files import is_map_file
+
+    if is_map_file(options.after[0]):
         return _fitted(options, options.after[0], options.after[1:])
-    if _is_map(options.files[0]):
+    if is_map_file(options.files[0]):
         raise UsageError(
             f"{options.after[0]} is no map file; for readings, name the experiment file instead of"
             f" {options.files[0]}, or fit them first with fit -o"
@@ -132,7 +134,9 @@ def _fitted(options: Namespace, file: Path, readings: list[Path]) -> tuple[Fitte
     """
     from ballplate.simulator.experiment import read_map
 
-    if _is_map(file):
+    from .fit_files import is_map_file
+
+    if is_map_file(file):
         if readings:
             raise UsageError(f"{file} is a map, which needs no readings; leave {readings[0]} out")
         return read_map(file), False
@@ -143,11 +147,3 @@ def _fitted(options: Namespace, file: Path, readings: list[Path]) -> tuple[Fitte
     result = fit(experiment, observed, options.sigma)
     warn_of(result)
     return (result.to_map() if result.converged else None), bool(result.complaint)
-
-
-def _is_map(path: Path) -> bool:
-    from ballplate.simulator.inputs import read_tree, written
-
-    if path.suffix.lower() == ".npz":
-        return True
-    return path.suffix.lower() in (".yaml", ".yml") and written(read_tree(path), "map") is not None

@@ -8,11 +8,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from itertools import combinations, product
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
-from ballplate.presentation import Data, Result, aligned, number
+from ballplate.presentation import Data, Result, number, records, table_lines
 from ballplate.results import ARCSECOND, coverage_factor, few_degrees_of_freedom
 from ballplate.simulator.computing import single_threaded
 from ballplate.simulator.geometry import AXIS_NAMES, rigid_motions
@@ -33,22 +34,26 @@ LEFT_OUT = 1e-3
 # Figures below this, in metres and radians, are rounding.
 ROUNDING = 1e-13
 
+# Units in which quantities are shown.
+UNITS = {"rad": (ARCSECOND, "arcsec"), "1": (1e-6, "µm/m"), "m": (1e-6, "µm")}
+
 CAMPAIGNS = "the first campaign", "the second campaign"
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class MachineLine:
     """A quantity that adjustments change: a scale error, the excess over 90 degrees of an angle
     between axes, or the length error of a diagonal of the volume.
 
-    It sums, over `parts`, component `along` of the error at `end` less that at `start`, times a
-    factor.
+    It sums products of `weights` (k, d) and the errors at `ends` (k, d) less those at `starts` (k,
+    d).
     """
 
     name: str
-    kind: Literal["scale", "angle", "diagonal"]
     unit: Unit
-    parts: tuple[tuple[tuple[float, ...], tuple[float, ...], tuple[float, ...]], ...]
+    ends: Array
+    starts: Array
+    weights: Array
 
 
 def machine_lines(lower: Array, upper: Array) -> tuple[MachineLine, ...]:
@@ -60,30 +65,22 @@ def machine_lines(lower: Array, upper: Array) -> tuple[MachineLine, ...]:
     """
     d, size = len(lower), upper - lower
     ends = lower + np.diag(size)
-    unit = np.eye(d)
-
-    def part(end: Array, start: Array, weight: Array) -> Any:
-        return tuple(end.tolist()), tuple(start.tolist()), tuple(weight.tolist())
-
-    lines = []
-    for i in range(d):
-        name = f"scale {AXIS_NAMES[i]}"
-        lines.append(MachineLine(name, "scale", "1", (part(ends[i], lower, unit[i] / size[i]),)))
+    per_length = np.diag(1.0 / size)
+    lines = [
+        MachineLine(f"scale {AXIS_NAMES[i]}", "1", ends[[i]], lower[None], per_length[[i]])
+        for i in range(d)
+    ]
     for i, j in combinations(range(d), 2):
         # An axis that leans towards the other makes the angle smaller.
-        departures = (
-            part(ends[j], lower, -unit[i] / size[j]),
-            part(ends[i], lower, -unit[j] / size[i]),
-        )
-        lines.append(
-            MachineLine(f"angle {AXIS_NAMES[i]}{AXIS_NAMES[j]}", "angle", "rad", departures)
-        )
+        leaning = -np.eye(d)[[i, j]] / size[[j, i], None]
+        name = f"angle {AXIS_NAMES[i]}{AXIS_NAMES[j]}"
+        lines.append(MachineLine(name, "rad", ends[[j, i]], np.array([lower, lower]), leaning))
     for signs in product((True, False), repeat=d - 1):
         ups = np.array([True, *signs])
         start, end = np.where(ups, lower, upper), np.where(ups, upper, lower)
         along = (end - start) / np.linalg.norm(end - start)
         name = "diagonal " + "".join("+" if up else "-" for up in ups)
-        lines.append(MachineLine(name, "diagonal", "m", (part(end, start, along),)))
+        lines.append(MachineLine(name, "m", end[None], start[None], along[None]))
     return tuple(lines)
 
 
@@ -100,16 +97,18 @@ def line_values(fitted: FittedMap, lines: Sequence[MachineLine]) -> tuple[Array,
     """Return values (m,) of the quantities and a square root (m, r) of their covariance, NaN where
     undetermined.
     """
-    weights = np.array([part[2] for machine_line in lines for part in machine_line.parts])
-    owner = np.array([k for k, machine_line in enumerate(lines) for _ in machine_line.parts])
-    points = np.array(
-        [point for machine_line in lines for part in machine_line.parts for point in part[:2]]
+    weights, ends, starts = (
+        np.concatenate([getattr(line, name) for line in lines])
+        for name in ("weights", "ends", "starts")
     )
+    owner = np.repeat(np.arange(len(lines)), [len(line.weights) for line in lines])
+    points = np.concatenate([ends, starts])
     places, rows = corrected(fitted, points)
     drawn = drawn_rows(fitted, points)
 
     def summed(of_points: Array) -> Array:
-        apart = np.einsum("kd,kd...->k...", weights, of_points[::2] - of_points[1::2])
+        at_ends, at_starts = np.split(of_points, 2)
+        apart = np.einsum("kd,kd...->k...", weights, at_ends - at_starts)
         total = np.zeros((len(lines), *apart.shape[1:]))
         np.add.at(total, owner, apart)
         return total
@@ -229,26 +228,15 @@ class AdjustedMachine(Result):
         return f"{verdicts[self.is_within]}{self.difference.headline()}"
 
     def lines(self) -> list[str]:
-        k = f"{self.coverage_factor:g}"
-        heads = ["quantity", "before", f"U (k = {k})", "predicted", f"U (k = {k})"]
-        heads += [] if self.found is None else ["found", f"U (k = {k})", "E_n"]
-        rows = [[*heads, "unit"]]
-        errors = self.normalised_errors
-        for i, line in enumerate(self.lines_of_machine):
-            shown = {"rad": ARCSECOND, "1": 1e-6, "m": 1e-6}[line.unit]
-            pairs = [self.before[i], self.predicted[i], *([self.found[i]] if self.found else [])]
-            cells = [
-                cell
-                for pair in pairs
-                for cell in (
-                    _shown(pair.value / shown),
-                    _shown(self.coverage_factor * pair.standard_uncertainty / shown),
-                )
-            ]
-            cells += [] if self.found is None else [_shown(float(errors[i]), "-")]
-            unit = {"rad": "arcsec", "1": "µm/m", "m": "µm"}[line.unit]
-            rows.append([line.name, *cells, unit])
-        table = aligned(rows, [False, *[True] * (len(heads) - 1), False])
+        k = self.coverage_factor
+        columns: list[tuple[str, Any]] = [("quantity", "quantity")]
+        for stage in ("before", "predicted", *([] if self.found is None else ["found"])):
+            columns.append((stage, partial(_in_unit, stage)))
+            columns.append((f"U (k = {k:g})", partial(_in_unit, f"u {stage}", factor=k)))
+        if self.found is not None:
+            columns.append(("E_n", ("E_n", number)))
+        columns.append(("unit", lambda row: UNITS[row["unit"]][1]))
+        table = table_lines(columns, self.rows(), unknown="undetermined")
         legend = [
             "(errors of scales: true length less reading; of angles: excess over 90 deg; of"
             " diagonals of the volume, + upwards and - downwards along x, y, z: true length less"
@@ -290,25 +278,24 @@ class AdjustedMachine(Result):
 
     def rows(self) -> list[Data]:
         """One row for each quantity."""
-        nothing, errors = LineValue(np.nan, np.nan), self.normalised_errors
-        return [
-            {
-                "quantity": line.name,
-                "unit": line.unit,
-                "before": self.before[i].value,
-                "u before": self.before[i].standard_uncertainty,
-                "predicted": self.predicted[i].value,
-                "u predicted": self.predicted[i].standard_uncertainty,
-                "found": (self.found[i] if self.found else nothing).value,
-                "u found": (self.found[i] if self.found else nothing).standard_uncertainty,
-                "E_n": float(errors[i]),
-            }
-            for i, line in enumerate(self.lines_of_machine)
-        ]
+        undetermined = (LineValue(np.nan, np.nan),) * len(self.lines_of_machine)
+        stages = {
+            "before": self.before,
+            "predicted": self.predicted,
+            "found": self.found or undetermined,
+        }
+        columns: dict[str, Any] = {
+            "quantity": [line.name for line in self.lines_of_machine],
+            "unit": [line.unit for line in self.lines_of_machine],
+        }
+        for stage, values in stages.items():
+            columns[stage] = [value.value for value in values]
+            columns[f"u {stage}"] = [value.standard_uncertainty for value in values]
+        return records(**columns, E_n=self.normalised_errors.tolist())
 
 
-def _shown(value: float, otherwise: str = "undetermined") -> str:
-    return otherwise if np.isnan(value) else number(value)
+def _in_unit(name: str, row: Data, factor: float = 1.0) -> float:
+    return factor * float(row[name]) / UNITS[row["unit"]][0]
 
 
 def adjusted_machine(

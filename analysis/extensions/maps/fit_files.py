@@ -2,13 +2,25 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 from typing import Literal
 
 from ballplate.results import Fit, fit
 from ballplate.simulator.experiment import BINARY, lay_out, load
-from ballplate.simulator.inputs import Mapping, read_tree, refused
+from ballplate.simulator.inputs import Mapping, read_bytes, read_tree, refused
 from ballplate.simulator.readings import read_readings
+
+# A map file says at its beginning that it is one.
+OF_MAPS = re.compile(rb"^map\s*:", re.MULTILINE)
+
+
+def is_map_file(path: Path) -> bool:
+    """Identify a map file, by its name or contents.
+
+    :raises ExperimentError: it cannot be read.
+    """
+    return path.suffix.lower() == BINARY or bool(OF_MAPS.search(read_bytes(path)))
 
 
 def kind_of_file(path: Path) -> Literal["map", "machine", "experiment"]:

@@ -2,33 +2,21 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Sequence
 from functools import reduce
 from pathlib import Path
 
 from ballplate.simulator.design import Tasks
-from ballplate.simulator.experiment import BINARY, Experiment, read_map
-from ballplate.simulator.inputs import read_bytes
+from ballplate.simulator.experiment import Experiment, read_map
 from ballplate.simulator.maps import FittedMap
 
 from .error_curves_result import ErrorCurves, error_curves
+from .fit_files import is_map_file
 from .fitted_errors_result import FittedErrorMap, fitted_map_errors
 from .map_places import PlacesAsked
 from .realisations import Draws
 from .selected_lengths import tasks_of_experiment
 from .volumetric_results import MachineErrors, machine_errors
-
-# A map file says at its beginning that it is one.
-OF_MAPS = re.compile(rb"^map\s*:", re.MULTILINE)
-
-
-def is_map_file(path: Path) -> bool:
-    """Identify a map file, by its name or contents.
-
-    :raises ExperimentError: it cannot be read.
-    """
-    return path.suffix.lower() == BINARY or bool(OF_MAPS.search(read_bytes(path)))
 
 
 def map_of_source(source: Path | FittedMap) -> tuple[FittedMap, str]:

@@ -205,7 +205,7 @@ def test_diagonals_are_those_of_corrected_points(kind: str, tmp_path: Path) -> N
     found = bp.adjust(fitted, "x=10 ppm")
     lower, upper = map(np.array, fitted.volume.corners)
     for one, before in zip(found.lines_of_machine, found.before, strict=True):
-        if one.kind != "diagonal":
+        if one.unit != "m":
             continue
         ups = np.array([sign == "+" for sign in one.name.removeprefix("diagonal ")])
         ends = np.array([np.where(ups, lower, upper), np.where(ups, upper, lower)])
