@@ -18,14 +18,21 @@ from ballplate.extensions.repair.written import plane_of
 from ballplate.extensions.sweeps.error_map_uncertainty import point_map
 from ballplate.presentation import Data, finite, picked
 from ballplate.rank import Verdict, verdict
-from ballplate.results import length_headline, rank_words, scale_lines, scale_warnings, target_lines
+from ballplate.results import (
+    length_headline,
+    predict,
+    rank_words,
+    scale_lines,
+    scale_warnings,
+    target_lines,
+)
 from ballplate.simulator.computing import single_threaded
 from ballplate.simulator.design import locations
 from ballplate.simulator.estimation import Linearisation, linearise
 from ballplate.simulator.experiment import Experiment, Position, lay_out
 from ballplate.simulator.geometry import ball_coordinates, even_grid, without_rigid_motion
 from ballplate.simulator.inputs import Target
-from ballplate.uncertainty import Quantity, scale_of, uncertainties
+from ballplate.uncertainty import Quantity, uncertainties
 
 # Nodes of the lattice along each axis: edges of it that bend are drawn as curves.
 NODES = 9
@@ -68,12 +75,16 @@ def answer(experiment: Experiment) -> dict[str, Any]:
 
 
 @single_threaded
-def scale_answer(experiment: Experiment) -> list[str]:
-    """Return the source of scale of a design, as text, later than the rest: the design is
-    evaluated again without each possible source.
+def later_answer(experiment: Experiment) -> dict[str, Any]:
+    """Return what comes later than the rest, since the design is evaluated again for each row: the
+    source of scale as `lines` of text, and `assumptions`, None without U6.
     """
-    scale = scale_of(experiment, linearise(lay_out(experiment)))
-    return [*scale_lines(scale), *scale_warnings(scale)]
+    prediction = predict(experiment, with_scale=True)
+    scale, assumptions = prediction.scale, prediction.assumptions
+    return {
+        "lines": [*scale_lines(scale), *scale_warnings(scale)],
+        "assumptions": assumptions and {**assumptions.to_dict(), "warning": assumptions.warning},
+    }
 
 
 def _row(quantity: Quantity) -> Data:

@@ -14,7 +14,7 @@ from typing import Any
 from ballplate.simulator.computing import begin_worker, interruptions_blocked
 from ballplate.simulator.inputs import ExperimentError, Message, refused, to_python
 
-from .answers import answer, scale_answer
+from .answers import answer, later_answer
 from .document import DesignDocument, data_of, experiment_of, variants_of
 
 
@@ -47,12 +47,12 @@ def figures(document: DesignDocument) -> dict[str, Any]:
     return answer(experiment_of(document))
 
 
-def scale(document: DesignDocument) -> list[str]:
-    """Return the source of scale of a document's design.
+def later(document: DesignDocument) -> dict[str, Any]:
+    """Return the source of scale of a document's design, and its assumptions.
 
     :raises ExperimentError: its text is invalid.
     """
-    return scale_answer(experiment_of(document))
+    return later_answer(experiment_of(document))
 
 
 class Judge:

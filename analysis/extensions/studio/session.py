@@ -26,7 +26,7 @@ from .document import (
     variants_of,
 )
 from .jobs import JOBS, MOST_RUNNING, Job, started
-from .judging import DesignJudgement, Judge, figures, judgement, scale
+from .judging import DesignJudgement, Judge, figures, judgement, later
 from .recovery import give_up, keep, recovered
 
 ENDINGS = (".yaml", ".yml")
@@ -162,15 +162,15 @@ class Session:
         data: Data = self._computed(figures, done(document, action))
         return data
 
-    def scale(self) -> dict[str, Any]:
-        """Return the source of scale of the design, as text, and its fingerprint.
+    def later(self) -> dict[str, Any]:
+        """Return the source of scale of the design, its assumptions, and its fingerprint.
 
         :raises ExperimentError: the text is invalid.
         :raises RefusedError: another request came meanwhile.
         """
         with self._lock:
             document = self._document
-        return {"fingerprint": document.fingerprint, "lines": self._computed(scale, document)}
+        return {"fingerprint": document.fingerprint, **self._computed(later, document)}
 
     def start(self, name: str, settings: Mapping[str, Any]) -> int:
         """Start a computation, and return its number.

@@ -102,6 +102,15 @@ def test_an_hour(design: Path) -> None:
         page.click("#undo")
         settled(page, 5)
         assert "full rank" in page.inner_text("#verdict")
+        # What is assumed is folded: three rows, and all on request.
+        page.wait_for_selector("#assumptions:not(.stale)")
+        heading = page.locator("#assumptions summary")
+        assert "times as large" in heading.inner_text()
+        heading.click()
+        rows = page.locator("#assumptions tbody tr")
+        assert rows.count() == 1 + 3 + 1
+        page.click("#all-assumed")
+        assert rows.count() > 1 + 3 + 1
         # Saved, the file says what the page says.
         page.keyboard.press("Control+s")
         until(page, "window.studio.state().saved")

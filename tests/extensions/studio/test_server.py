@@ -53,7 +53,7 @@ REQUESTS = [
     ("GET", "/api/state"),
     ("GET", "/api/jobs"),
     ("GET", "/api/schema"),
-    ("GET", "/api/scale"),
+    ("GET", "/api/later"),
     ("GET", "/pages/1"),
     ("GET", "/static/studio.js"),
     ("POST", "/api/do"),
@@ -155,10 +155,19 @@ def test_figures_are_those_of_run(client, design):
         expected = predict(experiment).quantities[row["symbol"]]
         assert row["average"] == expected.average and row["maximum"] == expected.maximum
     assert found["rank"]["deficiency"] == 0 and found["within"] == expected.within_target
-    scale = client.get("/api/scale").json()
-    told = predict(experiment, with_scale=True).lines()
-    assert scale["fingerprint"] == answer.json()["fingerprint"]
-    assert scale["lines"] and all(line in told for line in scale["lines"])
+    later = client.get("/api/later").json()
+    prediction = predict(experiment, with_scale=True)
+    assert later["fingerprint"] == answer.json()["fingerprint"]
+    assert later["lines"] and all(line in prediction.lines() for line in later["lines"])
+    assumptions = prediction.assumptions
+    assert later["assumptions"]["warning"] == assumptions.warning != ""
+    assert later["assumptions"]["assumptions"] == assumptions.to_dict()["assumptions"]
+
+
+def test_a_design_without_lengths_has_no_assumptions(client):
+    for name in ("x low", "x high", "y low", "y high"):
+        client.post("/api/do", json={"do": "remove", "position": name})
+    assert client.get("/api/later").json()["assumptions"] is None
 
 
 def test_a_change_in_another_window_is_not_lost(client):

@@ -15,7 +15,8 @@ let running = []; // computations as they were when they were asked after last
 let typed = false; // the text beside the design has changes that are not applied
 let lost = null; // waits for a studio that does not answer
 let watching = null; // waits for figures that are being computed
-let scaling = null; // asks for what carries scale, once nothing else is asked
+let scaling = null; // asks for what carries scale and what is assumed, once nothing else is asked
+let all_assumed = false; // all assumptions are shown, not the first alone
 
 async function ask(path, body) {
   const options = body === undefined ? {} : {
@@ -250,8 +251,11 @@ function figures(design, messages, pending = false) {
   );
   if (design) quantities(design);
   else $("quantities").replaceChildren();
-  if (design && !wrong) ask_scale();
-  else $("scale").replaceChildren();
+  if (design && !wrong) ask_later();
+  else {
+    $("scale").replaceChildren();
+    assumed(null);
+  }
   directions(design, messages, pending);
 }
 
@@ -292,20 +296,41 @@ function directions(design, messages, pending) {
   }
 }
 
-// What carries scale takes longer than all the rest: it is asked for once nothing moves any more.
-function ask_scale() {
+// Scale and assumptions take longer than all the rest: they are asked for once nothing moves any more.
+function ask_later() {
   clearTimeout(scaling);
-  $("scale").classList.add("stale");
+  for (const name of ["scale", "assumptions"]) $(name).classList.add("stale");
   scaling = setTimeout(async () => {
     try {
-      const found = await ask("/api/scale");
+      const found = await ask("/api/later");
       if (found.fingerprint !== state.fingerprint) return;
       $("scale").replaceChildren(...found.lines.map((line) => make("p", {}, line)));
-      $("scale").classList.remove("stale");
+      assumed(found.assumptions);
+      for (const name of ["scale", "assumptions"]) $(name).classList.remove("stale");
     } catch {
       $("scale").textContent = "";
+      assumed(null);
     }
   }, 400);
+}
+
+const FEW_ASSUMED = 3; // rows that are shown before a person asks for all
+function assumed(found) {
+  const rows = found?.assumptions ?? [];
+  $("assumptions").hidden = !rows.length;
+  if (!rows.length) return;
+  $("assumptions").classList.toggle("warn", Boolean(found.warning));
+  $("assumptions").querySelector("summary").textContent = found.warning || "What is assumed";
+  const times = (ratio) => (Number.isFinite(ratio) ? `${Number(ratio.toPrecision(3))}` : "");
+  const row = (words, title, one) => make("tr", {}, make("td", { title }, ...words), make("td", {}, micro(one.average)), make("td", {}, micro(one.maximum)), make("td", {}, times(one.ratio)));
+  const shown = all_assumed ? rows : rows.slice(0, FEW_ASSUMED);
+  $("assumptions").querySelector("table").replaceChildren(
+    make("thead", {}, make("tr", {}, ...["U6 in µm without what is assumed", "average", "max.", "times"].map((head) => make("th", {}, head)))),
+    make("tbody", {}, row(["all of these"], undefined, { ...found, ratio: 1 }),
+      ...shown.map((one) => row([make("strong", {}, one.assumed), `, instead ${one.instead}`], one.source, one)),
+      rows.length > FEW_ASSUMED ? make("tr", {}, make("td", { colspan: "4" },
+        make("button", { id: "all-assumed", class: "link", "aria-expanded": String(all_assumed), onclick: () => { all_assumed = !all_assumed; assumed(found); $("all-assumed").focus(); } }, all_assumed ? "fewer" : `all ${rows.length}`))) : ""),
+  );
 }
 
 function quantities(design) {
