@@ -67,6 +67,7 @@ if TYPE_CHECKING:
         parse_length_function,
         parse_positive_angle,
         parse_positive_length,
+        parse_positive_temperature_difference,
         parse_ratio,
         parse_ratio_drift,
         plain_number,

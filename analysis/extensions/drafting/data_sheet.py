@@ -6,12 +6,23 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from ballplate.simulator.inputs import LengthFunction, Target
+from ballplate.simulator.inputs import LengthFunction, Target, format_length, parse_positive_length
 from ballplate.simulator.machines import ARRANGEMENTS
 
-from .machine_tables import arrangement_of, machine_kind, table, tips_form
+from .machine_tables import arrangement_of, machine_kind, table
 from .places import Settings, Tips, places_of, tips_of
-from .sheet_values import Plate, expanded, hours, permissible_error, plate, target, volume
+from .sheet_values import (
+    Plate,
+    StatedTips,
+    expanded,
+    hours,
+    permissible_error,
+    plate,
+    target,
+    temperature,
+    tips,
+    volume,
+)
 
 # How each entry is read, in the order of the questions; the first five have to be stated.
 READERS: dict[str, Callable[[str], Any]] = {
@@ -20,7 +31,9 @@ READERS: dict[str, Callable[[str], Any]] = {
     "mpe": permissible_error,
     "plate": plate,
     "certificate": expanded,
-    "tips": tips_form,
+    "tips": tips,
+    "repeatability": parse_positive_length,
+    "temperature": temperature,
     "target": target,
     "hours": hours,
 }
@@ -29,16 +42,28 @@ NEEDED = tuple(READERS)[:5]
 
 @dataclass(frozen=True)
 class DataSheet:
-    """Values by the names of `READERS`, in metres; ``target`` is None for the usual one."""
+    """Values by the names of `READERS`, in metres; None for usual values.
+
+    :raises ValueError: the repeatability is above the constant part of the MPE.
+    """
 
     machine_type: str
     volume: tuple[float, ...]
     mpe: LengthFunction
     plate: Plate
     certificate: Target
-    tips: str
+    tips: StatedTips
     hours: float
+    repeatability: float | None = None
+    temperature: str | None = None
     target: Target | None = None
+
+    def __post_init__(self) -> None:
+        if self.repeatability is not None and self.repeatability > self.mpe.constant:
+            raise ValueError(
+                f"repeatability {format_length(self.repeatability)} is above the constant part of"
+                f" the MPE, {format_length(self.mpe.constant)}; correct one of them"
+            )
 
     @property
     def arrangement(self) -> str:
@@ -48,7 +73,7 @@ class DataSheet:
     @property
     def tips_there(self) -> Tips:
         """Return the tips of this machine."""
-        return tips_of(self.tips, ARRANGEMENTS[self.arrangement].probe_side[-1], self.volume)
+        return tips_of(self.tips.form, ARRANGEMENTS[self.arrangement].probe_side[-1], self.volume)
 
     @property
     def places(self) -> list[Settings]:

@@ -22,8 +22,6 @@ TARGET = 1 / 2
 # Errors of the simulated machine, as a share of the MPE at the space diagonal: with it the errors
 # of lengths have a standard deviation of about half the MPE, found from simulated machines.
 ERRORS = 1 / 8
-# Standard uncertainty of the offset of a tip, from its qualification on a reference sphere.
-QUALIFICATION = "0.5 um"
 
 
 def draft(sheet: DataSheet, texts: Mapping[str, str], next_command: str) -> str:
@@ -41,6 +39,10 @@ def draft(sheet: DataSheet, texts: Mapping[str, str], next_command: str) -> str:
     plate = {"kind": "grid", "balls": balls, "size": [*map(typed_length, sheet.plate.size)]}
     functions = _flow(dict.fromkeys(table("unseen")[sheet.arrangement], 1))
     left_out = f"\n  # A single tip does not show these rotations.\n  functions: {functions}"
+    from_mpe = (
+        f"a third of the constant part of the MPE, {function_text(mpe)}.\n"
+        "  # Better: the standard deviation of repeated readings of a ball."
+    )
     text = files(__package__).joinpath("draft.yaml").read_text(encoding="utf-8")
     return Template(text).substitute(
         stated="\n#   ".join(
@@ -49,14 +51,17 @@ def draft(sheet: DataSheet, texts: Mapping[str, str], next_command: str) -> str:
         next_command=next_command,
         kind=sheet.machine_type,
         volume=_flow([*map(typed_length, sheet.volume)]),
-        mpe=function_text(mpe),
-        repeatability=rounded(REPEATABILITY * mpe.constant, 2),
+        repeatability=rounded(sheet.repeatability)
+        if sheet.repeatability
+        else rounded(REPEATABILITY * mpe.constant, 2),
+        repeatability_words="as stated." if sheet.repeatability else from_mpe,
         arrangement=sheet.arrangement,
         chain=chain_words(sheet.arrangement),
         functions=left_out if tips.form == "one" else "",
         position=rounded(error, 2),
         rotation=f"{1e6 * error / max(sheet.volume):.2g} urad",
-        probes=_tips(tips),
+        probes=_tips(tips, rounded(sheet.tips.uncertainty)),
+        influences=_influences(sheet.temperature),
         plate=_flow(plate | {"role": "plate"}),
         positions=_entries(starts),
         certificate=function_text(sheet.certificate.stated),
@@ -70,16 +75,41 @@ def draft(sheet: DataSheet, texts: Mapping[str, str], next_command: str) -> str:
     )
 
 
-def _tips(tips: Tips) -> str:
+def _tips(tips: Tips, qualification: str) -> str:
     """Return the probes as a file has them; all but the reference have an uncertainty."""
     probes, uncertainty = dict[str, Settings](), dict[str, str]()
     for name, offset in tips.offsets.items():
         where = {"offset": [*map(typed_length, offset)]}
         probes[name] = (table("angles")[name] if tips.form == "head" else where) | uncertainty
-        uncertainty = {"standard_uncertainty": QUALIFICATION}
+        uncertainty = {"standard_uncertainty": qualification}
     head = f"head: {{tip: [0 mm, 0 mm, {typed_length(-2 * tips.length)}]}}\n"
     lines = "".join(f"\n  {name}: {_flow(probe)}" for name, probe in probes.items())
     return f"{head if tips.form == 'head' else ''}probes:{lines}"
+
+
+def _influences(uncertainty: str | None) -> str:
+    """Return the temperatures as a file has them, nothing if they are exactly known."""
+    if uncertainty is None:
+        return ""
+    measured = {"value": "20 degC", "standard_uncertainty": uncertainty}
+    measured["sensor_uncertainty"] = uncertainty
+    expansion = {"value": "11.5 um/m/K", "standard_uncertainty": "0 um/m/K"}
+    quantities = {"expansion": expansion, "temperature": measured}
+    lines = (
+        f"    {body}_{name}: {_flow(value)}"
+        for body in ("artefact", "scale")
+        for name, value in quantities.items()
+    )
+    return "\n".join(
+        [
+            "",
+            "# Temperatures, in all positions alike and in each; plate and scales of steel.",
+            "influences:",
+            "  - kind: temperature",
+            *lines,
+            "",
+        ]
+    )
 
 
 def _certificate(standard: LengthFunction) -> str:

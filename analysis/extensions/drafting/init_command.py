@@ -8,11 +8,12 @@ import shlex
 import sys
 from argparse import ArgumentParser, Namespace
 from collections.abc import Callable
+from math import ceil
 
 from ballplate.cli import UsageError, argument_type
-from ballplate.simulator.experiment import load
+from ballplate.simulator.experiment import Experiment, load
 
-from .data_sheet import NEEDED, READERS, data_sheet
+from .data_sheet import NEEDED, READERS, DataSheet, data_sheet
 from .draft import draft
 from .machine_tables import table
 
@@ -50,40 +51,63 @@ def drafted(options: Namespace) -> tuple[str, str] | None:
         lacking = " ".join(f'{_option(name)} "{entries[name]["default"]}"' for name in wanted)
         raise UsageError(f"the data sheet lacks values; add for example {lacking}")
     for name in wanted:
-        texts[name] = _answer(name, texts)
+        texts[name] = _answer(name, texts, options)
     try:
-        sheet = data_sheet(texts)
-        chosen = options.file.with_name(f"{options.file.stem}-chosen.yaml")
-        hours = f"{sheet.hours:g}"
-        command = shlex.join(
-            ["ballplate", "plan", str(options.file), "--hours", hours, "-o", str(chosen)]
-        )
-        text = draft(sheet, texts, command)
+        return _draft(options, data_sheet(texts), texts)
     except ValueError as error:
         raise UsageError(str(error)) from None
-    # What the file format refuses is reported before anything is written.
-    load(options.file, planning=True, text=text)
+
+
+def _draft(options: Namespace, sheet: DataSheet, texts: dict[str, str]) -> tuple[str, str]:
+    """Return the text of the file, as the file format allows it, and the next command.
+
+    :raises ValueError: the plate and the hours do not go with the machine.
+    """
+    chosen = options.file.with_name(f"{options.file.stem}-chosen.yaml")
+    plan = ["ballplate", "plan", options.file, "--hours", f"{sheet.hours:g}", "-o", chosen]
+    command = shlex.join(map(str, plan))
+    text = draft(sheet, texts, command)
+    (experiment,) = load(options.file, planning=True, text=text)
+    least = _least_hours(experiment)
+    if sheet.hours < least:
+        raise ValueError(
+            f"{sheet.hours:g} h is too short: three positions with a change of plane take"
+            f" {ceil(10 * least) / 10:g} h; give more"
+        )
     return text, command
 
 
-def _answer(name: str, texts: dict[str, str]) -> str:
+def _least_hours(experiment: Experiment) -> float:
+    """Return the hours of the three quickest positions with a change of plane; fewer positions, or
+    those of one plane, leave something undetermined.
+    """
+    pool = experiment.pool
+    assert pool is not None
+    quickest = sorted(candidate.seconds for candidate in pool.candidates)[:3]
+    return (sum(quickest) + pool.changes.plane) / 3600
+
+
+def _answer(name: str, texts: dict[str, str], options: Namespace) -> str:
     """Return an answer at the terminal that goes with the earlier ones; nothing is the default.
 
     :raises UsageError: the input ends.
     """
     entry = table("entries")[name]
     while True:
-        default = entry["default"] or "half the MPE"
+        default = entry["default"] or entry["usual"]
         print(f"{entry['question']} [{default}]: ", end="", file=sys.stderr, flush=True)
         line = sys.stdin.readline()
         if not line:
             raise UsageError(f"no answer about the {entry['question']}; nothing is written")
         answer = line.strip() or str(entry["default"])
         try:
-            sheet = data_sheet({**texts, name: answer})
+            stated = {**texts, name: answer}
+            sheet = data_sheet(stated)
             # As soon as both are known, with usual tips and hours.
-            if "plate" in {*texts, name}:
+            if "plate" in stated:
                 _ = sheet.places
+            if name == "hours":
+                _draft(options, sheet, stated)
         except ValueError as error:
             print(error, file=sys.stderr)
         else:

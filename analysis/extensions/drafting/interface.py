@@ -16,14 +16,19 @@ def design(
     certificate: str,
     tips: str = "star",
     target: str | None = None,
+    repeatability: str | None = None,
+    temperature: str | None = None,
 ) -> Experiment:
     """Return an experiment with a pool, drafted from a machine's data sheet as by `ballplate init`.
 
     All values are texts, quantities with units. The type of machine is moving bridge, fixed
     bridge, gantry, cantilever, horizontal arm, column, or an arrangement such as MB1; the volume
     has three edges; of an MPE such as 0.9 um + L/400, L is in mm and the result in um; the
-    certificate is an expanded uncertainty with its k; tips are one, star or head. The target is
-    one of the expanded uncertainty of lengths, by default half the MPE.
+    certificate is an expanded uncertainty with its k; tips are one, star or head, with or without
+    the standard uncertainty of their offsets. The target is one of the expanded uncertainty of
+    lengths, by default half the MPE; the repeatability is a standard deviation, by default a third
+    of the constant part of the MPE; the temperature is the standard uncertainty of temperatures,
+    by default exactly known.
 
     :raises ValueError: a text cannot be read, or the plate does not fit into the volume within the
         reach of the tips.
@@ -43,7 +48,9 @@ def design(
         "plate": plate,
         "certificate": certificate,
         "tips": tips,
-        "target": "" if target is None else target,
+        "target": target or "",
+        "repeatability": repeatability or "",
+        "temperature": temperature or "",
     }
     for name, text in texts.items():
         ensure_type(str, "a text, of a quantity with its unit", **{name: text})

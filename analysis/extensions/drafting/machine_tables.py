@@ -29,14 +29,6 @@ def machine_kind(text: str) -> str:
     return known("type of machine", text.replace("-", " "), [*table("kinds"), *ARRANGEMENTS])
 
 
-def tips_form(text: str) -> str:
-    """Return the form of the tips.
-
-    :raises ValueError: unknown; names all.
-    """
-    return known("tips", text, [*table("tips")])
-
-
 def known(noun: str, text: str, names: list[str]) -> str:
     """Return the one of some names that a text has in any case.
 

@@ -13,10 +13,15 @@ from ballplate.simulator.inputs import (
     parse_duration,
     parse_length_function,
     parse_positive_length,
+    parse_positive_temperature_difference,
     typed_length,
 )
 
+from .machine_tables import known, table
+
 NUMBER = r"((?:[0-9]+\.?[0-9]*|\.[0-9]+))"
+# Usual standard uncertainty in metres of the offset of a tip qualified on a reference sphere.
+QUALIFICATION = 0.5e-6
 # Between lengths: a cross, a comma, or a space before the next number.
 BETWEEN = re.compile(r"\s*[x×*,;]\s*|\s+(?=[-+.0-9])")
 # A name such as E0, MPE before a value.
@@ -39,6 +44,14 @@ class Plate:
     columns: int
     rows: int
     size: tuple[float, float]
+
+
+@dataclass(frozen=True)
+class StatedTips:
+    """The ``form`` of tips; ``uncertainty`` of their offsets in metres."""
+
+    form: str
+    uncertainty: float
 
 
 def lengths(text: str, count: int = 3) -> tuple[float, ...]:
@@ -148,6 +161,32 @@ def plate(text: str) -> Plate:
     elif len(sides) == 1 and columns != rows:
         raise ValueError(f'"{text}" has one size for two sides; give both, such as 420 x 252 mm')
     return Plate(columns, rows, (round(sides[0], 9), round(sides[-1], 9)))
+
+
+def tips(text: str) -> StatedTips:
+    """Return the form of tips with the standard uncertainty of each offset, the usual one if none
+    is stated.
+
+    :raises ValueError: an unknown form, or no uncertainty of 1 mm at most.
+
+    >>> tips("star"), tips("head, 0.3 um").uncertainty
+    (StatedTips(form='star', uncertainty=5e-07), 3e-07)
+    """
+    form, comma, length = text.partition(",")
+    uncertainty = parse_positive_length(length) if comma else QUALIFICATION
+    if uncertainty > 1e-3:
+        raise ValueError(f'"{text}" has offsets known to 1 mm or less; write "star, 0.5 um"')
+    return StatedTips(known("tips", form, [*table("tips")]), uncertainty)
+
+
+def temperature(text: str) -> str:
+    """Return a standard uncertainty of temperatures, as it is stated.
+
+    :raises ValueError: none above zero and at most 5 K.
+    """
+    if parse_positive_temperature_difference(text) > 5.0:
+        raise ValueError(f'"{text}" is no uncertainty of a temperature; write for example "0.1 K"')
+    return text.strip()
 
 
 def hours(text: str) -> float:

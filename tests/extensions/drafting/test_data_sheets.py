@@ -39,6 +39,10 @@ EXAMPLE = Path("designs/quickstart.yaml")
         ({"plate": "1 x 6, 420 mm"}, wording.SINGLE_LINE),
         ({"plate": "6 x 4, 420 mm"}, wording.ONE_SIZE),
         ({"hours": "0"}, wording.NO_TIME),
+        ({"hours": "1"}, wording.TOO_SHORT),
+        ({"temperature": "20 degC"}, wording.NO_UNCERTAINTY_OF_TEMPERATURE),
+        ({"repeatability": "2 um"}, wording.COARSE_REPEATABILITY),
+        ({"tips": "star, 2 mm"}, wording.COARSE_TIPS),
         ({"plate": "6 x 6, 1300 mm"}, wording.LARGER_THAN_THE_VOLUME),
         ({"plate": "6 x 6, 650 mm"}, wording.OUT_OF_REACH),
         ({"plate": "6 x 6, 900 mm", "tips": "one"}, wording.OUT_OF_REACH_OF_ONE),
@@ -126,7 +130,9 @@ def test_the_help_names_all(capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(SystemExit):
         main(["init", "--help"])
     told = " ".join(capsys.readouterr().out.split())
-    for option in options(dict.fromkeys((*BRIDGE, "tips", "target", "hours"), "")):
+    for option in options(
+        dict.fromkeys((*BRIDGE, "tips", "repeatability", "temperature", "target", "hours"), "")
+    ):
         assert option in told
     assert "MB1: y carries x carries z" in told and "--example" in told
 
@@ -154,9 +160,10 @@ def at_terminal(folder: Path, *words: str, typed: str) -> tuple[int, str]:
 def test_questions_at_a_terminal(tmp_path: Path) -> None:
     """Nonsense is answered at once and asked again; nothing typed is the default."""
     answers = ["bridge", "gantry", "", "", "6 x 6, 1300 mm", "5 x 5, 400 mm", "0.4 um", ""]
-    typed = "\n".join([*answers, "star", "", "4", ""])
+    typed = "\n".join([*answers, "star", "", "", "", "1", "4", ""])
     status, told = at_terminal(tmp_path, "m.yaml", typed=typed)
     assert status == 0, told
+    assert wording.TOO_SHORT.replace("2 h", "1.9 h") in told
     assert wording.UNKNOWN_MACHINE in told and wording.LARGER_THAN_THE_VOLUME in told
     assert "measuring volume, x y z [900 1200 700 mm]: " in told
     assert (

@@ -13,6 +13,7 @@ from ballplate.extensions.drafting.data_sheet import data_sheet
 from ballplate.extensions.drafting.draft import draft
 from ballplate.extensions.drafting.machine_tables import chain_words, table
 from ballplate.simulator.experiment.loading import load
+from ballplate.simulator.experiment.pool import with_chosen
 from ballplate.simulator.machines.arrangement import ARRANGEMENTS
 from ballplate.simulator.machines.settings import build_error_model
 from ballplate.simulator.machines.true_machine_settings import RandomSettings
@@ -127,6 +128,30 @@ def test_a_target_of_ones_own() -> None:
     text = drafted(BRIDGE, target="1 um + L/500, k=3")
     assert "target_uncertainty: 1 um + 2 um/m" in text and "coverage_factor: 3" in text
     assert wording.HALF_THE_MPE not in text
+
+
+def test_stated_values() -> None:
+    """The stated temperature is the one that the table of assumptions has for 0.1 K."""
+    (usual,) = load(Path("drafted.yaml"), text=drafted(SMALL))
+    (stated,) = load(Path("drafted.yaml"), text=drafted(SMALL, temperature="0.1 K"))
+    rows = {effect.assumption.name: effect for effect in bp.assumptions(usual).effects}
+    average = bp.run(stated).quantities["U6"].average
+    assert average == pytest.approx(rows["temperature"].average, rel=1e-9)
+    assert "temperature" not in {one.assumption.name for one in bp.assumptions(stated).effects}
+    text = drafted(BRIDGE, repeatability="0.25 um", tips="head, 0.3 um")
+    assert "repeatability: 0.25 um" in text and text.count("standard_uncertainty: 0.3 um}") == 4
+
+
+@pytest.mark.parametrize("name", SHEETS)
+def test_a_choice_has_three_positions_of_two_planes(name: str) -> None:
+    """So that `init` may refuse a time that does not suffice for them."""
+    (every,) = load(Path("drafted.yaml"), planning=True, text=drafted(SHEETS[name]))
+    assert every.pool is not None
+    candidates, generator = every.pool.candidates, np.random.default_rng(1)
+    few = [[one for one in candidates if one.plane == plane] for plane in "xyz"]
+    few += [[candidates[i] for i in generator.permutation(len(candidates))[:2]] for _ in range(20)]
+    for chosen in few:
+        assert bp.check(with_chosen(every, chosen)).verdict.deficiency > 0
 
 
 def test_a_plate_that_is_not_square() -> None:

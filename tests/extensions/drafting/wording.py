@@ -20,6 +20,12 @@ NO_CONSTANT_PART = '"0 um + L/400" has no constant part'
 NO_VOLUME = '"900" has 1 length, not 3'
 SINGLE_LINE = '"1 x 6, 420 mm" is no plate of 2 x 2 balls or more'
 ONE_SIZE = '"6 x 4, 420 mm" has one size for two sides; give both, such as 420 x 252 mm'
+TOO_SHORT = "1 h is too short: three positions with a change of plane take 2 h; give more"
+NO_UNCERTAINTY_OF_TEMPERATURE = '"20 degC" is no uncertainty of a temperature'
+COARSE_REPEATABILITY = (
+    "repeatability 2 µm is above the constant part of the MPE, 0.9 µm; correct one of them"
+)
+COARSE_TIPS = '"star, 2 mm" has offsets known to 1 mm or less; write "star, 0.5 um"'
 NO_TIME = '"0" leaves no time for measuring'
 LARGER_THAN_THE_VOLUME = (
     "the plate of 1300 mm x 1300 mm is larger than the volume, 900 mm x 1200 mm x 700 mm"
