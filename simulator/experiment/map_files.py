@@ -8,6 +8,7 @@ import io
 import json
 import math
 import os
+import re
 import zipfile
 from collections.abc import Mapping
 from pathlib import Path
@@ -27,6 +28,16 @@ from .map_checks import map_of_tree
 from .map_content import head_of
 
 BINARY = ".npz"
+# A map file in text has this key, which no other file has.
+OF_MAPS = re.compile(rb"^map\s*:", re.MULTILINE)
+
+
+def is_map_file(path: Path) -> bool:
+    """Identify a map file, by its name or contents.
+
+    :raises ExperimentError: it cannot be read.
+    """
+    return path.suffix.lower() == BINARY or bool(OF_MAPS.search(read_bytes(path)))
 
 
 def write_map(fitted: FittedMap, path: str | os.PathLike[str]) -> None:

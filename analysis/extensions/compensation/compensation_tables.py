@@ -3,22 +3,29 @@
 from __future__ import annotations
 
 import math
-import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from ballplate.presentation import Data, MainTable, Result, aligned, given, picked, table_lines
-from ballplate.simulator.experiment import BINARY, load_machine, read_map
+from ballplate.presentation import (
+    Data,
+    MainTable,
+    Result,
+    aligned,
+    by_axis,
+    given,
+    picked,
+    table_lines,
+)
+from ballplate.simulator.experiment import is_map_file, load_machine, read_map
 from ballplate.simulator.geometry import grid_points
 from ballplate.simulator.inputs import (
     Message,
     format_length,
     listing,
     parse_length,
-    read_text,
     refused,
 )
 from ballplate.simulator.machines import AXES, AXIS_ERRORS, Array, Points, true_volumetric
@@ -69,27 +76,17 @@ class CompensationTable(Result):
     def columns(self) -> MainTable:
         """One row for each node of an axis, or of the volume."""
         if isinstance(self.table, VolumeTable):
-            places = np.stack(np.meshgrid(*self.table.nodes, indexing="ij"), axis=-1)
-            rows: list[dict[str, Any]] = [
-                dict(zip((*AXES[: len(place)], *_PARTS), (*place, *values), strict=True))
-                for place, values in zip(
-                    places.reshape(-1, self.table.dimension).tolist(),
-                    self.table.values.reshape(-1, 6).tolist(),
-                    strict=True,
-                )
-            ]
-            return {f"{name}, {_UNITS.get(name, 'mm')}": name for name in rows[0]}, rows
-        rows = [
-            {
-                "axis": AXES[axis.axis],
-                "position": position,
-                **dict(zip(_PARTS, values, strict=True)),
+            places = by_axis("{}, mm", grid_points(self.table.nodes))
+            values = self.table.values.reshape(-1, 6)
+        else:
+            axes = self.table.axes
+            places = {
+                "axis": [AXES[table.axis] for table in axes for _ in table.positions],
+                "position, mm": np.concatenate([table.positions for table in axes]),
             }
-            for axis in self.table.axes
-            for position, values in zip(axis.positions.tolist(), axis.values.tolist(), strict=True)
-        ]
-        parts = {f"{name}, {unit}": name for name, unit in _UNITS.items()}
-        return {"axis": "axis", "position, mm": "position", **parts}, rows
+            values = np.concatenate([table.values for table in axes])
+        moved = by_axis("displacement {}, µm", values[:, :3])
+        return {**places, **moved, **by_axis("turn about {}, µrad", values[:, 3:])}, ()
 
     def data(self) -> Data:
         result_data = {
@@ -121,13 +118,6 @@ class CompensationTable(Result):
             "",
             *_axis_lines(self.table),
         ]
-
-
-_UNITS = {
-    **{f"displacement {axis}": "µm" for axis in AXES},
-    **{f"turn about {axis}": "µrad" for axis in AXES},
-}
-_PARTS = tuple(_UNITS)
 
 
 def _axis_lines(table: AxisTables) -> list[str]:
@@ -263,7 +253,7 @@ def tabled_machine(
     :raises ExperimentError: the file is invalid, what it says of corrections is undetermined, or
         the lack of fit is beyond the limit and not allowed.
     """
-    if _is_map(path):
+    if is_map_file(path):
         return of_map(read_map(path), path, allow_lack_of_fit)
     doubts: list[Message] = []
     machine = load_machine(path, doubts)
@@ -285,12 +275,6 @@ def tabled_machine(
     offsets = np.array([machine.probe])
     tabled = TabledMachine(machine.title, truth.model, truth.a, lower, upper, zero, offsets, bends)
     return tabled, tuple(map(str, doubts))
-
-
-def _is_map(path: Path) -> bool:
-    if path.suffix.lower() == BINARY:
-        return True
-    return re.search("^covariance:", read_text(path), re.MULTILINE) is not None
 
 
 def of_map(
@@ -430,8 +414,6 @@ def read_compensation_files(
     """
     own_arrangement = None if arrangement is None else parse_arrangement(arrangement)
     point = None if origin is None else tuple(origin)
-    tables_read = read_table_files(FORMATS[name], paths, sense, own_arrangement, point)
+    table, stated, notes = read_table_files(FORMATS[name], paths, sense, own_arrangement, point)
     title = listing(path.name for path in paths)
-    return ReadCompensation(
-        paths[0].stem, title, FORMATS[name], tables_read.sense, tables_read.table, tables_read.notes
-    )
+    return ReadCompensation(paths[0].stem, title, FORMATS[name], stated, table, notes)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -33,25 +33,15 @@ from .table_formats import SENSES, Sense, StatedTable, Table, TableFormat, with_
 AXES = ("x", "y", "z")
 
 
-@dataclass(frozen=True, eq=False)
-class ReadTable:
-    """A table as corrections to be added to scale readings, whatever the files state, and in which
-    `sense` they do; `notes` tell what is not read.
-    """
-
-    table: Table
-    sense: Sense
-    notes: tuple[str, ...]
-
-
 def read_table_files(
     made: TableFormat,
     paths: Sequence[Path],
     sense: Sense | None = None,
     arrangement: Arrangement | None = None,
     origin: Corner | None = None,
-) -> ReadTable:
-    """Read the files of a table in a format.
+) -> tuple[Table, Sense, tuple[str, ...]]:
+    """Read the files of a table in a format: as corrections to be added to scale readings, with the
+    sense that the files state, and notes on what is not read.
 
     `sense` says which errors they state where they do not, `arrangement` whose errors are wanted,
     and, where they state none, whose they are; `origin` is the point from which levers count.
@@ -64,10 +54,9 @@ def read_table_files(
         if arrangement is not None:
             text = "a table of the whole volume has no arrangement of axes; leave it out"
             raise refused(paths[0], text)
-        return ReadTable(with_sense(statements.volume, meant), meant, statements.notes)
-    own_arrangement = _arrangement(statements, made, arrangement, paths[0])
+        return with_sense(statements.volume, meant), meant, statements.notes
     tables = AxisTables(
-        own_arrangement,
+        _arrangement(statements, made, arrangement, paths[0]),
         _origin(statements, made, origin, paths[0]),
         statements.axes,
     )
@@ -81,7 +70,7 @@ def read_table_files(
     notes = statements.notes
     if not made.has_rotations:
         notes = (*notes, f"{made.name} tables have no rotations: the errors read have none")
-    return ReadTable(with_sense(tables, meant), meant, notes)
+    return with_sense(tables, meant), meant, notes
 
 
 def _sense(statements: StatedTable, sense: Sense | None, path: Path) -> Sense:
@@ -103,15 +92,11 @@ def _arrangement(
 ) -> Arrangement:
     """The arrangement that the values are told in."""
     if statements.arrangement is not None:
-        own_arrangement = statements.arrangement
-    elif wanted is not None:
-        own_arrangement = Arrangement(tool_chain(wanted)) if made.from_zero else wanted
-    else:
-        raise refused(
-            path,
-            "does not state the machine's arrangement of axes; name it, such as MB2 or FB1",
-        )
-    return own_arrangement
+        return statements.arrangement
+    if wanted is None:
+        text = "does not state the machine's arrangement of axes; name it, such as MB2 or FB1"
+        raise refused(path, text)
+    return Arrangement(tool_chain(wanted)) if made.from_zero else wanted
 
 
 def _origin(

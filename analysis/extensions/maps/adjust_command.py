@@ -116,7 +116,7 @@ def run(options: Namespace) -> int:
 
 def _second(options: Namespace) -> tuple[FittedMap | None, bool]:
     """The map of the second campaign, and whether there is something to complain of."""
-    from .fit_files import is_map_file
+    from ballplate.simulator.experiment import is_map_file
 
     if is_map_file(options.after[0]):
         return _fitted(options, options.after[0], options.after[1:])
@@ -132,9 +132,7 @@ def _fitted(options: Namespace, file: Path, readings: list[Path]) -> tuple[Fitte
     """Return a map, of a file or of a fit, and whether it has a failure reason; None if a fit
     failed.
     """
-    from ballplate.simulator.experiment import read_map
-
-    from .fit_files import is_map_file
+    from ballplate.simulator.experiment import is_map_file, read_map
 
     if is_map_file(file):
         if readings:

@@ -2,25 +2,13 @@
 
 from __future__ import annotations
 
-import re
 from pathlib import Path
 from typing import Literal
 
 from ballplate.results import Fit, fit
-from ballplate.simulator.experiment import BINARY, lay_out, load
-from ballplate.simulator.inputs import Mapping, read_bytes, read_tree, refused
+from ballplate.simulator.experiment import is_map_file, lay_out, load
+from ballplate.simulator.inputs import Mapping, read_tree, refused
 from ballplate.simulator.readings import read_readings
-
-# A map file says at its beginning that it is one.
-OF_MAPS = re.compile(rb"^map\s*:", re.MULTILINE)
-
-
-def is_map_file(path: Path) -> bool:
-    """Identify a map file, by its name or contents.
-
-    :raises ExperimentError: it cannot be read.
-    """
-    return path.suffix.lower() == BINARY or bool(OF_MAPS.search(read_bytes(path)))
 
 
 def kind_of_file(path: Path) -> Literal["map", "machine", "experiment"]:
@@ -28,12 +16,10 @@ def kind_of_file(path: Path) -> Literal["map", "machine", "experiment"]:
 
     :raises ExperimentError: it cannot be read.
     """
-    if path.suffix.lower() == BINARY:
+    if is_map_file(path):
         return "map"
     root = read_tree(path)
     keys = root.items if isinstance(root, Mapping) else {}
-    if "map" in keys:
-        return "map"
     if "positions" in keys or "machine" in keys or "pool" in keys:
         return "experiment"
     return "machine" if "arrangement" in keys else "map"

@@ -7,11 +7,10 @@ from functools import reduce
 from pathlib import Path
 
 from ballplate.simulator.design import Tasks
-from ballplate.simulator.experiment import Experiment, read_map
+from ballplate.simulator.experiment import Experiment, is_map_file, read_map
 from ballplate.simulator.maps import FittedMap
 
 from .error_curves_result import ErrorCurves, error_curves
-from .fit_files import is_map_file
 from .fitted_errors_result import FittedErrorMap, fitted_map_errors
 from .map_places import PlacesAsked
 from .realisations import Draws
