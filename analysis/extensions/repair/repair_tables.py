@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from ballplate.presentation import Data, finite, number, picked
@@ -15,6 +16,7 @@ from .offers import duration
 if TYPE_CHECKING:
     from .repair_search import Repair, Repairs
     from .scale import ScaleCertificate
+    from .written import Edit
 
 # Names of errors that a line has room for.
 MOST_NAMES = 8
@@ -143,10 +145,7 @@ def certificate_data(certificate: ScaleCertificate | None) -> Data | None:
         "text": None if certificate.change is None else certificate.change.words,
         "offset_uncertainty": certificate.offset_uncertainty,
         "average_U6": finite(certificate.average),
-        "edits": [
-            {"path": edit.path, "adds": edit.is_new, "value": edit.value}
-            for edit in certificate.edits
-        ],
+        "edits": _edit_data(certificate.edits),
     }
 
 
@@ -179,7 +178,9 @@ def _data(repair: Repair) -> Data:
         "offset_uncertainty": OFFSET_TRIAL,
         "rests_on_exact_offsets": repair.rests_on_offsets,
         **picked(repair, "readings", "seconds"),
-        "edits": [
-            {"path": edit.path, "adds": edit.is_new, "value": edit.value} for edit in repair.edits
-        ],
+        "edits": _edit_data(repair.edits),
     }
+
+
+def _edit_data(edits: Sequence[Edit]) -> list[Data]:
+    return [{"path": edit.path, "adds": edit.is_new, "value": edit.value} for edit in edits]
