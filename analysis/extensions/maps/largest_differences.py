@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from ballplate.simulator.design import Flags, Volume
@@ -45,26 +46,12 @@ def largest_at_points(
     (k, d).
     """
 
-    def size(x: Array, p: Array) -> Array:
-        return np.linalg.norm(differences(x, p), axis=1)
+    def size(x: Array, offset: Array) -> Array:
+        return np.linalg.norm(differences(x, np.broadcast_to(offset, x.shape)), axis=1)
 
-    d = len(volume.lower)
-    x = even_grid(*volume.corners, [POINTS_ALONG[d]] * d)
-    at_random = _at_random(volume, RANDOM)
-    largest, squares = 0.0, []
-    for offset in offsets:
-        squares.append(size(at_random, np.broadcast_to(offset, at_random.shape)) ** 2)
-        values = size(x, np.broadcast_to(offset, x.shape))
-        best = _best_of_parts(values, x > volume.lower + 0.5 * volume.size)
-        starts = np.concatenate([x[best], at_random[[int(squares[-1].argmax())]]])
-
-        def size_at(some: Array, offset: Array = offset) -> Array:
-            return size(some, np.broadcast_to(offset, some.shape))
-
-        step = volume.size / (POINTS_ALONG[d] - 1)
-        largest = max(largest, _climbed(size_at, starts, volume.lower, volume.upper, step))
-    rms = float(np.sqrt(np.mean(squares)))
-    return LargestDifference(largest, rms, len(offsets) * (len(x) + RANDOM))
+    along = POINTS_ALONG[len(volume.lower)]
+    x = _grid(volume, along)
+    return _searched(size, x, partial(size, x), volume, offsets, along)
 
 
 def largest_of_lengths(
@@ -74,41 +61,61 @@ def largest_of_lengths(
     probe of one of the offsets (k, d), by corrected points (n, d) of two maps.
     """
 
-    def apart(ends: Array, p: Array) -> Array:
+    def apart(ends: Array, offset: Array) -> Array:
         first, second = np.split(ends, 2, axis=1)
+        p = np.broadcast_to(offset, first.shape)
         lengths = [
             np.linalg.norm(places(first, p) - places(second, p), axis=1) for places in (old, new)
         ]
         return np.abs(lengths[1] - lengths[0])
 
-    d = len(volume.lower)
-    x = even_grid(*volume.corners, [ENDS_ALONG[d]] * d)
+    along = ENDS_ALONG[len(volume.lower)]
+    x = _grid(volume, along)
     i, j = np.triu_indices(len(x), 1)
-    at_random = _at_random(volume, 2 * RANDOM).reshape(RANDOM, 2 * d)
-    middle = np.tile(volume.lower + 0.5 * volume.size, 2)
-    step = np.tile(volume.size / (ENDS_ALONG[d] - 1), 2)
+
+    def apart_on_grid(offset: Array) -> Array:
+        # Each point is corrected once.
+        p = np.broadcast_to(offset, x.shape)
+        lengths = [np.linalg.norm(y[i] - y[j], axis=1) for y in (old(x, p), new(x, p))]
+        return np.abs(lengths[1] - lengths[0])
+
+    ends = np.concatenate([x[i], x[j]], axis=1)
+    return _searched(apart, ends, apart_on_grid, volume, offsets, along)
+
+
+def _grid(volume: Volume, along: int) -> Array:
+    return even_grid(*volume.corners, [along] * len(volume.lower))
+
+
+def _searched(
+    value: Callable[[Array, Array], Array],
+    places: Array,
+    on_grid: Callable[[Array], Array],
+    volume: Volume,
+    offsets: Array,
+    along: int,
+) -> LargestDifference:
+    """The largest value (n,) at places (n, m) of one or more points each with a probe offset; a
+    search starts from the best of `places`, whose values `on_grid` gives for an offset.
+    """
+    points = places.shape[1] // len(volume.lower)
+    lower, upper = (np.tile(corner, points) for corner in volume.corners)
+    step = np.tile(volume.size / (along - 1), points)
+    generator = np.random.default_rng(np.random.SeedSequence(2))
+    at_random = generator.uniform(lower, upper, (RANDOM, len(lower)))
     largest, squares = 0.0, []
     for offset in offsets:
 
-        def apart_at(ends: Array, offset: Array = offset) -> Array:
-            return apart(ends, np.broadcast_to(offset, (len(ends), d)))
+        def value_at(x: Array, offset: Array = offset) -> Array:
+            return value(x, offset)
 
-        squares.append(apart_at(at_random) ** 2)
-        p = np.broadcast_to(offset, x.shape)
-        lengths = [
-            np.linalg.norm(length[i] - length[j], axis=1) for length in (old(x, p), new(x, p))
-        ]
-        ends = np.concatenate([x[i], x[j]], axis=1)
-        best = _best_of_parts(np.abs(lengths[1] - lengths[0]), ends > middle)
-        lower, upper = (np.tile(corner, 2) for corner in volume.corners)
-        largest = max(largest, _climbed(apart_at, ends[best], lower, upper, step))
+        random_values = value_at(at_random)
+        squares.append(random_values**2)
+        best = _best_of_parts(on_grid(offset), places > lower + 0.5 * (upper - lower))
+        starts = np.concatenate([places[best], at_random[[int(random_values.argmax())]]])
+        largest = max(largest, _climbed(value_at, starts, lower, upper, step))
     rms = float(np.sqrt(np.mean(squares)))
-    return LargestDifference(largest, rms, len(offsets) * (len(i) + RANDOM))
-
-
-def _at_random(volume: Volume, count: int) -> Array:
-    generator = np.random.default_rng(np.random.SeedSequence(2))
-    return generator.uniform(volume.lower, volume.upper, (count, len(volume.lower)))
+    return LargestDifference(largest, rms, len(offsets) * (len(places) + RANDOM))
 
 
 def _best_of_parts(values: Array, halves: Flags) -> Array:

@@ -287,6 +287,11 @@ def test_wrong_usage(
             "EC0Y is the squareness of Y to X, a single number: -45.00 µrad at the reference point",
         ),
         (("--error", "EEX"), 'states no error "EEX"; did you mean'),
+        # In the order of the file.
+        (
+            ("--error", "QQQ"),
+            'states no error "QQQ"; known: EXX, EYX, EZX, EBX, ECX, EYY, EZY, EAY and 4 more',
+        ),
         (("--points", "10"), "points need a line; leave them out"),
         (
             ("--line", "y = 600 mm"),
