@@ -36,6 +36,13 @@ class PredictedAssumptions(AskedResult, Protocol):
     def summary(self) -> list[str]: ...
 
 
+class AskedAssumptions(AskedResult, Protocol):
+    """Answers of readings to assumptions; `verdict` has the causes that contradict them."""
+
+    @property
+    def verdict(self) -> tuple[str, ...]: ...
+
+
 class GroupVariances(AskedResult, Protocol):
     """Estimated variances of `groups` of observations."""
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -28,6 +29,7 @@ from ballplate.results.estimates import (
     labels,
 )
 from ballplate.results.extension_results import (
+    AskedAssumptions,
     AskedResult,
     GroupVariances,
     IssuedCertificate,
@@ -59,7 +61,7 @@ from ballplate.simulator.computing.steps import Report, unreported
 from ballplate.simulator.design.arrays import Design
 from ballplate.simulator.estimation.gauss_newton import Solution
 from ballplate.simulator.inputs.arguments import ensure_one_of, ensure_positive, ensure_type
-from ballplate.simulator.inputs.extensions import function, service
+from ballplate.simulator.inputs.extensions import function, optional_service, service
 from ballplate.simulator.inputs.settings import listing
 from ballplate.simulator.machines.protocol import Array
 from ballplate.simulator.maps.fit_verdict import LackOfFit
@@ -173,6 +175,8 @@ class Fit(FitResult):
         lines += ["", *self._residual_table()]
         if self.diagnosis:
             lines += self.diagnosis.lines(self.observed.marks)
+        if self.assumptions is not None:
+            lines += ["", *self.assumptions.lines()]
         if self.variance_components is not None:
             lines += ["", *self.variance_components.lines()]
             lines += [REWEIGHTED] if self.is_reweighted else []
@@ -222,6 +226,7 @@ class Fit(FitResult):
                 error_functions=[curve.to_dict() for curve in curves],
                 residuals=self._residual_groups(),
                 suspected=self.diagnosis and self.diagnosis.data(self.observed.marks),
+                assumptions=self.assumptions and self.assumptions.to_dict(),
             ),
             **(
                 {}
@@ -512,17 +517,22 @@ class Fit(FitResult):
             )
         if self.too_large:
             advice = (
-                "no single gross error explains that: try a larger error model or larger"
-                " uncertainties, and consider drifts"
+                "no single gross error and no assumption that was asked explains that: try a larger"
+                " error model or larger uncertainties"
             )
             if has_exact_values(self.design):
                 advice += "; several values stated as exact may be in error, too"
             if self.diagnosis and self.diagnosis.names_causes:
                 advice = "see what is suspected"
+            elif self.assumptions is not None and self.assumptions.verdict:
+                advice = "see what the readings contradict"
             times = self.lack_of_fit.times
             warnings.append(
                 f"S^2 is {times:.3g} times what the stated uncertainties explain; {advice}"
             )
+        elif self.assumptions is not None and self.assumptions.verdict:
+            verdict = "; ".join(self.assumptions.verdict)
+            warnings.append(f"the readings contradict the experiment: {verdict}")
         if self.without_scatter:
             warnings.append(
                 "sigma is zero within rounding, since the readings agree exactly with the model,"
@@ -579,6 +589,19 @@ class Fit(FitResult):
         if before is not None and before.is_beyond_limit:
             return before
         return lack_of_fit(self.sum_of_squares, self.sum_freedom, self.diagnosis, self.untested)
+
+    @cached_property
+    def assumptions(self) -> AskedAssumptions | None:
+        """What the readings say of each assumption of the experiment; None if they were not asked.
+
+        >>> import ballplate as bp
+        >>> fit = bp.fit(bp.quickstart(), bp.simulate(bp.quickstart()))
+        >>> fit.assumptions.verdict
+        ()
+        """
+        asked = optional_service("assumptions_asked")
+        found: AskedAssumptions | None = asked(self) if asked and self.converged else None
+        return found
 
     @property
     def without_scatter(self) -> bool:

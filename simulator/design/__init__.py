@@ -14,6 +14,7 @@ if TYPE_CHECKING:
         Readings,
         Rows,
         State,
+        disturbed_readings,
         locations,
         measured,
         nominal_places,
@@ -22,6 +23,7 @@ if TYPE_CHECKING:
         reading_noise,
         reading_uncertainties,
     )
+    from .influences.displacements import SharedDisplacements
     from .influences.drift import (
         HOUR,
         Clock,
@@ -31,6 +33,7 @@ if TYPE_CHECKING:
         ScaleDriftSettings,
         even_clock,
     )
+    from .influences.position_scale import PositionScale
     from .influences.protocol import (
         DesignParts,
         Disturbed,
@@ -38,6 +41,7 @@ if TYPE_CHECKING:
         InfluenceParameter,
         InfluenceSettings,
     )
+    from .influences.sag import Sag, SagSettings
     from .influences.temperature import COLDEST, WARMEST, TemperaturesSettings
     from .lookup import Indices, References
     from .objects import SLIGHTLY, Flags, Tasks, Volume

@@ -16,6 +16,7 @@ from ..inputs.extensions import provider
 from ..inputs.yamltree import to_list
 from ..machines.protocol import Array, ErrorModel
 from ..machines.settings import KINDS
+from ..maps.fit_verdict import verdict_content
 from ..maps.fitted_map import FittedMap, MapData
 from .model_files import fingerprints, relative
 
@@ -53,7 +54,7 @@ def head_of(fitted: FittedMap, folder: Path) -> dict[str, Any]:
         "coverage_factor": fitted.coverage_factor,
         "temperatures": None if fitted.temperatures is None else dict(fitted.temperatures),
         "data": None if fitted.data is None else to_list(_data(fitted.data)),
-        "lack_of_fit": None if fitted.lack_of_fit is None else dict(vars(fitted.lack_of_fit)),
+        "lack_of_fit": None if fitted.lack_of_fit is None else verdict_content(fitted.lack_of_fit),
         "left_out": [
             {key: value for key, value in vars(left_out).items() if value is not None}
             for left_out in fitted.left_out

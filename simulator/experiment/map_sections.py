@@ -93,6 +93,9 @@ class LackOfFitSettings(Settings):
     has_pattern: bool = Field(
         True, description="whether residuals have a pattern that noise does not explain"
     )
+    contradicted: tuple[Text, ...] = Field(
+        (), description="causes that the readings showed against assumptions of the experiment"
+    )
 
 
 class MapSettings(Settings):

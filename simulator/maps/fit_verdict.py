@@ -20,13 +20,15 @@ LIMIT, LIMIT_OF_SCATTER = 10.0, 100.0
 class LackOfFit:
     """The weighted sum of squares S^2 of a fit's residuals, at the stated uncertainties, with its
     degrees of freedom, the number of flagged readings, and a flag for a significant pattern of the
-    residuals, set too if no test was made.
+    residuals, set too if no test was made. `contradicted` are causes that the readings showed
+    against assumptions of the experiment.
     """
 
     sum_of_squares: float
     degrees_of_freedom: int
     suspected: int = 0
     has_pattern: bool = True
+    contradicted: tuple[str, ...] = ()
 
     @property
     def times(self) -> float:
@@ -83,6 +85,10 @@ class LackOfFit:
         if self.suspected:
             are = "errors are" if self.suspected > 1 else "error is"
             reasons.append(f"{self.suspected} gross {are} suspected among the readings")
+        if self.contradicted:
+            reasons.append(
+                f"the readings contradict the experiment: {'; '.join(self.contradicted)}"
+            )
         return f"in the fit of the map, {'; '.join(reasons)}" if reasons else ""
 
 
@@ -107,4 +113,11 @@ def verdict_line(lack: LackOfFit | None, symbol: str = "the map") -> str:
 
 def verdict_data(lack: LackOfFit | None) -> dict[str, Any]:
     """The verdict on a map's fit as plain data."""
-    return {"verdict": verdict_of(lack), **({} if lack is None else vars(lack))}
+    return {"verdict": verdict_of(lack), **({} if lack is None else verdict_content(lack))}
+
+
+def verdict_content(lack: LackOfFit) -> dict[str, Any]:
+    """The entries of a lack of fit, with contradictions if there are any."""
+    content = dict(vars(lack))
+    causes = content.pop("contradicted")
+    return {**content, "contradicted": list(causes)} if causes else content

@@ -100,11 +100,11 @@ class Search:
         # Noise slightly determines directions that the nominal design does not: functions
         # of the noise itself, which would explain it.
         self.drawn = linearise(at.design)
-        nominal = leftover(self.drawn, None, freedom)
+        self.nominal = nominal = leftover(self.drawn, None, freedom)
         events = patterns(at.design, self.drawn.state, None, every_start=True)
         self.of_drawn = Columns(events.matrix, event_groups(events), nominal)
         self.dimensions = [
-            _basis(nominal, smooth.columns).shape[1]
+            basis_of(nominal, smooth.columns).shape[1]
             for smooth in smooth_errors(at.design, self.drawn.state)
         ]
         start = leftover(at, x, freedom)
@@ -121,15 +121,19 @@ class Search:
         # Residuals are independent of the estimate, but not of the readings. Therefore directions
         # are those at the readings that the estimate expects.
         linearised = linearise(self.design, self.state, None, self.drawn.spectrum)
-        expected = leftover(linearised, None, start.freedom)
+        self.expected = leftover(linearised, None, start.freedom)
         smooths = smooth_errors(self.design, self.state)
         reduced = [
-            Smooth(smooth.words, _basis(start, _basis(expected, smooth.columns, most)))
+            replace(smooth, columns=self.visible(smooth.columns, most))
             for smooth, most in zip(smooths, self.dimensions, strict=True)
         ]
         self.smooth = [smooth for smooth in reduced if smooth.columns.shape[1]]
         self.scatters = scatters(self.design)
         self.other_tests = max(len(self.smooth) + len(self.scatters), 1)
+
+    def visible(self, columns: Array, most: int) -> Array:
+        """Return a basis (n, q) of what residuals show of biases (n, k), in `most` directions."""
+        return basis_of(self.start, basis_of(self.expected, columns, most))
 
     @property
     def limit(self) -> float:
@@ -194,7 +198,7 @@ class Search:
         statistics = normal_equivalent(log_p), normal_equivalent(limit)
         return Unexplained(words, math.sqrt(total / freedom), too_large, *statistics)
 
-    def _log_p(self, square: float, dimensions: float, remainder: Leftover) -> float:
+    def log_p(self, square: float, dimensions: float, remainder: Leftover) -> float:
         """Return the logarithm of the p-value of a sum of squares among the residuals
         `remainder`.
         """
@@ -215,7 +219,7 @@ class Search:
             best_index = int(
                 np.flatnonzero(log_chances_of_group <= log_chances_of_group.min() * (1.0 - 1e-9))[0]
             )
-            log_p = self._log_p(
+            log_p = self.log_p(
                 explained.square[best_index], explained.dimensions[best_index], self.left
             )
             if log_p < best.log_p * (1.0 + 1e-9):
@@ -228,11 +232,11 @@ class Search:
         A smooth error that contains the event is an alternative only if it explains more than the
         event.
         """
-        event_basis = _basis(self.left, self._dense(event.columns))
+        event_basis = basis_of(self.left, self._dense(event.columns))
         chances = np.zeros(len(self.smooth))
         for k, smooth in enumerate(self.smooth):
-            basis = _further(self.left, smooth.columns, self.width)
-            chances[k] = self._log_p(*_explained(self.left, basis), self.left)
+            basis = further_basis(self.left, smooth.columns, self.width)
+            chances[k] = self.log_p(*explained_by(self.left, basis), self.left)
             beyond = event_basis - basis @ (basis.T @ event_basis)
             if event_basis.shape[1] and (beyond**2).sum() <= SAME:
                 further_log_p = self._conditional(event.columns, basis)
@@ -243,7 +247,7 @@ class Search:
         """Return whether a smooth error is merely a cause in one of its directions."""
         if smooth.columns.shape[1] > len(columns):
             return False
-        cause_basis = _basis(self.start, self._dense(columns))
+        cause_basis = basis_of(self.start, self._dense(columns))
         remainder = smooth.columns - cause_basis @ (cause_basis.T @ smooth.columns)
         return bool(((remainder**2).sum(axis=0) <= SAME).all())
 
@@ -270,7 +274,7 @@ class Search:
     def _conditional(self, removed: Integers, biases: Array) -> float:
         """Return the logarithm of the p-value of biases (n, k) after removal of some patterns."""
         remainder = self.left.without(self._dense(removed))
-        return self._log_p(*_explained(remainder, _basis(remainder, biases)), remainder)
+        return self.log_p(*explained_by(remainder, basis_of(remainder, biases)), remainder)
 
     def _together(self, columns: Integers) -> Integers:
         """Return those of several expanding positions, or distances in error, that are
@@ -421,12 +425,12 @@ class Search:
         return tuple(alternatives.values())
 
 
-def _basis(remainder: Leftover, columns: Array, most: int | None = None) -> Array:
+def basis_of(remainder: Leftover, columns: Array, most: int | None = None) -> Array:
     """Return an orthonormal basis (n, q) of the remainder of columns (n, k), as `orthonormal`."""
     return orthonormal(remainder.of(columns), np.linalg.norm(columns, axis=0), most)
 
 
-def _further(remainder: Leftover, basis: Array, since: int) -> Array:
+def further_basis(remainder: Leftover, basis: Array, since: int) -> Array:
     """Return the part of an orthonormal basis orthogonal to all removed columns but the first
     `since`.
     """
@@ -436,6 +440,6 @@ def _further(remainder: Leftover, basis: Array, since: int) -> Array:
     return orthonormal(basis - later @ (later.T @ basis), np.ones(basis.shape[1]))
 
 
-def _explained(remainder: Leftover, basis: Array) -> tuple[float, float]:
+def explained_by(remainder: Leftover, basis: Array) -> tuple[float, float]:
     """Return the sum of squares that an orthonormal `basis` (n, q) explains, and its dimensions."""
     return float(((basis.T @ remainder.residual) ** 2).sum()), float(basis.shape[1])

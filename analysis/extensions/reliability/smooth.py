@@ -35,10 +35,13 @@ Displacements = Iterator[tuple[str, Array]]
 
 @dataclass(frozen=True)
 class Smooth:
-    """Biases (rows, k) that together are one smooth error, with its description."""
+    """Biases (rows, k) that together are one smooth error, with its description; `is_drift` in
+    time.
+    """
 
     words: str
     columns: Array
+    is_drift: bool
 
 
 def smooth_errors(design: Design, state: State) -> Iterator[Smooth]:
@@ -51,7 +54,7 @@ def smooth_errors(design: Design, state: State) -> Iterator[Smooth]:
     scales = locations(design, drawn, readings) - state.probes[readings.probe]
     for build in (_on_scales, _along_axes, _of_probes, _in_space, _in_time):
         for words, displacement in build(design, state, scales):
-            yield Smooth(words, _rows(linearised, displacement))
+            yield Smooth(words, rows_of(linearised, displacement), build is _in_time)
 
 
 def _on_scales(design: Design, state: State, x: Array) -> Displacements:
@@ -155,7 +158,7 @@ def _in_all_directions(values: Array, d: int) -> Array:
     return displacements.reshape(len(values), d, -1)
 
 
-def _rows(linearised: LinearisedDesign, displacement: Array) -> Array:
+def rows_of(linearised: LinearisedDesign, displacement: Array) -> Array:
     """Return biases (rows, k) of all observations by displacements (readings, d, k) of all
     readings.
     """

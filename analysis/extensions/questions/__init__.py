@@ -1,0 +1,1 @@
+"""What an estimate takes for granted, asked of its readings."""

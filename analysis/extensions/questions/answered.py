@@ -1,0 +1,133 @@
+"""What the readings of a fit say of each assumption, as text and data."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from ballplate.presentation import SHOWN, Data, given, number, picked, table_lines
+from ballplate.simulator.machines import Unit
+
+from .score_tests import LEVEL
+
+# Chances below this are shown as a bound.
+LEAST_SHOWN = 1e-6
+
+
+@dataclass(frozen=True)
+class Size:
+    """The estimate of a parameter of a cause, in `unit`."""
+
+    name: str
+    value: float
+    standard_uncertainty: float
+    unit: Unit
+
+
+@dataclass(frozen=True)
+class Contradicted:
+    """A cause that the readings show against what is `assumed`, with its `chance` if it is absent.
+
+    `others` are causes that the readings cannot tell apart from it. A fit that allows for the cause
+    gives its `sizes`, the residuals in stated uncertainties, `times`, and the average and the
+    maximum of U6 in metres, `lengths`.
+    """
+
+    assumed: str
+    cause: str
+    cure: str
+    chance: float
+    others: tuple[str, ...] = ()
+    sizes: tuple[Size, ...] = ()
+    times: float = np.nan
+    lengths: tuple[float, float] | None = None
+
+    @property
+    def words(self) -> str:
+        """The cause, with those that cannot be told apart from it."""
+        return ", or ".join([self.cause, *self.others])
+
+
+@dataclass(frozen=True)
+class Answer:
+    """The smallest chance of so many `tests` of an assumption, times their number, with all
+    contradictions removed; NaN without a test.
+
+    Every tested cause of the size `noticed_from`, in `unit`, is noticed with 80 % probability, NaN
+    if it has no size. Readings say nothing of the causes `not_seen`.
+    """
+
+    assumed: str
+    chance: float
+    tests: int
+    noticed_from: float
+    unit: Unit
+    not_seen: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Answers:
+    """Contradictions, the most significant one first, and the answers to all assumptions."""
+
+    contradicted: tuple[Contradicted, ...]
+    asked: tuple[Answer, ...]
+
+    @property
+    def verdict(self) -> tuple[str, ...]:
+        """Causes that the readings show."""
+        return tuple(each.words for each in self.contradicted)
+
+    def lines(self) -> list[str]:
+        lines = []
+        for each in self.contradicted:
+            facts = [f"chance {_chance(each.chance)}", *map(_size, each.sizes)]
+            if each.lengths is not None:
+                facts.append(
+                    f"then sigma {number(each.times, 3)}, U6 {number(1e6 * each.lengths[0], 3)} µm"
+                )
+            lines.append(f"contradicted: {each.words} ({'; '.join(facts)}); {each.cure}")
+        columns = {
+            "asked of the readings": "assumed",
+            "chance": ([each.chance for each in self.asked], _chance),
+            "noticed from": [_amount(each.noticed_from, each.unit) for each in self.asked],
+            "not seen": [_listed(each.not_seen) for each in self.asked],
+        }
+        return [*lines, *table_lines(columns, self.asked)]
+
+    def to_dict(self) -> Data:
+        return {
+            "level": LEVEL,
+            "contradicted": [
+                {
+                    **picked(each, "assumed", "cause", "others", "chance", "cure"),
+                    "parameters": [vars(size) for size in each.sizes],
+                    **given(
+                        sigma=each.times,
+                        U6=each.lengths
+                        and dict(zip(("average", "maximum"), each.lengths, strict=True)),
+                    ),
+                }
+                for each in self.contradicted
+            ],
+            "asked": [vars(each) for each in self.asked],
+        }
+
+
+def _chance(chance: float) -> str:
+    if np.isnan(chance):
+        return "-"
+    return f"{chance:.2g}" if chance >= LEAST_SHOWN else f"<{LEAST_SHOWN:.0e}"
+
+
+def _size(size: Size) -> str:
+    value, u = 1e6 * size.value, 1e6 * size.standard_uncertainty
+    return f"{size.name} {number(value, 3)} ± {number(u, 2)} {SHOWN[size.unit]}"
+
+
+def _amount(value: float, unit: Unit) -> str:
+    return "-" if np.isnan(value) else f"{number(1e6 * value, 2)} {SHOWN[unit]}"
+
+
+def _listed(words: tuple[str, ...]) -> str:
+    more = len(words) - 2
+    return ", ".join(words[:2]) + (f" and {more} more" if more > 0 else "")

@@ -1,0 +1,147 @@
+"""Answers of a fit's readings to the question whether each assumption of the experiment holds."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+
+import numpy as np
+from ballplate.extensions.reliability.cause_search import Search, basis_of, explained_by
+from ballplate.extensions.reliability.remainders import Leftover, too_many_entries
+from ballplate.extensions.reliability.scatter import Scatter, scatters, with_scatter
+from ballplate.extensions.reliability.scatter import log_chances as scatter_chances
+from ballplate.extensions.reliability.searched_fit import DiagnosisInWords
+from ballplate.extensions.reliability.suspects import Suspect
+from ballplate.results import Fit
+from ballplate.simulator.computing import single_threaded
+from ballplate.simulator.estimation import estimate, linearise, linearised_fit
+from ballplate.uncertainty import uncertainties
+
+from .answered import Answer, Answers, Contradicted, Size
+from .score_tests import (
+    LEVEL,
+    Contradiction,
+    Tested,
+    contradictions,
+    log_chances,
+    noticeable,
+    tested,
+)
+
+# Kinds of suspects that are hypotheses themselves; all others are errors of single observations.
+ASKED = ("probe", "scale", "expansion")
+
+
+@single_threaded
+def assumptions_asked(fit: Fit) -> Answers | None:
+    """Return what the readings of a converged fit say of each assumption; None without residuals
+    to ask, or with offsets in error by so much that only a fit without them tells more.
+    """
+    at, diagnosis = fit.functions.at, fit.diagnosis
+    if not isinstance(diagnosis, DiagnosisInWords) or too_many_entries(at.design):
+        return None
+    freedom = at.degrees_of_freedom
+    if freedom < 3 or fit.without_scatter:
+        return None
+    if diagnosis.refit is not None and diagnosis.refit.kind == "offsets":
+        return None
+    x = fit.observed.x
+    if diagnosis.scatter is not None:
+        noisy = with_scatter(at.design, diagnosis.scatter.of, diagnosis.scatter.times)
+        at = linearise(noisy, at.state, x, at.spectrum)
+    search = Search(at, x, freedom, fit.sigma_is_estimated)
+    every = list(tested(search))
+    seen = [each for each in every if each.dimensions]
+    noisier = scatters(search.design)
+    tests = len(seen) + len(noisier) + 1
+    limit = math.log(LEVEL / tests)
+    left = _without_gross_errors(search, seen, diagnosis.suspects, limit)
+    found, remainder = contradictions(search, left, seen, limit)
+    sigma = math.sqrt(remainder.sum_of_squares / remainder.freedom) if search.estimated else 1.0
+    least = noticeable(search, remainder, tests) * sigma
+    return Answers(
+        tuple(_contradicted(fit, each) for each in found),
+        tuple(_answers(search, remainder, every, noisier, least)),
+    )
+
+
+def _without_gross_errors(
+    search: Search, seen: list[Tested], suspects: Sequence[Suspect], limit: float
+) -> Leftover:
+    """Return residuals without the suspected errors of single observations, except those that a
+    hypothesis explains.
+    """
+    gross = [
+        search.patterns.matrix[:, suspect.columns].toarray()
+        for suspect in suspects
+        if suspect.patterns.kind[suspect.pattern] not in ASKED
+        and len(suspect.patterns) == len(search.patterns)
+    ]
+    left = search.start
+    if not gross:
+        return left
+    found, without = contradictions(search, left, seen, limit)
+    for columns in gross:
+        basis = basis_of(without, columns)
+        if not found or search.log_p(*explained_by(without, basis), without) < search.limit:
+            left = left.without(columns)
+    return left
+
+
+def _contradicted(fit: Fit, found: Contradiction) -> Contradicted:
+    """Return a contradiction, with the result of a fit that allows for its cause, if any."""
+    cause = found.best.hypothesis
+    others = tuple(other.hypothesis.words for other in found.others)
+    plain = Contradicted(cause.assumed, cause.words, cause.cure, math.exp(found.log_p), others)
+    if cause.design is None:
+        return plain
+    solution = estimate(cause.design, fit.observed.x)
+    if solution.status != "converged":
+        return plain
+    at = linearised_fit(cause.design, solution)
+    times = math.sqrt(at.factor.sum_of_squares / max(at.degrees_of_freedom, 1))
+    sigma = times if fit.sigma_is_estimated else 1.0
+    first = len(solution.state.influences) - len(cause.parameters)
+    rows = np.eye(len(at.layout))[at.layout.influences][first:]
+    values, u = solution.state.influences[first:], sigma * at.of_shared(rows)
+    sizes = tuple(
+        Size(name, value, uncertainty, cause.unit)
+        for name, value, uncertainty in zip(
+            cause.parameters, values.tolist(), u.tolist(), strict=True
+        )
+        if np.isfinite(uncertainty)
+    )
+    lengths = uncertainties(at, sigma, symbols=("U6",)).get("U6")
+    of_lengths = None if lengths is None else (lengths.average, lengths.maximum)
+    return replace(plain, sizes=sizes, times=times, lengths=of_lengths)
+
+
+def _answers(
+    search: Search, left: Leftover, every: list[Tested], noisier: list[Scatter], least: float
+) -> Iterator[Answer]:
+    """Return the answer to each assumption: its smallest chance times the number of its tests."""
+    chances = log_chances(search, left, every)
+    for assumed in dict.fromkeys(each.hypothesis.assumed for each in every):
+        chosen = [k for k, each in enumerate(every) if each.hypothesis.assumed == assumed]
+        seen = [k for k in chosen if every[k].dimensions]
+        not_seen = [every[k].hypothesis.words for k in chosen if not every[k].dimensions]
+        noticed = []
+        for k in seen:
+            hypothesis = every[k].hypothesis
+            u = every[k].uncertainties(left)
+            if len(u) <= search.design.dimension:
+                noticed += (least * u[np.isfinite(u)]).tolist()
+                names = np.array(hypothesis.parameters)[~np.isfinite(u)]
+                not_seen += [f"{hypothesis.words}, {name}" for name in names]
+        yield Answer(
+            assumed,
+            min(len(seen) * math.exp(min(chances[seen])), 1.0) if seen else math.nan,
+            len(seen),
+            max(noticed, default=math.nan),
+            every[chosen[0]].hypothesis.unit,
+            tuple(not_seen),
+        )
+    if noisier:
+        chance = len(noisier) * math.exp(scatter_chances(noisier, left, search.estimated).min())
+        yield Answer("scatter", min(chance, 1.0), len(noisier), math.nan, "1", ())

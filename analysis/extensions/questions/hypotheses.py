@@ -1,0 +1,244 @@
+"""What readings may contradict of an experiment: causes that its design takes to be absent."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+from ballplate.simulator.design import (
+    Clock,
+    Design,
+    DesignParts,
+    Disturbed,
+    Drift,
+    Influence,
+    InfluenceParameter,
+    Lengths,
+    PositionScale,
+    Sag,
+    SagSettings,
+    SharedDisplacements,
+    even_clock,
+)
+from ballplate.simulator.geometry import AXIS_NAMES
+from ballplate.simulator.machines import (
+    ARRANGEMENTS,
+    Arrangement,
+    Array,
+    ErrorModel,
+    Integers,
+    KinematicModel,
+    PlaneModel,
+    Unit,
+)
+
+# Balls of a position that extend by less than this, in metres, tell nothing of a scale there.
+LEAST_EXTENT = 1e-3
+
+
+@dataclass(frozen=True)
+class Hypothesis:
+    """A cause, in `words`, that contradicts what is `assumed`, and its `cure`.
+
+    `displaced` gives the displacements (m, d, k) of readings by a unit of each of its parameters;
+    `design` is the one that does not assume its absence, None if there is no such. `parameters` are
+    the names of those that the design has in addition, in `unit`.
+    """
+
+    assumed: str
+    words: str
+    cure: str
+    displaced: Callable[[Disturbed], Array] | None = None
+    design: Design | None = None
+    parameters: tuple[str, ...] = ()
+    unit: Unit = "m"
+
+
+def hypotheses(design: Design) -> Iterator[Hypothesis]:
+    """Return all causes that a design takes to be absent, except further terms of the model."""
+    for build in (_tips, _certificates, _temperatures, _sag, _drifts, _displacements, _chains):
+        yield from build(design)
+
+
+def _added(design: Design, assumed: str, words: str, cure: str, influence: Influence) -> Hypothesis:
+    """Return the hypothesis of an influence quantity of which nothing is known."""
+    return Hypothesis(
+        assumed,
+        words,
+        cure,
+        lambda at: influence.shifts(at)[1],
+        replace(design, influences=(*design.influences, influence)),
+        tuple(parameter.name for parameter in influence.parameters),
+        influence.parameters[0].unit,
+    )
+
+
+def _unknown(names: list[str], unit: Unit, effect: float) -> tuple[InfluenceParameter, ...]:
+    return tuple(InfluenceParameter(name, unit, 0.0, np.inf, effect) for name in names)
+
+
+def _letters(design: Design) -> list[str]:
+    return list(AXIS_NAMES[: design.dimension])
+
+
+def _tips(design: Design) -> Iterator[Hypothesis]:
+    for probe in np.unique(design.readings.probe).tolist():
+        place = np.full(len(design.probes.names), -1)
+        place[probe] = 0
+        influence = SharedDisplacements(
+            ("probe",), place, _unknown(_letters(design), "m", 1.0), of_tips=True
+        )
+        words = f"offset of probe {design.probes.names[probe]}"
+        yield _added(design, "tips", words, "qualify the probe again", influence)
+
+
+def _certificates(design: Design) -> Iterator[Hypothesis]:
+    for artefact, name in enumerate(design.artefacts.names):
+        positions = np.flatnonzero(design.positions.artefact == artefact)
+        if _is_certified(design, artefact):
+            words = f"scale of the certificate of {name}, or its temperature in all positions"
+            cure = "check the certificate, and the temperatures of artefact and scales"
+            influence = _scale(design, positions)
+            yield _added(design, "certificates", words, cure, influence)
+
+
+def _is_certified(design: Design, artefact: int) -> bool:
+    lengths = design.of(Lengths)
+    of_length = design.balls.artefact[design.readings.ball[lengths.first]]
+    return bool((lengths.is_known & (of_length == artefact)).any()) or any(
+        bool((design.balls.artefact[values.balls[:, 0]] == artefact).any())
+        for values in design.observations
+        if values.scales and len(values)
+    )
+
+
+def _temperatures(design: Design) -> Iterator[Hypothesis]:
+    """Scales of single positions: of the artefact there, or of each axis of the machine."""
+    cure = "check the temperatures there"
+    for by_axis, assumed, words in (
+        (False, "temperature of artefacts", "size of {} in position {}"),
+        (True, "temperature of scales", "scales of the machine, not {}, in position {}"),
+    ):
+        for k in np.unique(design.readings.position).tolist():
+            artefact = design.artefacts.names[design.positions.artefact[k]]
+            influence = _scale(design, np.array([k]), by_axis)
+            if influence.parameters:
+                where = words.format(artefact, design.positions.names[k])
+                yield _added(design, assumed, where, cure, influence)
+
+
+def _scale(design: Design, positions: Integers, by_axis: bool = False) -> PositionScale:
+    """Return one scale of all lengths in some positions, or one along each axis."""
+    place = np.full((len(design.positions.names), design.dimension), -1)
+    here = design.readings.select(np.flatnonzero(np.isin(design.readings.position, positions)))
+    turned = design.positions.rotations[here.position]
+    arms = np.einsum("mij,mj->mi", turned, design.balls.places[here.ball])
+    reach = float(np.abs(arms).max(initial=LEAST_EXTENT))
+    if not by_axis:
+        place[positions] = 0
+        return PositionScale(place, _unknown(["scale"], "1", reach))
+    axes = np.flatnonzero(np.abs(arms).max(axis=0, initial=0.0) > LEAST_EXTENT)
+    for column, axis in enumerate(axes.tolist()):
+        place[positions, axis] = column
+    return PositionScale(place, _unknown([AXIS_NAMES[axis] for axis in axes], "1", reach))
+
+
+def _sag(design: Design) -> Iterator[Hypothesis]:
+    known = {one.parameter.name for one in design.influences if isinstance(one, Sag)}
+    parts = DesignParts(
+        design.machine,
+        design.probes,
+        design.artefacts,
+        design.balls,
+        design.positions,
+        design.readings,
+        Path(),
+    )
+    for artefact in np.unique(design.positions.artefact[design.plate_positions]).tolist():
+        name = design.artefacts.names[artefact]
+        if design.dimension < 3 or len(design.balls.of(artefact)) < 3:
+            continue
+        influence = SagSettings(kind="sag", artefact=name).influence(parts)
+        if influence.parameter.name not in known:
+            cure = "support the plate at other points, or state its sag"
+            yield _added(design, "sag", f"sag of {name}", cure, influence)
+
+
+def _drifts(design: Design) -> Iterator[Hypothesis]:
+    if any(isinstance(influence, Drift) for influence in design.influences):
+        return
+    clock, d = even_clock(len(design.positions.names)), design.dimension
+    if not np.ptp(clock.hours(design.readings)) > 0.0:
+        return
+    reach = float(np.abs(design.machine.volume.corners).max())
+    yield _drift(design, clock, [(axis, False) for axis in range(d)], "readings", 1.0)
+    yield _drift(design, clock, [(-1, True)], "scales", reach)
+
+
+def _drift(
+    design: Design, clock: Clock, parts: list[tuple[int, bool]], of: str, effect: float
+) -> Hypothesis:
+    """Return a drift by one unit in the whole campaign, whatever time it takes."""
+    names, unit = (["scale"], "1") if parts[0][1] else (_letters(design), "m")
+    influence = Drift(clock, tuple(parts), _unknown(names, unit, effect))
+    hours = clock.hours(design.readings)
+    beside = {influence.column: hours / np.ptp(hours)}
+    readings = replace(design.readings, beside={**(design.readings.beside or {}), **beside})
+    words = f"drift of the {of} from the first one to the last"
+    cure = "read in an order that separates a drift, or state one under influences"
+    hypothesis = _added(replace(design, readings=readings), "drift", words, cure, influence)
+    return replace(hypothesis, displaced=lambda at: influence.shifts(replace(at, beside=beside))[1])
+
+
+def _displacements(design: Design) -> Iterator[Hypothesis]:
+    """Displacements of each probe in each position, as of a head that indexes badly."""
+    readings = design.readings
+    probes = len(design.probes.names)
+    pairs = np.unique(readings.position * probes + readings.probe)
+    is_known = any(isinstance(one, SharedDisplacements) for one in design.influences)
+    if is_known or len(pairs) == len(np.unique(readings.position)):
+        return
+    place = np.full(len(design.positions.names) * probes, -1)
+    place[pairs] = np.arange(len(pairs))
+    names = [
+        f"{design.positions.names[pair // probes]}, {design.probes.names[pair % probes]}: {letter}"
+        for pair in pairs.tolist()
+        for letter in _letters(design)
+    ]
+    influence = SharedDisplacements(
+        ("position", "probe"),
+        place.reshape(-1, probes),
+        _unknown(names, "m", 1.0),
+    )
+    words = "displacements of each probe in each position"
+    cure = "check how tips return after re-indexing or a change, or state reproducibility"
+    yield _added(design, "reproducibility", words, cure, influence)
+
+
+def _chains(design: Design) -> Iterator[Hypothesis]:
+    model = design.model
+    chain = model.spatial if isinstance(model, PlaneModel) else model
+    if not isinstance(chain, KinematicModel):
+        return
+    names: dict[Arrangement, list[str]] = {}
+    for name, arrangement in ARRANGEMENTS.items():
+        if arrangement != chain.arrangement:
+            names.setdefault(arrangement, []).append(name)
+    zeros = np.zeros(len(model.parameters))
+    for arrangement, of_it in names.items():
+        changed = replace(chain, arrangement=arrangement)
+        other: ErrorModel = changed
+        if isinstance(model, PlaneModel):
+            other = replace(model, spatial=changed)
+
+        def displaced(at: Disturbed, other: ErrorModel = other) -> Array:
+            changes = other.jacobian(at.x, zeros, at.offsets) - model.jacobian(
+                at.x, zeros, at.offsets
+            )
+            return np.asarray(changes[:, :, np.abs(changes).max(axis=(0, 1)) > 0.0])
+
+        words = f"chain of axes {' or '.join(of_it)}"
+        cure = "correct arrangement under error_model"
+        yield Hypothesis("chain of axes", words, cure, displaced, replace(design, model=other))

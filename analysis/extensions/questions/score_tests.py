@@ -1,0 +1,142 @@
+"""Score tests of hypotheses at an estimate, by the residuals that they explain to first order."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from ballplate.extensions.reliability.bias_patterns import LinearisedDesign
+from ballplate.extensions.reliability.cause_search import (
+    Search,
+    basis_of,
+    explained_by,
+    further_basis,
+)
+from ballplate.extensions.reliability.power import noncentrality
+from ballplate.extensions.reliability.remainders import HIDDEN, Leftover
+from ballplate.extensions.reliability.smooth import rows_of
+from ballplate.simulator.design import Design, State, disturbed_readings, expected_readings
+from ballplate.simulator.machines import Array
+
+from .hypotheses import Hypothesis, hypotheses
+
+# Chance that any of the assumptions of a right experiment is contradicted.
+LEVEL = 0.01
+
+# Power of the test of what can be noticed.
+POWER = 0.8
+
+# A hypothesis explains nothing beyond another if what remains of it has at least this p-value.
+BEYOND = math.log(1e-2)
+
+# Share of a parameter that is not in what residuals show, from which on they do not show it.
+SEPARATE = 1e-6
+
+# Largest number of contradictions.
+MOST = 5
+
+
+@dataclass(frozen=True)
+class Tested:
+    """A hypothesis with the `basis` (n, q) of what residuals show of it, and of its parameters in
+    their unit the `sensitivity` (n, k), what residuals show of a unit of each.
+    """
+
+    hypothesis: Hypothesis
+    basis: Array
+    sensitivity: Array
+
+    @property
+    def dimensions(self) -> int:
+        return self.basis.shape[1]
+
+    def uncertainties(self, left: Leftover) -> Array:
+        """Return standard uncertainties (k,) of the parameters in units of sigma, infinite of those
+        that residuals do not show by themselves.
+        """
+        size = np.linalg.norm(self.sensitivity, axis=0)
+        size[size == 0.0] = np.inf
+        remaining = left.of(self.sensitivity / size)
+        _, values, vectors = np.linalg.svd(remaining, full_matrices=False)
+        shown = np.flatnonzero(values**2 > HIDDEN)[: self.dimensions]
+        root = np.linalg.norm(vectors[shown].T / values[shown], axis=1)
+        is_shown = (vectors[shown] ** 2).sum(axis=0) > 1.0 - SEPARATE
+        return np.where(is_shown, root / size, np.inf)
+
+
+def tested(search: Search) -> Iterator[Tested]:
+    """Return all hypotheses with what the residuals of a search show of them."""
+    design = search.design
+    for hypothesis in hypotheses(design):
+        nominal = _rows(design, search.drawn.state, hypothesis)
+        most = basis_of(search.nominal, nominal).shape[1]
+        columns = _rows(design, search.state, hypothesis)
+        yield Tested(hypothesis, search.visible(columns, most), columns)
+    for smooth in search.smooth:
+        assumed = "drift" if smooth.is_drift else "error model"
+        cure = "consider drifts" if smooth.is_drift else "compare error models (ballplate models)"
+        hypothesis = Hypothesis(assumed, smooth.words, cure)
+        yield Tested(hypothesis, smooth.columns, smooth.columns[:, :0])
+
+
+def _rows(design: Design, state: State, hypothesis: Hypothesis) -> Array:
+    """Return the whitened changes (n, k) of all rows by a unit of each parameter."""
+    readings = design.readings
+    at = disturbed_readings(state, readings, expected_readings(design, state, readings))
+    assert hypothesis.displaced is not None
+    return rows_of(LinearisedDesign(design, state, None), hypothesis.displaced(at))
+
+
+@dataclass(frozen=True)
+class Contradiction:
+    """The hypothesis that explains most, with the logarithm of its p-value, and `others` that
+    explain the same.
+    """
+
+    best: Tested
+    log_p: float
+    others: tuple[Tested, ...]
+
+
+def log_chances(search: Search, left: Leftover, every: list[Tested]) -> Array:
+    """Return logarithms (h,) of the p-values of hypotheses at some remainder."""
+    return np.array([_log_p(search, left, each.basis) for each in every])
+
+
+def _log_p(search: Search, left: Leftover, basis: Array) -> float:
+    remaining = further_basis(left, basis, search.width)
+    return search.log_p(*explained_by(left, remaining), left) if remaining.shape[1] else 0.0
+
+
+def contradictions(
+    search: Search, left: Leftover, every: list[Tested], limit: float
+) -> tuple[list[Contradiction], Leftover]:
+    """Return the hypotheses that residuals confirm beyond a `limit`, one after the other, and what
+    remains without them.
+    """
+    found: list[Contradiction] = []
+    while len(found) < MOST and left.freedom >= 3:
+        chances = log_chances(search, left, every)
+        first = int(chances.argmin())
+        if chances[first] >= limit:
+            break
+        best = every[first]
+        others = tuple(
+            other
+            for other, chance in zip(every, chances, strict=True)
+            if other is not best
+            and chance < limit
+            and other.dimensions <= best.dimensions
+            and _log_p(search, left.without(other.basis), best.basis) > BEYOND
+        )
+        found.append(Contradiction(best, float(chances[first]), others))
+        left = left.without(best.basis)
+    return found, left
+
+
+def noticeable(search: Search, left: Leftover, tests: int) -> float:
+    """Return the size, in standard uncertainties, that a test at the common level notices."""
+    freedom = left.freedom - 1 if search.estimated else math.inf
+    return noncentrality(LEVEL / max(tests, 1), POWER, freedom)
