@@ -49,7 +49,7 @@ class Contradicted:
 
 
 @dataclass(frozen=True)
-class Answer:
+class AssumptionAnswer:
     """The smallest chance of so many `tests` of an assumption, times their number, with all
     contradictions removed; NaN without a test.
 
@@ -70,7 +70,7 @@ class Answers:
     """Contradictions, the most significant one first, and the answers to all assumptions."""
 
     contradicted: tuple[Contradicted, ...]
-    asked: tuple[Answer, ...]
+    asked: tuple[AssumptionAnswer, ...]
 
     @property
     def verdict(self) -> tuple[str, ...]:

@@ -18,7 +18,7 @@ from ballplate.simulator.computing import single_threaded
 from ballplate.simulator.estimation import estimate, linearise, linearised_fit
 from ballplate.uncertainty import uncertainties
 
-from .answered import Answer, Answers, Contradicted, Size
+from .answered import Answers, AssumptionAnswer, Contradicted, Size
 from .score_tests import (
     LEVEL,
     Contradiction,
@@ -29,7 +29,7 @@ from .score_tests import (
     tested,
 )
 
-# Kinds of suspects that are hypotheses themselves; all others are errors of single observations.
+# Kinds of suspects that are causes themselves; all others are errors of single observations.
 ASKED = ("probe", "scale", "expansion")
 
 
@@ -70,7 +70,7 @@ def _without_gross_errors(
     search: Search, seen: list[Tested], suspects: Sequence[Suspect], limit: float
 ) -> Leftover:
     """Return residuals without the suspected errors of single observations, except those that a
-    hypothesis explains.
+    cause explains.
     """
     gross = [
         search.patterns.matrix[:, suspect.columns].toarray()
@@ -91,8 +91,8 @@ def _without_gross_errors(
 
 def _contradicted(fit: Fit, found: Contradiction) -> Contradicted:
     """Return a contradiction, with the result of a fit that allows for its cause, if any."""
-    cause = found.best.hypothesis
-    others = tuple(other.hypothesis.words for other in found.others)
+    cause = found.best.cause
+    others = tuple(other.cause.words for other in found.others)
     plain = Contradicted(cause.assumed, cause.words, cause.cure, math.exp(found.log_p), others)
     if cause.design is None:
         return plain
@@ -119,29 +119,29 @@ def _contradicted(fit: Fit, found: Contradiction) -> Contradicted:
 
 def _answers(
     search: Search, left: Leftover, every: list[Tested], noisier: list[Scatter], least: float
-) -> Iterator[Answer]:
+) -> Iterator[AssumptionAnswer]:
     """Return the answer to each assumption: its smallest chance times the number of its tests."""
     chances = log_chances(search, left, every)
-    for assumed in dict.fromkeys(each.hypothesis.assumed for each in every):
-        chosen = [k for k, each in enumerate(every) if each.hypothesis.assumed == assumed]
+    for assumed in dict.fromkeys(each.cause.assumed for each in every):
+        chosen = [k for k, each in enumerate(every) if each.cause.assumed == assumed]
         seen = [k for k in chosen if every[k].dimensions]
-        not_seen = [every[k].hypothesis.words for k in chosen if not every[k].dimensions]
+        not_seen = [every[k].cause.words for k in chosen if not every[k].dimensions]
         noticed = []
         for k in seen:
-            hypothesis = every[k].hypothesis
+            cause = every[k].cause
             u = every[k].uncertainties(left)
             if len(u) <= search.design.dimension:
                 noticed += (least * u[np.isfinite(u)]).tolist()
-                names = np.array(hypothesis.parameters)[~np.isfinite(u)]
-                not_seen += [f"{hypothesis.words}, {name}" for name in names]
-        yield Answer(
+                names = np.array(cause.parameters)[~np.isfinite(u)]
+                not_seen += [f"{cause.words}, {name}" for name in names]
+        yield AssumptionAnswer(
             assumed,
             min(len(seen) * math.exp(min(chances[seen])), 1.0) if seen else math.nan,
             len(seen),
             max(noticed, default=math.nan),
-            every[chosen[0]].hypothesis.unit,
+            every[chosen[0]].cause.unit,
             tuple(not_seen),
         )
     if noisier:
         chance = len(noisier) * math.exp(scatter_chances(noisier, left, search.estimated).min())
-        yield Answer("scatter", min(chance, 1.0), len(noisier), math.nan, "1", ())
+        yield AssumptionAnswer("scatter", min(chance, 1.0), len(noisier), math.nan, "1", ())

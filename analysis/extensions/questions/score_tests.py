@@ -1,4 +1,4 @@
-"""Score tests of hypotheses at an estimate, by the residuals that they explain to first order."""
+"""Score tests of causes at an estimate, by the residuals that they explain to first order."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from ballplate.extensions.reliability.bias_patterns import LinearisedDesign
 from ballplate.extensions.reliability.cause_search import (
+    LOG_ODDS_LIMIT,
     Search,
     basis_of,
     explained_by,
@@ -18,9 +19,10 @@ from ballplate.extensions.reliability.power import noncentrality
 from ballplate.extensions.reliability.remainders import HIDDEN, Leftover
 from ballplate.extensions.reliability.smooth import rows_of
 from ballplate.simulator.design import Design, State, disturbed_readings, expected_readings
+from ballplate.simulator.estimation import estimate
 from ballplate.simulator.machines import Array
 
-from .hypotheses import Hypothesis, hypotheses
+from .possible_causes import CHAIN, PossibleCause, possible_causes
 
 # Chance that any of the assumptions of a right experiment is contradicted.
 LEVEL = 0.01
@@ -28,7 +30,7 @@ LEVEL = 0.01
 # Power of the test of what can be noticed.
 POWER = 0.8
 
-# A hypothesis explains nothing beyond another if what remains of it has at least this p-value.
+# A cause explains nothing beyond another if what remains of it has at least this p-value.
 BEYOND = math.log(1e-2)
 
 # Share of a parameter that is not in what residuals show, from which on they do not show it.
@@ -40,17 +42,22 @@ MOST = 5
 
 @dataclass(frozen=True)
 class Tested:
-    """A hypothesis with the `basis` (n, q) of what residuals show of it, and of its parameters in
+    """A cause with the `basis` (n, q) of what residuals show of it, and of its parameters in
     their unit the `sensitivity` (n, k), what residuals show of a unit of each.
     """
 
-    hypothesis: Hypothesis
+    cause: PossibleCause
     basis: Array
     sensitivity: Array
 
     @property
     def dimensions(self) -> int:
         return self.basis.shape[1]
+
+    @property
+    def is_of_model(self) -> bool:
+        """True of further terms of the error model, which no changed design has."""
+        return self.cause.design is None
 
     def uncertainties(self, left: Leftover) -> Array:
         """Return standard uncertainties (k,) of the parameters in units of sigma, infinite of those
@@ -67,31 +74,31 @@ class Tested:
 
 
 def tested(search: Search) -> Iterator[Tested]:
-    """Return all hypotheses with what the residuals of a search show of them."""
+    """Return all causes with what the residuals of a search show of them."""
     design = search.design
-    for hypothesis in hypotheses(design):
-        nominal = _rows(design, search.drawn.state, hypothesis)
+    for cause in possible_causes(design):
+        nominal = _rows(design, search.drawn.state, cause)
         most = basis_of(search.nominal, nominal).shape[1]
-        columns = _rows(design, search.state, hypothesis)
-        yield Tested(hypothesis, search.visible(columns, most), columns)
+        columns = _rows(design, search.state, cause)
+        yield Tested(cause, search.visible(columns, most), columns)
     for smooth in search.smooth:
         assumed = "drift" if smooth.is_drift else "error model"
         cure = "consider drifts" if smooth.is_drift else "compare error models (ballplate models)"
-        hypothesis = Hypothesis(assumed, smooth.words, cure)
-        yield Tested(hypothesis, smooth.columns, smooth.columns[:, :0])
+        cause = PossibleCause(assumed, smooth.words, cure)
+        yield Tested(cause, smooth.columns, smooth.columns[:, :0])
 
 
-def _rows(design: Design, state: State, hypothesis: Hypothesis) -> Array:
+def _rows(design: Design, state: State, cause: PossibleCause) -> Array:
     """Return the whitened changes (n, k) of all rows by a unit of each parameter."""
     readings = design.readings
     at = disturbed_readings(state, readings, expected_readings(design, state, readings))
-    assert hypothesis.displaced is not None
-    return rows_of(LinearisedDesign(design, state, None), hypothesis.displaced(at))
+    assert cause.displaced is not None
+    return rows_of(LinearisedDesign(design, state, None), cause.displaced(at))
 
 
 @dataclass(frozen=True)
 class Contradiction:
-    """The hypothesis that explains most, with the logarithm of its p-value, and `others` that
+    """The cause that explains most, with the logarithm of its p-value, and `others` that
     explain the same.
     """
 
@@ -101,7 +108,7 @@ class Contradiction:
 
 
 def log_chances(search: Search, left: Leftover, every: list[Tested]) -> Array:
-    """Return logarithms (h,) of the p-values of hypotheses at some remainder."""
+    """Return logarithms (h,) of the p-values of causes at some remainder."""
     return np.array([_log_p(search, left, each.basis) for each in every])
 
 
@@ -113,7 +120,7 @@ def _log_p(search: Search, left: Leftover, basis: Array) -> float:
 def contradictions(
     search: Search, left: Leftover, every: list[Tested], limit: float
 ) -> tuple[list[Contradiction], Leftover]:
-    """Return the hypotheses that residuals confirm beyond a `limit`, one after the other, and what
+    """Return the causes that residuals confirm beyond a `limit`, one after the other, and what
     remains without them.
     """
     found: list[Contradiction] = []
@@ -122,18 +129,40 @@ def contradictions(
         first = int(chances.argmin())
         if chances[first] >= limit:
             break
-        best = every[first]
-        others = tuple(
-            other
-            for other, chance in zip(every, chances, strict=True)
-            if other is not best
-            and chance < limit
-            and other.dimensions <= best.dimensions
-            and _log_p(search, left.without(other.basis), best.basis) > BEYOND
-        )
-        found.append(Contradiction(best, float(chances[first]), others))
-        left = left.without(best.basis)
+        same = [
+            k
+            for k in np.flatnonzero(chances < limit).tolist()
+            if k == first
+            or _log_p(search, left.without(every[k].basis), every[first].basis) > BEYOND
+        ]
+        # Further terms of the error model are an explanation where no other does as well.
+        best = min(same, key=lambda k: (every[k].is_of_model, chances[k]))
+        widest = max(every[best].dimensions, every[first].dimensions)
+        others = [k for k in same if k != best and every[k].dimensions <= widest]
+        if every[best].cause.assumed == CHAIN:
+            best, *others = _chains(search, every, np.flatnonzero(chances < limit).tolist())
+        of_others = tuple(every[k] for k in others)
+        found.append(Contradiction(every[best], float(chances[best]), of_others))
+        left = left.without(every[best].basis)
     return found, left
+
+
+def _chains(search: Search, every: list[Tested], candidates: list[int]) -> list[int]:
+    """Return the chains of axes among some causes that fit best, by fits with each.
+
+    A score test adds a chain's errors to those of the stated one, which it replaces.
+    """
+    squares = {}
+    for k in candidates:
+        cause = every[k].cause
+        if cause.assumed == CHAIN and cause.design is not None:
+            solution = estimate(cause.design, search.x)
+            is_good = solution.status == "converged"
+            squares[k] = solution.factor.sum_of_squares if is_good else math.inf
+    least = min(squares.values())
+    variance = max(least / search.freedom, 1.0) if search.estimated else 1.0
+    near = least + 2.0 * LOG_ODDS_LIMIT * variance
+    return [k for k in sorted(squares, key=squares.__getitem__) if squares[k] <= near]
 
 
 def noticeable(search: Search, left: Leftover, tests: int) -> float:

@@ -37,9 +37,12 @@ from ballplate.simulator.machines import (
 # Balls of a position that extend by less than this, in metres, tell nothing of a scale there.
 LEAST_EXTENT = 1e-3
 
+# What is assumed of the order of axes.
+CHAIN = "chain of axes"
+
 
 @dataclass(frozen=True)
-class Hypothesis:
+class PossibleCause:
     """A cause, in `words`, that contradicts what is `assumed`, and its `cure`.
 
     `displaced` gives the displacements (m, d, k) of readings by a unit of each of its parameters;
@@ -56,15 +59,17 @@ class Hypothesis:
     unit: Unit = "m"
 
 
-def hypotheses(design: Design) -> Iterator[Hypothesis]:
+def possible_causes(design: Design) -> Iterator[PossibleCause]:
     """Return all causes that a design takes to be absent, except further terms of the model."""
     for build in (_tips, _certificates, _temperatures, _sag, _drifts, _displacements, _chains):
         yield from build(design)
 
 
-def _added(design: Design, assumed: str, words: str, cure: str, influence: Influence) -> Hypothesis:
-    """Return the hypothesis of an influence quantity of which nothing is known."""
-    return Hypothesis(
+def _added(
+    design: Design, assumed: str, words: str, cure: str, influence: Influence
+) -> PossibleCause:
+    """Return the cause of an influence quantity of which nothing is known."""
+    return PossibleCause(
         assumed,
         words,
         cure,
@@ -83,7 +88,7 @@ def _letters(design: Design) -> list[str]:
     return list(AXIS_NAMES[: design.dimension])
 
 
-def _tips(design: Design) -> Iterator[Hypothesis]:
+def _tips(design: Design) -> Iterator[PossibleCause]:
     for probe in np.unique(design.readings.probe).tolist():
         place = np.full(len(design.probes.names), -1)
         place[probe] = 0
@@ -94,7 +99,7 @@ def _tips(design: Design) -> Iterator[Hypothesis]:
         yield _added(design, "tips", words, "qualify the probe again", influence)
 
 
-def _certificates(design: Design) -> Iterator[Hypothesis]:
+def _certificates(design: Design) -> Iterator[PossibleCause]:
     for artefact, name in enumerate(design.artefacts.names):
         positions = np.flatnonzero(design.positions.artefact == artefact)
         if _is_certified(design, artefact):
@@ -114,7 +119,7 @@ def _is_certified(design: Design, artefact: int) -> bool:
     )
 
 
-def _temperatures(design: Design) -> Iterator[Hypothesis]:
+def _temperatures(design: Design) -> Iterator[PossibleCause]:
     """Scales of single positions: of the artefact there, or of each axis of the machine."""
     cure = "check the temperatures there"
     for by_axis, assumed, words in (
@@ -145,7 +150,7 @@ def _scale(design: Design, positions: Integers, by_axis: bool = False) -> Positi
     return PositionScale(place, _unknown([AXIS_NAMES[axis] for axis in axes], "1", reach))
 
 
-def _sag(design: Design) -> Iterator[Hypothesis]:
+def _sag(design: Design) -> Iterator[PossibleCause]:
     known = {one.parameter.name for one in design.influences if isinstance(one, Sag)}
     parts = DesignParts(
         design.machine,
@@ -160,13 +165,13 @@ def _sag(design: Design) -> Iterator[Hypothesis]:
         name = design.artefacts.names[artefact]
         if design.dimension < 3 or len(design.balls.of(artefact)) < 3:
             continue
-        influence = SagSettings(kind="sag", artefact=name).influence(parts)
+        influence = SagSettings.model_construct(kind="sag", artefact=name).influence(parts)
         if influence.parameter.name not in known:
             cure = "support the plate at other points, or state its sag"
             yield _added(design, "sag", f"sag of {name}", cure, influence)
 
 
-def _drifts(design: Design) -> Iterator[Hypothesis]:
+def _drifts(design: Design) -> Iterator[PossibleCause]:
     if any(isinstance(influence, Drift) for influence in design.influences):
         return
     clock, d = even_clock(len(design.positions.names)), design.dimension
@@ -179,20 +184,21 @@ def _drifts(design: Design) -> Iterator[Hypothesis]:
 
 def _drift(
     design: Design, clock: Clock, parts: list[tuple[int, bool]], of: str, effect: float
-) -> Hypothesis:
+) -> PossibleCause:
     """Return a drift by one unit in the whole campaign, whatever time it takes."""
-    names, unit = (["scale"], "1") if parts[0][1] else (_letters(design), "m")
+    unit: Unit = "1" if parts[0][1] else "m"
+    names = ["scale"] if parts[0][1] else _letters(design)
     influence = Drift(clock, tuple(parts), _unknown(names, unit, effect))
     hours = clock.hours(design.readings)
     beside = {influence.column: hours / np.ptp(hours)}
     readings = replace(design.readings, beside={**(design.readings.beside or {}), **beside})
     words = f"drift of the {of} from the first one to the last"
     cure = "read in an order that separates a drift, or state one under influences"
-    hypothesis = _added(replace(design, readings=readings), "drift", words, cure, influence)
-    return replace(hypothesis, displaced=lambda at: influence.shifts(replace(at, beside=beside))[1])
+    cause = _added(replace(design, readings=readings), "drift", words, cure, influence)
+    return replace(cause, displaced=lambda at: influence.shifts(replace(at, beside=beside))[1])
 
 
-def _displacements(design: Design) -> Iterator[Hypothesis]:
+def _displacements(design: Design) -> Iterator[PossibleCause]:
     """Displacements of each probe in each position, as of a head that indexes badly."""
     readings = design.readings
     probes = len(design.probes.names)
@@ -217,7 +223,7 @@ def _displacements(design: Design) -> Iterator[Hypothesis]:
     yield _added(design, "reproducibility", words, cure, influence)
 
 
-def _chains(design: Design) -> Iterator[Hypothesis]:
+def _chains(design: Design) -> Iterator[PossibleCause]:
     model = design.model
     chain = model.spatial if isinstance(model, PlaneModel) else model
     if not isinstance(chain, KinematicModel):
@@ -241,4 +247,4 @@ def _chains(design: Design) -> Iterator[Hypothesis]:
 
         words = f"chain of axes {' or '.join(of_it)}"
         cure = "correct arrangement under error_model"
-        yield Hypothesis("chain of axes", words, cure, displaced, replace(design, model=other))
+        yield PossibleCause(CHAIN, words, cure, displaced, replace(design, model=other))
