@@ -29,6 +29,8 @@ NAMES = tuple(extension.name for extension in SHIPPED)
 BUILDS_ON = {
     ("campaign", "requirements"): "the next position is chosen for the goals of `reach`",
     ("judgement", "reliability"): "the residuals of each model are searched as those of a fit",
+    ("judgement", "questions"): "an assumption that fails is no reason for a larger model",
+    ("questions", "reliability"): "causes are told from gross errors by the same search",
     ("certificates", "laboratory"): "both read XML",
     ("maps", "reliability"): "certificates in common act on fits as gross errors do",
     ("pages", "campaign"): "the page of a design has its run sheet",

@@ -12,10 +12,12 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
+from ballplate.extensions.questions.answers import answers_at
+from ballplate.extensions.questions.possible_causes import MODEL
 from ballplate.extensions.reliability.exact_values import diagnosis_of_all
 from ballplate.extensions.reliability.refits import diagnosis_with_refits
 from ballplate.extensions.reliability.remainders import too_many_entries
-from ballplate.extensions.reliability.wording import refit_words, suspect_words
+from ballplate.extensions.reliability.wording import refit_words
 from ballplate.simulator.computing import ProgressStep, Report, single_threaded, unreported
 from ballplate.simulator.design import Design, State
 from ballplate.simulator.estimation import Linearisation, corrected_points, estimate, linearised_fit
@@ -365,21 +367,17 @@ def _lack_of_fit(fitted: FittedSum, repeats: PureError) -> float:
 
 
 def _mistakes(fits: list[RungFit], file: LadderModel, x: Array, is_given: bool) -> tuple[str, ...]:
-    """Return descriptions of errors in the file's offsets or arrangement that explain an excessive
-    S^2 of its own model.
-    """
+    """Return descriptions of errors in the file that explain an excessive S^2 of its own model."""
     fit = next(fit for fit in fits if fit.model.words == file.words)
     square, freedom = fit.fitted.sum_of_squares, fit.fitted.degrees_of_freedom
     if too_many_entries(fit.at.design) or chance_of(square, freedom, 0.0, 0, True) > MISFIT:
         return ()
     diagnosis = diagnosis_with_refits(fit.at, x, freedom, not is_given)
-    suspects = (
-        suspect
-        for suspect in diagnosis.suspects
-        if suspect.patterns.kind[suspect.pattern] == "probe"
-    )
-    words = [refit_words(diagnosis.refit)] if diagnosis.refit else []
-    return (*words, *map(suspect_words, suspects))
+    if diagnosis.refit:
+        return (refit_words(diagnosis.refit),)
+    answers = answers_at(fit.at, x, not is_given, diagnosis)
+    found = () if answers is None else answers.contradicted
+    return tuple(each.words for each in found if each.assumed != MODEL)
 
 
 def _faults(fit: RungFit, x: Array, repeats: PureError, is_given: bool) -> tuple[str, ...]:

@@ -14,6 +14,7 @@ from .document import Page, PageSection, facts_list, introduction, shipped, writ
 from .elements import Html, element, joined, note, sentence, table
 from .quoted import QuotedData
 from .residual_sections import (
+    answers_section,
     components_section,
     reliability_section,
     residual_charts,
@@ -122,6 +123,7 @@ def _results(fit: QuotedData, contents: FitContents) -> list[PageSection]:
         PageSection(
             "suspected", "Suspected gross errors", suspects_section(fit, contents.untested)
         ),
+        PageSection("asked", "What the readings say of the assumptions", answers_section(fit)),
         PageSection("residuals", "Residuals", of_residuals),
         PageSection("components", "Variance components", components_section(fit)),
         PageSection("reliability", "Reliability", reliability),
@@ -140,6 +142,7 @@ def _is_good(data: Mapping[str, Any]) -> bool:
         or data["weakly_determined"]
         or data["too_large"]
         or data.get("suspected")
+        or data.get("assumptions", {}).get("contradicted")
         or data["warnings"]
     )
     missed = any(share is not None and share < 1.0 for share in shares)

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 from ballplate.presentation import SHOWN, round_number
+from ballplate.simulator.inputs import listing
 from ballplate.simulator.machines import Array, Integers
 
 from .charts import Chart, Trace, chart_svg, figure, figures, legend
@@ -139,6 +140,26 @@ def suspects_section(fit: QuotedData, untested: str) -> Html:
         return sentence("No test of the residuals exceeds its limit.")
     items = (element("li", suspect.text("words")) for suspect in fit.at("suspected").each())
     return element("ol", *items)
+
+
+def answers_section(fit: QuotedData) -> Html:
+    """Section on what the readings contradict, and the answer to each assumption."""
+    if "assumptions" not in fit:
+        return Html()
+    answers = fit.at("assumptions")
+    items = [element("li", each.text("words")) for each in answers.at("contradicted").each()]
+    first = sentence("The readings contradict no assumption.")
+    if items:
+        first = joined([sentence("The readings contradict:"), element("ol", *items)])
+    rows = []
+    for each in answers.at("asked").each():
+        size, unit = each.amount("noticed_from", "unit")
+        noticed = joined([size, f" {unit}"]) if each.data["noticed_from"] is not None else "-"
+        not_seen = listing(each.data["not_seen"], 4)
+        rows.append([each.text("assumed"), each.number("chance", digits=2), noticed, not_seen])
+    heads = ["asked of the readings", "chance", "noticed from", "not seen"]
+    words = "Noticed in four of five campaigns; chance: of a larger effect if the assumption holds."
+    return joined([first, table("answers", "Assumptions", heads, rows, (0, 3)), note(words)])
 
 
 def components_section(fit: QuotedData) -> Html:

@@ -43,9 +43,19 @@ class Contradicted:
     lengths: tuple[float, float] | None = None
 
     @property
-    def words(self) -> str:
+    def verdict(self) -> str:
         """The cause, with those that cannot be told apart from it."""
         return ", or ".join([self.cause, *self.others])
+
+    @property
+    def words(self) -> str:
+        """The verdict with its chance, size, effect on U6, and cure."""
+        facts = [f"chance {_chance(self.chance)}", *map(_size, self.sizes)]
+        if not np.isnan(self.times):
+            facts.append(f"then sigma {number(self.times, 3)}")
+        if self.lengths is not None:
+            facts.append(f"U6 {number(1e6 * self.lengths[0], 3)} µm")
+        return f"{self.verdict} ({', '.join(facts)}); {self.cure}"
 
 
 @dataclass(frozen=True)
@@ -75,17 +85,10 @@ class Answers:
     @property
     def verdict(self) -> tuple[str, ...]:
         """Causes that the readings show."""
-        return tuple(each.words for each in self.contradicted)
+        return tuple(each.verdict for each in self.contradicted)
 
     def lines(self) -> list[str]:
-        lines = []
-        for each in self.contradicted:
-            facts = [f"chance {_chance(each.chance)}", *map(_size, each.sizes)]
-            if each.lengths is not None:
-                facts.append(
-                    f"then sigma {number(each.times, 3)}, U6 {number(1e6 * each.lengths[0], 3)} µm"
-                )
-            lines.append(f"contradicted: {each.words} ({'; '.join(facts)}); {each.cure}")
+        lines = [f"contradicted: {each.words}" for each in self.contradicted]
         columns = {
             "asked of the readings": "assumed",
             "chance": ([each.chance for each in self.asked], _chance),
@@ -99,7 +102,7 @@ class Answers:
             "level": LEVEL,
             "contradicted": [
                 {
-                    **picked(each, "assumed", "cause", "others", "chance", "cure"),
+                    **picked(each, "assumed", "cause", "others", "chance", "cure", "words"),
                     "parameters": [vars(size) for size in each.sizes],
                     **given(
                         sigma=each.times,
@@ -109,7 +112,7 @@ class Answers:
                 }
                 for each in self.contradicted
             ],
-            "asked": [vars(each) for each in self.asked],
+            "asked": [{**vars(each), "not_seen": list(each.not_seen)} for each in self.asked],
         }
 
 

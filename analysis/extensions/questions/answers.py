@@ -5,20 +5,22 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from ballplate.extensions.reliability.cause_search import Search, basis_of, explained_by
 from ballplate.extensions.reliability.remainders import Leftover, too_many_entries
 from ballplate.extensions.reliability.scatter import Scatter, scatters, with_scatter
 from ballplate.extensions.reliability.scatter import log_chances as scatter_chances
-from ballplate.extensions.reliability.searched_fit import DiagnosisInWords
-from ballplate.extensions.reliability.suspects import Suspect
+from ballplate.extensions.reliability.suspects import Diagnosis, Suspect
 from ballplate.results import Fit
 from ballplate.simulator.computing import single_threaded
-from ballplate.simulator.estimation import estimate, linearise, linearised_fit
+from ballplate.simulator.estimation import Linearisation, estimate, linearise, linearised_fit
+from ballplate.simulator.machines import Array, Integers
 from ballplate.uncertainty import uncertainties
 
 from .answered import Answers, AssumptionAnswer, Contradicted, Size
+from .possible_causes import PossibleCause
 from .score_tests import (
     LEVEL,
     Contradiction,
@@ -38,19 +40,26 @@ def assumptions_asked(fit: Fit) -> Answers | None:
     """Return what the readings of a converged fit say of each assumption; None without residuals
     to ask, or with offsets in error by so much that only a fit without them tells more.
     """
-    at, diagnosis = fit.functions.at, fit.diagnosis
-    if not isinstance(diagnosis, DiagnosisInWords) or too_many_entries(at.design):
+    diagnosis: Any = fit.diagnosis
+    if fit.without_scatter or diagnosis is None:
         return None
+    return answers_at(fit.functions.at, fit.observed.x, fit.sigma_is_estimated, diagnosis)
+
+
+@single_threaded
+def answers_at(
+    at: Linearisation, x: Array, sigma_is_estimated: bool, diagnosis: Diagnosis
+) -> Answers | None:
+    """Return what scale readings `x` (readings, d) say of each assumption at an estimate, as
+    `assumptions_asked`; `diagnosis` is that of their residuals.
+    """
     freedom = at.degrees_of_freedom
-    if freedom < 3 or fit.without_scatter:
+    if freedom < 3 or diagnosis.refit is not None or too_many_entries(at.design):
         return None
-    if diagnosis.refit is not None and diagnosis.refit.kind == "offsets":
-        return None
-    x = fit.observed.x
     if diagnosis.scatter is not None:
         noisy = with_scatter(at.design, diagnosis.scatter.of, diagnosis.scatter.times)
         at = linearise(noisy, at.state, x, at.spectrum)
-    search = Search(at, x, freedom, fit.sigma_is_estimated)
+    search = Search(at, x, freedom, sigma_is_estimated)
     every = list(tested(search))
     seen = [each for each in every if each.dimensions]
     noisier = scatters(search.design)
@@ -61,7 +70,7 @@ def assumptions_asked(fit: Fit) -> Answers | None:
     sigma = math.sqrt(remainder.sum_of_squares / remainder.freedom) if search.estimated else 1.0
     least = noticeable(search, remainder, tests) * sigma
     return Answers(
-        tuple(_contradicted(fit, each) for each in found),
+        tuple(_contradicted(x, sigma_is_estimated, each) for each in found),
         tuple(_answers(search, remainder, every, noisier, least)),
     )
 
@@ -89,22 +98,21 @@ def _without_gross_errors(
     return left
 
 
-def _contradicted(fit: Fit, found: Contradiction) -> Contradicted:
+def _contradicted(x: Array, sigma_is_estimated: bool, found: Contradiction) -> Contradicted:
     """Return a contradiction, with the result of a fit that allows for its cause, if any."""
     cause = found.best.cause
     others = tuple(other.cause.words for other in found.others)
     plain = Contradicted(cause.assumed, cause.words, cause.cure, math.exp(found.log_p), others)
     if cause.design is None:
         return plain
-    solution = estimate(cause.design, fit.observed.x)
+    solution = estimate(cause.design, x)
     if solution.status != "converged":
         return plain
     at = linearised_fit(cause.design, solution)
     times = math.sqrt(at.factor.sum_of_squares / max(at.degrees_of_freedom, 1))
-    sigma = times if fit.sigma_is_estimated else 1.0
-    first = len(solution.state.influences) - len(cause.parameters)
-    rows = np.eye(len(at.layout))[at.layout.influences][first:]
-    values, u = solution.state.influences[first:], sigma * at.of_shared(rows)
+    sigma = times if sigma_is_estimated else 1.0
+    values, columns = _parameters(cause, at)
+    u = sigma * at.of_shared(np.eye(len(at.layout))[columns])
     sizes = tuple(
         Size(name, value, uncertainty, cause.unit)
         for name, value, uncertainty in zip(
@@ -115,6 +123,15 @@ def _contradicted(fit: Fit, found: Contradiction) -> Contradicted:
     lengths = uncertainties(at, sigma, symbols=("U6",)).get("U6")
     of_lengths = None if lengths is None else (lengths.average, lengths.maximum)
     return replace(plain, sizes=sizes, times=times, lengths=of_lengths)
+
+
+def _parameters(cause: PossibleCause, at: Linearisation) -> tuple[Array, Integers]:
+    """Return estimates (k,) of a cause's parameters, and their columns among the shared ones."""
+    if cause.probe >= 0:
+        stated = at.design.probes.offsets[cause.probe]
+        return at.state.probes[cause.probe] - stated, at.layout.offset_columns[cause.probe]
+    first = len(at.state.influences) - len(cause.parameters)
+    return at.state.influences[first:], np.arange(len(at.layout))[at.layout.influences][first:]
 
 
 def _answers(

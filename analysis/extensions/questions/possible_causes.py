@@ -17,10 +17,13 @@ from ballplate.simulator.design import (
     InfluenceParameter,
     Lengths,
     PositionScale,
+    Priors,
     Sag,
     SagSettings,
     SharedDisplacements,
+    disturbed_readings,
     even_clock,
+    nominal_state,
 )
 from ballplate.simulator.geometry import AXIS_NAMES
 from ballplate.simulator.machines import (
@@ -40,14 +43,18 @@ LEAST_EXTENT = 1e-3
 # What is assumed of the order of axes.
 CHAIN = "chain of axes"
 
+# What is assumed of further terms.
+MODEL = "error model"
+
 
 @dataclass(frozen=True)
 class PossibleCause:
     """A cause, in `words`, that contradicts what is `assumed`, and its `cure`.
 
-    `displaced` gives the displacements (m, d, k) of readings by a unit of each of its parameters;
-    `design` is the one that does not assume its absence, None if there is no such. `parameters` are
-    the names of those that the design has in addition, in `unit`.
+    `displaced` gives the displacements (m, d, k) of readings by a unit of each of its parameters,
+    and is None for further terms of a model. `design` is the one that does not assume its absence,
+    None if there is no such. `parameters` are the names of those that the design has in addition,
+    in `unit`: influence quantities, or the offset of a `probe` that is not -1.
     """
 
     assumed: str
@@ -57,6 +64,7 @@ class PossibleCause:
     design: Design | None = None
     parameters: tuple[str, ...] = ()
     unit: Unit = "m"
+    probe: int = -1
 
 
 def possible_causes(design: Design) -> Iterator[PossibleCause]:
@@ -68,13 +76,23 @@ def possible_causes(design: Design) -> Iterator[PossibleCause]:
 def _added(
     design: Design, assumed: str, words: str, cure: str, influence: Influence
 ) -> PossibleCause:
-    """Return the cause of an influence quantity of which nothing is known."""
+    """Return the cause of an influence quantity of which nothing is known.
+
+    Designs have influence quantities of plates only: none has one that displaces length standards.
+    """
+    of_standards = np.setdiff1d(np.arange(len(design.readings)), design.plate_readings)
+    at = disturbed_readings(
+        nominal_state(design),
+        design.readings.select(of_standards),
+        np.ones((len(of_standards), design.dimension)),
+    )
+    is_of_plates = not influence.shifts(at)[1].any()
     return PossibleCause(
         assumed,
         words,
         cure,
         lambda at: influence.shifts(at)[1],
-        replace(design, influences=(*design.influences, influence)),
+        replace(design, influences=(*design.influences, influence)) if is_of_plates else None,
         tuple(parameter.name for parameter in influence.parameters),
         influence.parameters[0].unit,
     )
@@ -89,6 +107,7 @@ def _letters(design: Design) -> list[str]:
 
 
 def _tips(design: Design) -> Iterator[PossibleCause]:
+    priors = design.of(Priors)
     for probe in np.unique(design.readings.probe).tolist():
         place = np.full(len(design.probes.names), -1)
         place[probe] = 0
@@ -96,7 +115,14 @@ def _tips(design: Design) -> Iterator[PossibleCause]:
             ("probe",), place, _unknown(_letters(design), "m", 1.0), of_tips=True
         )
         words = f"offset of probe {design.probes.names[probe]}"
-        yield _added(design, "tips", words, "qualify the probe again", influence)
+        of_others = np.arange(len(design.probes.names))[:, None] != probe
+        unknown = replace(design.probes, free=design.probes.free | ~of_others)
+        without = priors.select(np.flatnonzero(priors.probe != probe))
+        yield replace(
+            _added(design, "tips", words, "qualify the probe again", influence),
+            design=replace(design, probes=unknown).observed(without),
+            probe=probe,
+        )
 
 
 def _certificates(design: Design) -> Iterator[PossibleCause]:
@@ -245,6 +271,6 @@ def _chains(design: Design) -> Iterator[PossibleCause]:
             )
             return np.asarray(changes[:, :, np.abs(changes).max(axis=(0, 1)) > 0.0])
 
-        words = f"chain of axes {' or '.join(of_it)}"
+        words = f"the arrangement of the axes is {' or '.join(of_it)}"
         cure = "correct arrangement under error_model"
         yield PossibleCause(CHAIN, words, cure, displaced, replace(design, model=other))

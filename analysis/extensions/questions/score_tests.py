@@ -22,16 +22,13 @@ from ballplate.simulator.design import Design, State, disturbed_readings, expect
 from ballplate.simulator.estimation import estimate
 from ballplate.simulator.machines import Array
 
-from .possible_causes import CHAIN, PossibleCause, possible_causes
+from .possible_causes import CHAIN, MODEL, PossibleCause, possible_causes
 
 # Chance that any of the assumptions of a right experiment is contradicted.
 LEVEL = 0.01
 
 # Power of the test of what can be noticed.
 POWER = 0.8
-
-# A cause explains nothing beyond another if what remains of it has at least this p-value.
-BEYOND = math.log(1e-2)
 
 # Share of a parameter that is not in what residuals show, from which on they do not show it.
 SEPARATE = 1e-6
@@ -56,8 +53,8 @@ class Tested:
 
     @property
     def is_of_model(self) -> bool:
-        """True of further terms of the error model, which no changed design has."""
-        return self.cause.design is None
+        """True of further terms of a model of errors or drifts."""
+        return self.cause.displaced is None
 
     def uncertainties(self, left: Leftover) -> Array:
         """Return standard uncertainties (k,) of the parameters in units of sigma, infinite of those
@@ -82,7 +79,7 @@ def tested(search: Search) -> Iterator[Tested]:
         columns = _rows(design, search.state, cause)
         yield Tested(cause, search.visible(columns, most), columns)
     for smooth in search.smooth:
-        assumed = "drift" if smooth.is_drift else "error model"
+        assumed = "drift" if smooth.is_drift else MODEL
         cure = "consider drifts" if smooth.is_drift else "compare error models (ballplate models)"
         cause = PossibleCause(assumed, smooth.words, cure)
         yield Tested(cause, smooth.columns, smooth.columns[:, :0])
@@ -121,7 +118,7 @@ def contradictions(
     search: Search, left: Leftover, every: list[Tested], limit: float
 ) -> tuple[list[Contradiction], Leftover]:
     """Return the causes that residuals confirm beyond a `limit`, one after the other, and what
-    remains without them.
+    remains without them. Others are as good if the best explains nothing beyond them at that limit.
     """
     found: list[Contradiction] = []
     while len(found) < MOST and left.freedom >= 3:
@@ -133,14 +130,16 @@ def contradictions(
             k
             for k in np.flatnonzero(chances < limit).tolist()
             if k == first
-            or _log_p(search, left.without(every[k].basis), every[first].basis) > BEYOND
+            or _log_p(search, left.without(every[k].basis), every[first].basis) >= limit
         ]
         # Further terms of the error model are an explanation where no other does as well.
         best = min(same, key=lambda k: (every[k].is_of_model, chances[k]))
         widest = max(every[best].dimensions, every[first].dimensions)
         others = [k for k in same if k != best and every[k].dimensions <= widest]
         if every[best].cause.assumed == CHAIN:
+            other_causes = [k for k in others if every[k].cause.assumed != CHAIN]
             best, *others = _chains(search, every, np.flatnonzero(chances < limit).tolist())
+            others += other_causes
         of_others = tuple(every[k] for k in others)
         found.append(Contradiction(every[best], float(chances[best]), of_others))
         left = left.without(every[best].basis)

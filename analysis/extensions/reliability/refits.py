@@ -1,9 +1,7 @@
-"""Errors in an experiment file that a fit without them reveals: offsets of probes, arrangement of
-axes.
+"""Errors in the offsets of probes that a fit without them reveals.
 
-Offsets in error by millimetres and another chain of axes are no small biases: their patterns at the
-biased estimate explain little. A fit with all offsets free gives the sum of squares for every
-single error in them; each other arrangement has a fit of its own.
+Offsets in error by millimetres are no small biases: their patterns at the biased estimate explain
+little. A fit with all offsets free gives the sum of squares for every single error in them.
 """
 
 from __future__ import annotations
@@ -30,13 +28,8 @@ from ballplate.simulator.estimation import (
     linearised_fit,
 )
 from ballplate.simulator.machines import (
-    ARRANGEMENTS,
-    Arrangement,
     Array,
-    ErrorModel,
     Integers,
-    KinematicModel,
-    PlaneModel,
 )
 
 from .bias_patterns import patterns
@@ -63,8 +56,7 @@ NEARLY_ALL = 1e-2
 def diagnosis_with_refits(
     fitted: Linearisation, x: Array, freedom: int, sigma_is_estimated: bool
 ) -> Diagnosis:
-    """Search the residuals of a fit for their cause, including errors in offsets and in the
-    arrangement.
+    """Search the residuals of a fit for their cause, including errors in offsets.
 
     If no cause explains the residuals to first order, or only several causes explain a large S^2,
     the estimate is repeated without each error of these kinds. An error is named if it explains S^2
@@ -78,7 +70,7 @@ def diagnosis_with_refits(
     if first_order.unexplained is None and (is_small or len(first_order.suspects) < 2):
         return first_order
     search = _Refits(fitted, x, freedom, sigma_is_estimated, first_order)
-    return search.offsets() or search.arrangements() or first_order
+    return search.offsets() or first_order
 
 
 @dataclass(frozen=True)
@@ -124,7 +116,7 @@ class _Refits:
         if not first.is_off:
             words = tuple(mistake.words(design) for mistake in mistakes)
             cure = "correct the offsets under probes, or the names of probes in the readings"
-            return self._named("offsets", words, cure, with_offsets(design, first.change), limit)
+            return self._named(words, cure, with_offsets(design, first.change), limit)
         (probe,) = first.probes
         exact = _exact(design, stated_offsets(design) + first.change, np.array([probe]))
         searched = self._without(exact)
@@ -147,45 +139,7 @@ class _Refits:
             suspect = replace(suspect, of_model=(*further, *suspect.of_model))
             return replace(remainder, suspects=(suspect, *remainder.suspects))
         words = tuple(f"the offset of probe {name} is another one" for name in names.values())
-        return self._named("offsets", words, "qualify the probe again", exact, limit)
-
-    def arrangements(self) -> Diagnosis | None:
-        """Return the diagnosis with another arrangement of the axes; None if none explains S^2."""
-        design = self.at.design
-        model = design.model
-        chain = model.spatial if isinstance(model, PlaneModel) else model
-        if not isinstance(chain, KinematicModel):
-            return None
-        priors = design.of(Priors)
-        if priors.of_model.any():
-            # Priors of these parameters, as of a map, do not apply to another arrangement's.
-            alone = design.observed(priors.select(~priors.of_model))
-            solution = estimate(alone, self.x)
-            if solution.status != "converged":
-                return None
-            refitted = linearised_fit(alone, solution)
-            return replace(self, at=refitted, freedom=refitted.degrees_of_freedom).arrangements()
-        names: dict[Arrangement, list[str]] = {}
-        for name, arrangement in ARRANGEMENTS.items():
-            if arrangement != chain.arrangement:
-                names.setdefault(arrangement, []).append(name)
-        fits = []
-        for arrangement in names:
-            changed: ErrorModel = replace(chain, arrangement=arrangement)
-            changed = replace(model, spatial=changed) if isinstance(model, PlaneModel) else changed
-            solution = estimate(replace(design, model=changed), self.x)
-            if solution.status == "converged":
-                fits.append((solution.factor.sum_of_squares, (arrangement, changed)))
-        near, limit = self._near(fits), math.log(0.5 * FAMILY / len(names))
-        least = min((remaining for remaining, _ in fits), default=self.total)
-        if not near or self._log_p(least, 1) > limit or self.total - least < self._odds(least):
-            return None
-        words = tuple(
-            f"the arrangement of the axes is {' or '.join(names[candidate])}"
-            for candidate, _ in near
-        )
-        cure = "correct arrangement under error_model"
-        return self._named("arrangement", words, cure, replace(design, model=near[0][1]), limit)
+        return self._named(words, "qualify the probe again", exact, limit)
 
     @property
     def total(self) -> float:
@@ -232,7 +186,7 @@ class _Refits:
         return None
 
     def _named(
-        self, kind: str, words: tuple[str, ...], cure: str, design: Design, limit: float
+        self, words: tuple[str, ...], cure: str, design: Design, limit: float
     ) -> Diagnosis | None:
         """Return the diagnosis with an error in the file, and the causes that remain without it."""
         searched = self._without(design)
@@ -242,7 +196,7 @@ class _Refits:
         remaining = search.sum_of_squares
         before, times = (math.sqrt(square / self.freedom) for square in (self.total, remaining))
         statistics = normal_equivalent(self._log_p(remaining, 1)), normal_equivalent(limit)
-        return replace(remainder, refit=Refit(kind, words, cure, before, times, *statistics))
+        return replace(remainder, refit=Refit(words, cure, before, times, *statistics))
 
 
 @dataclass(frozen=True)

@@ -90,11 +90,9 @@ class Refit:
     """An error in the experiment file that a fit without it reveals: one of indistinguishable
     `causes`.
 
-    Residuals are `times` as large as stated without it, `before` with it. `kind` is offsets or
-    arrangement.
+    Residuals are `times` as large as stated without it, `before` with it.
     """
 
-    kind: str
     causes: tuple[str, ...]
     cure: str
     before: float

@@ -300,7 +300,7 @@ def diagnosis_data(diagnosis: Diagnosis, marks: Sequence[Mark] = ()) -> list[Dat
     items = []
     if diagnosis.refit:
         refit = diagnosis.refit
-        items.append(_other_data(refit.causes[0], refit.kind, refit, refit_words(refit)))
+        items.append(_other_data(refit.causes[0], "offsets", refit, refit_words(refit)))
         items[0]["alternatives"] = list(refit.causes[1:])
     items += [_suspect_data(suspect, marks) for suspect in diagnosis.suspects]
     if diagnosis.scatter:

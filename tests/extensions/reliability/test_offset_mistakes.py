@@ -1,4 +1,4 @@
-"""One wrong offset, sign, exchange of probes or arrangement is named, before patterns of
+"""One wrong offset, sign or exchange of probes is named, before patterns of
 micrometres.
 """
 
@@ -6,10 +6,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import ballplate as bp
 import numpy as np
 import pytest
-from ballplate.extensions.judgement.compared_models import compared_models
 from ballplate.extensions.laboratory.wrong_offsets import (
     WrongOffsets,
     offset_differences,
@@ -17,10 +15,8 @@ from ballplate.extensions.laboratory.wrong_offsets import (
 )
 from ballplate.extensions.reliability import refits
 from ballplate.extensions.reliability.refits import diagnosis_with_refits
-from ballplate.extensions.reliability.wording import diagnosis_words
 from ballplate.simulator.estimation.gauss_newton import estimate, linearised_fit
 from ballplate.simulator.experiment.layout import lay_out
-from ballplate.simulator.machines.arrangement import ARRANGEMENTS
 
 from tests.extensions.reliability import wording
 from tests.extensions.reliability.designs import experiment
@@ -29,7 +25,6 @@ from tests.extensions.reliability.offsets import (
     Mistake,
     Plan,
     drawn,
-    limits,
     mistakes,
     outcome,
     plan,
@@ -125,35 +120,6 @@ def test_nothing_is_estimated_anew_where_nothing_is_unexplained(
         assert len(found.suspects) == (size > 0.0) and not found.refit
 
 
-@pytest.fixture(scope="module")
-def other_machine(tmp_path_factory: pytest.TempPathFactory) -> tuple[bp.Experiment, object]:
-    """A file that states MB2, and readings of a machine that is MB1."""
-    given = experiment(tmp_path_factory.mktemp("machine"), DESIGNS["few balls"])
-    return given, bp.simulate(given.with_({"error_model.arrangement": "MB1", "seed": 2}))
-
-
-def test_fit_names_another_arrangement(other_machine: tuple[bp.Experiment, object]) -> None:
-    found = bp.fit(*other_machine)
-    (words,) = diagnosis_words(found.diagnosis)
-    assert found.too_large and wording.THE_ARRANGEMENT_OF_THE_AXES in words
-    right = bp.fit(other_machine[0].with_({"error_model.arrangement": "MB1"}), other_machine[1])
-    assert found.diagnosis.refit is not None
-    assert found.diagnosis.refit.times == pytest.approx(right.sigma, rel=1e-6)
-    (data,) = found.to_dict()["suspected"]
-    assert data["kind"] == "arrangement" and data["name"] == wording.THE_ARRANGEMENT_OF_THE_AXES
-    assert any(wording.SEE_WHAT_IS_SUSPECTED in one for one in found.cautions)
-
-
-def test_ladder_names_another_arrangement_before_richer_models(
-    other_machine: tuple[bp.Experiment, object],
-) -> None:
-    observed = bp.fit(*other_machine).observed
-    found = compared_models(other_machine[0], observed, most=4)
-    assert found.is_none and found.to_dict()["recommended"] is None
-    assert wording.THE_ARRANGEMENT_OF_THE_AXES in found.verdict()[0]
-    assert "pitch" not in " ".join(found.lines())
-
-
 @pytest.mark.long
 @pytest.mark.parametrize("is_uncertain", [False, True], ids=["exact", "uncertain"])
 @pytest.mark.parametrize("name", DESIGNS)
@@ -165,30 +131,3 @@ def test_rates_of_naming_one_wrong_offset(
         print("", name, *found.lines(), *found.failures, sep="\n")
     assert found.every["wrong"] <= 0.02 * found.every.total()
     assert found.large["right"] >= 0.9 * found.large.total() > 0.0
-
-
-@pytest.mark.long
-def test_rates_of_naming_the_arrangement(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    """Readings of each arrangement with the quickstart's design, fitted as each other one."""
-    given = experiment(tmp_path, DESIGNS["quickstart"])
-    every, wrong, right = 0, 0, 0
-    for number, true in enumerate(ARRANGEMENTS):
-        readings = bp.simulate(given.with_({"error_model.arrangement": true, "seed": number + 1}))
-        for stated in ARRANGEMENTS:
-            if ARRANGEMENTS[stated] == ARRANGEMENTS[true]:
-                continue
-            file = given.with_({"error_model.arrangement": stated})
-            refit = bp.fit(file, readings).diagnosis.refit
-            named = " ".join(refit.causes) if refit else ""
-            every, right = every + 1, right + (true in named)
-            wrong += bool(named) and true not in named
-    with capsys.disabled():
-        for words, count in (("the right arrangement", right), ("another one only", wrong)):
-            lower, upper = limits(count, every)
-            print(
-                f"\n{words}: {count} of {every}, {100 * count / every:.1f} % (95 %:"
-                f" {100 * lower:.1f} to {100 * upper:.1f} %)"
-            )
-    assert wrong <= 0.02 * every and right >= 0.9 * every
