@@ -125,7 +125,9 @@ def map_of(fit: MappedFit, date: str | None = None) -> FittedMap:
             _left_out(estimate) for estimate in fit.estimates if estimate.kind == "influence"
         ),
         data=data_of(fit.observed, experiment),
-        lack_of_fit=replace(fit.lack_of_fit, contradicted=() if asked is None else asked.verdict),
+        lack_of_fit=replace(fit.lack_of_fit, contradicted=asked.verdict)
+        if asked
+        else fit.lack_of_fit,
         experiment=fit.label,
         program=f"ballplate {version('ballplate')}",
         date=date,

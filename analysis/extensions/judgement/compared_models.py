@@ -13,7 +13,6 @@ from typing import Literal
 
 import numpy as np
 from ballplate.extensions.questions.answers import answers_at
-from ballplate.extensions.questions.possible_causes import MODEL
 from ballplate.extensions.reliability.exact_values import diagnosis_of_all
 from ballplate.extensions.reliability.refits import diagnosis_with_refits
 from ballplate.extensions.reliability.remainders import too_many_entries
@@ -377,7 +376,7 @@ def _mistakes(fits: list[RungFit], file: LadderModel, x: Array, is_given: bool) 
         return (refit_words(diagnosis.refit),)
     answers = answers_at(fit.at, x, not is_given, diagnosis)
     found = () if answers is None else answers.contradicted
-    return tuple(each.words for each in found if each.assumed != MODEL)
+    return tuple(each.words for each in found if not each.may_be_model)
 
 
 def _faults(fit: RungFit, x: Array, repeats: PureError, is_given: bool) -> tuple[str, ...]:

@@ -30,7 +30,8 @@ class Contradicted:
 
     `others` are causes that the readings cannot tell apart from it. A fit that allows for the cause
     gives its `sizes`, the residuals in stated uncertainties, `times`, and the average and the
-    maximum of U6 in metres, `lengths`.
+    maximum of U6 in metres, `lengths`. It `may_be_model` if further terms of the error model are
+    among the others.
     """
 
     assumed: str
@@ -41,6 +42,7 @@ class Contradicted:
     sizes: tuple[Size, ...] = ()
     times: float = np.nan
     lengths: tuple[float, float] | None = None
+    may_be_model: bool = False
 
     @property
     def verdict(self) -> str:

@@ -20,7 +20,7 @@ from ballplate.simulator.machines import Array, Integers
 from ballplate.uncertainty import uncertainties
 
 from .answered import Answers, AssumptionAnswer, Contradicted, Size
-from .possible_causes import PossibleCause
+from .possible_causes import MODEL, PossibleCause
 from .score_tests import (
     LEVEL,
     Contradiction,
@@ -102,7 +102,14 @@ def _contradicted(x: Array, sigma_is_estimated: bool, found: Contradiction) -> C
     """Return a contradiction, with the result of a fit that allows for its cause, if any."""
     cause = found.best.cause
     others = tuple(other.cause.words for other in found.others)
-    plain = Contradicted(cause.assumed, cause.words, cause.cure, math.exp(found.log_p), others)
+    plain = Contradicted(
+        cause.assumed,
+        cause.words,
+        cause.cure,
+        math.exp(found.log_p),
+        others,
+        may_be_model=any(each.cause.assumed == MODEL for each in (found.best, *found.others)),
+    )
     if cause.design is None:
         return plain
     solution = estimate(cause.design, x)
@@ -147,7 +154,7 @@ def _answers(
         for k in seen:
             cause = every[k].cause
             u = every[k].uncertainties(left)
-            if len(u) <= search.design.dimension:
+            if 0 < len(cause.parameters) <= search.design.dimension:
                 noticed += (least * u[np.isfinite(u)]).tolist()
                 names = np.array(cause.parameters)[~np.isfinite(u)]
                 not_seen += [f"{cause.words}, {name}" for name in names]

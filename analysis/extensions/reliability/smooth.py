@@ -164,9 +164,8 @@ def rows_of(linearised: LinearisedDesign, displacement: Array) -> Array:
     """
     k = displacement.shape[2]
     biases = np.zeros((row_count(linearised.design), k))
-    biases[linearised.places["reading"]] = (
-        linearised.weight[:, :, None] * displacement[linearised.chosen]
-    ).reshape(-1, k)
+    white = linearised.weight[:, :, None] * displacement[linearised.chosen]
+    biases[linearised.places["reading"]] = white.reshape(linearised.weight.size, k)
     biases[linearised.places["length"]] = linearised.white.whitened(
         linearised.along_lengths(displacement)
     )

@@ -86,6 +86,7 @@ def map_of_campaign(true: Real, seed: int) -> FittedMap:
         degrees_of_freedom=freedom,
         sum_of_squares=at.factor.sum_of_squares,
         lack_of_fit=None,
+        assumptions=None,
         estimates=(),
         functions=estimated_functions(at, False),
     )
