@@ -121,7 +121,7 @@ SHIPPED = (
         functions=_from("interface", "reliability"),
         services=_from("searched_fit", "diagnosed"),
     ),
-    _here("questions", services=_from("answers", "assumptions_asked")),
+    _here("questions", services=_from("asking", "assumptions_asked")),
     _here(
         "certificates",
         commands={

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from ballplate.extensions.questions.answers import answers_at
+from ballplate.extensions.questions.asking import answers_at
 from ballplate.extensions.reliability.exact_values import diagnosis_of_all
 from ballplate.extensions.reliability.refits import diagnosis_with_refits
 from ballplate.extensions.reliability.remainders import too_many_entries
