@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ballplate.presentation import Data, Result
+from ballplate.presentation import Data, Result, picked
 from ballplate.simulator.computing import Report, unreported
 from ballplate.simulator.inputs import UnusableError, in_one_line
 from filelock import FileLock, Timeout
@@ -101,13 +101,11 @@ class SweepResult(Result):
         return [self.heading, self.headline(), *self.remarks, "", *table]
 
     def data(self) -> Data:
-        summary = self.summary
-        counts = {name: getattr(summary, name) for name in ("cells", "done", "failed", "left")}
         return {
             "sweep": self.label,
             "title": self.title,
             "store": str(self.store),
-            **counts,
+            **picked(self.summary, "cells", "done", "failed", "left"),
             "shortcomings": self.shortcomings,
             "rows": self.rows(),
         }

@@ -222,10 +222,13 @@ def statuses(store: Store) -> dict[tuple[str, int], str]:
 def add_keys(store: Store, sweep: int, cell_keys: dict[int, str]) -> None:
     """Enter keys of cells."""
     with _transaction(store) as connection:
-        connection.executemany(
-            "INSERT OR REPLACE INTO cell (sweep, number, key, digest) VALUES (?, ?, ?, ?)",
-            [(sweep, cell, key, digest_of(sweep, cell, key)) for cell, key in cell_keys.items()],
-        )
+        for number, key in cell_keys.items():
+            _add_key(connection, sweep, number, key)
+
+
+def _add_key(connection: sqlite3.Connection, sweep: int, number: int, key: str) -> None:
+    insert = "INSERT OR REPLACE INTO cell (sweep, number, key, digest) VALUES (?, ?, ?, ?)"
+    connection.execute(insert, [sweep, number, key, digest_of(sweep, number, key)])
 
 
 def add_rows(store: Store, sweep: int, rows: Iterable[CellResult]) -> None:
@@ -245,10 +248,7 @@ def add_rows(store: Store, sweep: int, rows: Iterable[CellResult]) -> None:
                 INSERT,
                 [*first, names, figures, details, versions, row.seconds, tally, digest],
             )
-            connection.execute(
-                "INSERT OR REPLACE INTO cell (sweep, number, key, digest) VALUES (?, ?, ?, ?)",
-                [sweep, row.number, row.key, digest_of(sweep, row.number, row.key)],
-            )
+            _add_key(connection, sweep, row.number, row.key)
             if row.block == 0 and row.status == "done":
                 # The sums over blocks are used up, except for their computing time.
                 seconds = "SELECT coalesce(sum(seconds), 0) FROM result WHERE key = ? AND block > 0"

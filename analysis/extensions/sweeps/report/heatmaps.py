@@ -11,7 +11,7 @@ from ballplate.simulator.machines import Array, Integers
 
 from .measures import Measure, uncertainty_measures
 from .results import ReportAxis, ReportedSweep, criterion, partly_open, ranked
-from .series import evenly, setting_words
+from .series import evenly
 from .tables import DIGITS, NOT_DONE, STAR
 
 # Limits: values of an axis, distinguishable shades, pairs of axes.
@@ -62,11 +62,9 @@ def _heat(results: ReportedSweep, i: int, j: int, measure: Measure, best: int) -
     common = results.chosen[best, further]
     here = np.flatnonzero((results.chosen[:, further] == common).all(axis=1))
     planned = results.cells[(results.cells[:, further] == common).all(axis=1)]
-    places = {
-        (int(a), int(b)): int(row)
-        for a, b, row in zip(results.chosen[here, i], results.chosen[here, j], here, strict=True)
-    }
-    wanted = {(int(a), int(b)) for a, b in planned[:, [i, j]]}
+    pairs = map(tuple, results.chosen[here][:, [i, j]].tolist())
+    places = dict(zip(pairs, here.tolist(), strict=True))
+    wanted = set(map(tuple, planned[:, [i, j]].tolist()))
     row_values, column_values = evenly(rows, MOST_VALUES), evenly(columns, MOST_VALUES)
     grid = [[(a, b) for b in column_values] for a in row_values]
     if sum(place in places for line in grid for place in line) < 4:
@@ -90,7 +88,7 @@ def _heat(results: ReportedSweep, i: int, j: int, measure: Measure, best: int) -
     shades = np.where(is_open, DEFICIENT, _shades(values.ravel()).reshape(values.shape))
     notes = []
     if further:
-        notes.append(f"All with {setting_words(results, further, common)}, as in the best case.")
+        notes.append(f"All with {results.words(further, common)}, as in the best case.")
     notes += [
         f"{len(shown)} of {len(axis.labels)} values of {axis.name}."
         for axis, shown in ((rows, row_values), (columns, column_values))

@@ -52,31 +52,18 @@ def uncertainty_measures(results: ReportedSweep, of_parts: bool = True) -> list[
                 Measure(symbol, statistic, unit, column)
                 for column, unit in _columns(results, f"{name}_{statistic}_")
             ]
-        for statistic, unit, factor in (("undetermined", "", 1.0), ("within_target", "%", 100.0)):
-            column = f"{name}_{statistic}"
-            if column not in results.frame:
-                continue
-            if statistic == "undetermined" and not (
-                of_parts and (results.figure(column) > 0).any()
-            ):
-                continue
-            measures.append(
-                Measure(
-                    symbol,
-                    statistic.replace("_", " "),
-                    unit,
-                    column,
-                    factor,
-                    is_count=statistic == "undetermined",
-                )
-            )
+        open_, share = f"{name}_undetermined", f"{name}_within_target"
+        if of_parts and (results.figure(open_) > 0).any():
+            measures.append(Measure(symbol, "undetermined", "", open_, 1.0, is_count=True))
+        if share in results.frame:
+            measures.append(Measure(symbol, "within target", "%", share, 100.0))
     return measures
 
 
 def rank_measures(results: ReportedSweep) -> list[Measure]:
     """Return the rank deficiency, unless all cells have full rank."""
     column = "rank_deficiency"
-    if column not in results.frame or not (results.figure(column) > 0).any():
+    if not (results.figure(column) > 0).any():
         return []
     return [Measure("rank", "deficiency", "", column, 1.0, is_count=True)]
 

@@ -87,9 +87,13 @@ class ReportedSweep:
 
     def label(self, cell: int) -> str:
         """Return a cell's axes with their values."""
+        return self.words(range(len(self.axes)), self.cells[cell])
+
+    def words(self, axes: Iterable[int], values: Integers) -> str:
+        """Return some axes with values by index."""
         return ", ".join(
-            f"{axis.name} {axis.labels[k]}"
-            for axis, k in zip(self.axes, self.cells[cell].tolist(), strict=True)
+            f"{self.axes[i].name} {self.axes[i].labels[k]}"
+            for i, k in zip(axes, values.tolist(), strict=True)
         )
 
     def cell(self, row: int) -> int:
@@ -164,10 +168,7 @@ def _axis(stored: dict[str, Any]) -> ReportAxis:
 
 def partly_open(results: ReportedSweep, symbol: str) -> Flags:
     """Return the rows of the frame (rows,) in which some values of a quantity are undetermined."""
-    column = f"{symbol_column(symbol.rstrip(MORE))}_undetermined"
-    if column not in results.frame:
-        return np.zeros(len(results.frame), bool)
-    return results.figure(column) > 0
+    return results.figure(f"{symbol_column(symbol.rstrip(MORE))}_undetermined") > 0
 
 
 def criterion(results: ReportedSweep) -> tuple[str, str] | None:

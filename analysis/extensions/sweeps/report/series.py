@@ -10,7 +10,7 @@ from ballplate.simulator.computing import evenly_spread
 from ballplate.simulator.machines import Array, Integers
 
 from ..store_columns import symbol_column
-from .measures import Measure, trial_symbols, uncertainty_measures
+from .measures import STATISTICS, Measure, trial_symbols, uncertainty_measures
 from .results import ReportAxis, ReportedSweep, criterion, partly_open, ranked
 
 # Limits: distinguishable lines, values along an axis, pictures of one quantity for settings of
@@ -61,29 +61,27 @@ def plots(results: ReportedSweep) -> list[Plot]:
     Lines are values of a second axis. The quantity that cells are judged by has a picture for each
     setting of the further axes.
     """
-    measures = [
-        m
-        for m in uncertainty_measures(results)
-        if m.statistic in ("average", "maximum") and " or " not in m.unit
-    ]
+    by_symbol: dict[str, dict[str, Measure]] = {}
+    for measure in uncertainty_measures(results):
+        if measure.statistic in STATISTICS and " or " not in measure.unit:
+            by_symbol.setdefault(measure.symbol, {})[measure.statistic] = measure
     judged = criterion(results)
+
+    def is_judged(symbol: str) -> bool:
+        return judged is not None and judged[1] == symbol_column(symbol)
+
     drawn = []
     for k, axis in enumerate(results.axes):
         if len(axis.numbers) < 2:
             continue
         pictures = _pictures(results, k)
-        for symbol in sorted(
-            dict.fromkeys(m.symbol for m in measures),
-            key=lambda symbol: judged is None or judged[1] != symbol_column(symbol),
-        ):
-            by_statistic = {m.statistic: m for m in measures if m.symbol == symbol}
-            if len(by_statistic) < 2:
+        for symbol in sorted(by_symbol, key=is_judged, reverse=True):
+            measures = by_symbol[symbol]
+            if len(measures) < 2:
                 continue
-            is_judged = judged is not None and judged[1] == symbol_column(symbol)
-            for picture in pictures if is_judged else pictures[:1]:
-                plot = _plot(
-                    results, k, picture, symbol, [by_statistic["average"], by_statistic["maximum"]]
-                )
+            for picture in pictures if is_judged(symbol) else pictures[:1]:
+                pair = measures["average"], measures["maximum"]
+                plot = _plot(results, k, picture, symbol, pair)
                 if any(np.isfinite(line.y).any() for panel in plot.panels for line in panel.lines):
                     drawn.append(plot)
     return drawn
@@ -128,7 +126,7 @@ def _pictures(results: ReportedSweep, k: int) -> list[_Picture]:
     for i in order:
         here = rows[place.ravel() == i]
         lines = [here[results.chosen[here, second] == value] for value in values]
-        note = setting_words(results, further, apart[i])
+        note = results.words(further, apart[i])
         note = f"With {note}" if note else ""
         if i == best_setting and len(apart) > 1:
             note += ", as in the best case"
@@ -157,13 +155,6 @@ def evenly(axis: ReportAxis, most: int) -> list[int]:
     return [int(i) for i in order[evenly_spread(len(order), most)]]
 
 
-def setting_words(results: ReportedSweep, axes: Sequence[int], values: Integers) -> str:
-    return ", ".join(
-        f"{results.axes[i].name} {results.axes[i].labels[j]}"
-        for i, j in zip(axes, values.tolist(), strict=True)
-    )
-
-
 def _picture(
     results: ReportedSweep,
     k: int,
@@ -178,7 +169,7 @@ def _picture(
     for line in lines:
         line_rows = line[[value in shown for value in results.chosen[line, k].tolist()]]
         if len(line_rows):
-            label = setting_words(results, axes, results.chosen[line_rows[0], axes])
+            label = results.words(axes, results.chosen[line_rows[0], axes])
             labelled_lines.append((label, line_rows[np.argsort(x[line_rows], kind="stable")]))
     return _Picture(tuple(labelled_lines), note)
 

@@ -116,15 +116,20 @@ def _columns_table(
     firsts = range(len(results.axes[0].labels)) if len(results.axes) == 2 else [None]
     blocks = []
     for first in firsts:
-        measure_rows = []
-        for measure in measures:
-            entries = []
-            for last in range(len(axis.labels)):
-                cell = cells.get((last,) if first is None else (first, last))
-                entries.append(
+        here = [
+            cells.get((last,) if first is None else (first, last))
+            for last in range(len(axis.labels))
+        ]
+        measure_rows = [
+            Row(
+                (measure.name, measure.unit),
+                tuple(
                     Entry("") if cell is None else _entry(results, measure, cell, rows.get(cell))
-                )
-            measure_rows.append(Row((measure.name, measure.unit), tuple(entries)))
+                    for cell in here
+                ),
+            )
+            for measure in measures
+        ]
         title = "" if first is None else f"{results.axes[0].name} {results.axes[0].labels[first]}"
         if any(entry.text for row in measure_rows for entry in row.entries):
             blocks.append(Block(title, tuple(measure_rows)))
@@ -189,5 +194,4 @@ def _entry(results: ReportedSweep, measure: Measure, cell: int, row: int | None)
 
 def _is_open(results: ReportedSweep, measure: Measure, row: int) -> bool:
     """Return whether a cell leaves all values of a measure undetermined."""
-    column = f"{symbol_column(measure.symbol)}_undetermined"
-    return column in results.frame and results.value(column, row) > 0
+    return results.value(f"{symbol_column(measure.symbol)}_undetermined", row) > 0

@@ -98,10 +98,8 @@ def failures(results: ReportedSweep) -> VerdictGroups:
     failed = results.frame[results.frame["status"] == "failed"]
     for cell, reason in zip(failed["cell"], failed["reason"], strict=True):
         lines = str(reason).splitlines() or ["failed"]
-        if len(lines) == 1:
-            statements.append((lines[0], [], int(cell)))
-        else:
-            statements.append((f"{len(lines)} errors", lines, int(cell)))
+        heading, *lines = lines if len(lines) == 1 else [f"{len(lines)} errors", *lines]
+        statements.append((heading, lines, int(cell)))
     return _grouped(results, statements)
 
 
