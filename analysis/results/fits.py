@@ -173,8 +173,8 @@ class Fit(FitResult):
         if not self.converged:
             return lines
         lines += ["", *self._residual_table()]
-        if self.diagnosis:
-            lines += self.diagnosis.lines(self.observed.marks)
+        if self._suspicion:
+            lines += self._suspicion.lines(self.observed.marks)
         if self.assumptions is not None:
             lines += ["", *self.assumptions.lines()]
         if self.variance_components is not None:
@@ -225,7 +225,7 @@ class Fit(FitResult):
             **given(
                 error_functions=[curve.to_dict() for curve in curves],
                 residuals=self._residual_groups(),
-                suspected=self.diagnosis and self.diagnosis.data(self.observed.marks),
+                suspected=self._suspicion and self._suspicion.data(self.observed.marks),
                 assumptions=self.assumptions and self.assumptions.to_dict(),
             ),
             **(
@@ -607,6 +607,15 @@ class Fit(FitResult):
     def without_scatter(self) -> bool:
         """Whether sigma is estimated from residuals that are rounding errors."""
         return self.sigma_is_estimated and self.sigma < LEAST_SIGMA
+
+    @property
+    def _suspicion(self) -> Suspicion | None:
+        """The diagnosis, but for residuals without a gross error that a contradicted assumption
+        explains.
+        """
+        found = self.diagnosis
+        is_explained = self.assumptions is not None and bool(self.assumptions.verdict)
+        return None if found and not found.names_causes and is_explained else found
 
     def _residual_groups(self) -> dict[str, list[dict[str, Any]]]:
         """Residuals by group as plain data; empty without results."""

@@ -67,6 +67,7 @@ def test_the_assumption_that_fails_is_named(given: Experiment, cause: str) -> No
     (words,) = found.assumptions.verdict
     assert campaign.name in words
     assert any(words in caution or "see what" in caution for caution in found.cautions)
+    assert not any("try a larger error model" in text for text in (*found.lines(), *found.cautions))
 
 
 def test_readings_that_agree_contradict_nothing(given: Experiment) -> None:
