@@ -49,6 +49,7 @@ from .table_forms import (
     NoFormError,
     chosen_form,
     forms_of,
+    holds_nothing,
 )
 
 TEMPERATURES = (
@@ -261,7 +262,7 @@ class _Reader:
             if name in roles and (unit := roles[name].unit) is not None:
                 factors[roles[name].place] = names_known[unit], power_of_ten(names_known[unit])
         constants = {**texts, **group.texts}
-        places = {role: c.place for role, c in roles.items() if c.constant is None}
+        places = self.form.headings.places
         rows: list[tuple[FileRow, float]] = []
         messages: list[Message] = []
 
@@ -288,7 +289,7 @@ class _Reader:
         for line, cells in self.form.rows:
             if len(messages) >= MOST_MESSAGES:
                 break
-            if all(cells[i].casefold() in NOTHING for i in axes):
+            if holds_nothing(cells, axes):
                 continue
             mark = Mark(file, line, 1)
             names = tuple(

@@ -24,7 +24,7 @@ def joined_axes(
         return list(rows), []
     axis_place, value_place = headings.by_axis
     # Rows of other times, units or uncertainties are of other readings.
-    same = [c.place for c in headings.roles.values() if c.constant is None]
+    same = list(headings.places.values())
     latest: dict[tuple[str, ...], Row] = {}
     joined: list[Row] = []
     wrong: list[tuple[int, str]] = []

@@ -17,16 +17,14 @@ def doubtful_decimals(form: Form) -> str:
     sign = DECIMALS[form.decimal]
     doubtful = ""
     for _, cells in form.rows:
-        for group in form.headings.groups:
-            for axis in group.axes:
-                cell = cells[axis.place]
-                if sign not in cell:
-                    if len(cell.lstrip("+-")) > 3:
-                        return ""
-                elif not EITHER.fullmatch(cell):
+        for cell in (cells[i] for i in form.headings.axes):
+            if sign not in cell:
+                if len(cell.lstrip("+-")) > 3:
                     return ""
-                else:
-                    doubtful = doubtful or cell
+            elif not EITHER.fullmatch(cell):
+                return ""
+            else:
+                doubtful = doubtful or cell
     return doubtful
 
 
@@ -36,7 +34,7 @@ def commas_of_both_kinds(form: Form) -> bool:
     """
     if form.separator != "comma" or not form.headings.unused:
         return False
-    used = [axis.place for group in form.headings.groups for axis in group.axes]
+    used = form.headings.axes
     spare = [i for i in range(len(form.headings.cells)) if i not in form.headings.used]
     if not all(re.fullmatch(r"[+-]?[0-9]*", row[i]) for _, row in form.rows for i in used):
         return False

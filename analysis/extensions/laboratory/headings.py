@@ -68,9 +68,19 @@ class Headings:
     @cached_property
     def used(self) -> frozenset[int]:
         """Indices of the columns in use."""
-        columns = [*self.roles.values(), *(axis for group in self.groups for axis in group.axes)]
-        places = [column.place for column in columns if column.constant is None]
-        return frozenset((*places, *(self.by_axis or ())))
+        return frozenset((*self.axes, *self.places.values(), *(self.by_axis or ())))
+
+    @property
+    def axes(self) -> list[int]:
+        """Indices of the columns of co-ordinates."""
+        return [axis.place for group in self.groups for axis in group.axes]
+
+    @property
+    def places(self) -> dict[str, int]:
+        """Indices of the other columns, by role."""
+        return {
+            role: column.place for role, column in self.roles.items() if column.constant is None
+        }
 
     def name(self, place: int) -> str:
         """The heading of a column, or its number without one."""
@@ -135,9 +145,8 @@ def read_headings(cells: Sequence[str], words: Vocabulary) -> Headings | None:
             for i, cell in enumerate(cells)
             if (unit := unit_of_further(cell, name)) is not None
         }
-        if len(units_found) > 1:
-            raise HeadingError(_which(name, [cells[i] for i in units_found]))
-        for i, unit in units_found.items():
+        if (i := _only(name, list(units_found), cells)) is not None:
+            unit = units_found[i]
             is_time = is_clock(unit, units)
             if not is_time and unit not in units:
                 text = f'the unit in the column "{shorten(cells[i])}" is not known'
@@ -153,11 +162,9 @@ def read_headings(cells: Sequence[str], words: Vocabulary) -> Headings | None:
                 for i, (name, _) in enumerate(parsed)
                 if name in words_known and i not in columns_taken
             ]
-            if len(places) > 1:
-                raise HeadingError(_which(role, [cells[i] for i in places]))
-            if places:
-                roles[role] = HeadedColumn(places[0], parsed[places[0]][1])
-                columns_taken.add(places[0])
+            if (place := _only(role, places, cells)) is not None:
+                roles[role] = HeadedColumn(place, parsed[place][1])
+                columns_taken.add(place)
     if "u" in roles:
         _refuse_expanded(roles["u"], cells)
     else:
@@ -171,17 +178,16 @@ def _axis_and_value(cells: Sequence[str], words: Vocabulary) -> tuple[int, int] 
 
     :raises HeadingError: several columns could be one of them.
     """
-    columns = []
+    columns: list[int | None] = []
     for role, known in (("axis", AXIS_WORDS), ("value", VALUES)):
         stated = getattr(words.stated, role, None)
         names = [(i, heading(cell)[0].split()) for i, cell in enumerate(cells)]
         places = [i for i, name in names if name and {*known}.issuperset(name)]
         if stated is not None:
             places = [_stated_column(stated, cells).place]
-        if len(places) > 1:
-            raise HeadingError(_which(role, [cells[i] for i in places]))
-        columns += places
-    return (columns[0], columns[1]) if len(columns) == 2 else None
+        columns.append(_only(role, places, cells))
+    of_axes, of_values = columns
+    return None if of_axes is None or of_values is None else (of_axes, of_values)
 
 
 def _uncertainty(cells: Sequence[str], columns_taken: set[int]) -> dict[str, HeadedColumn]:
@@ -201,13 +207,10 @@ def _uncertainty(cells: Sequence[str], columns_taken: set[int]) -> dict[str, Hea
         places = [
             i for i, uncertainty_kind in headings_found.items() if uncertainty_kind.kind == kind
         ]
-        if len(places) > 1:
-            raise HeadingError(_which("u", [cells[i] for i in places]))
-        if places:
+        if (place := _only("u", places, cells)) is not None:
             break
     else:
         return {}
-    (place,) = places
     named, uncertainty_kind = shorten(cells[place]), headings_found[place]
     unit = uncertainty_kind.unit or "um"
     column = {"u": HeadedColumn(place, uncertainty_kind.unit)}
@@ -276,13 +279,19 @@ def _stated_roles(cells: Sequence[str], words: Vocabulary) -> dict[str, HeadedCo
     }
 
 
-def _which(role: str, cells: Sequence[str]) -> str:
-    if len(set(cells)) == 1:
-        return _twice(role, cells[0])
-    named = quoted(cells)
-    return (
-        f"the columns {named} could all be {role}; say which: readings: {{columns: {{{role}:"
-        f" {shorten(cells[0])}}}}}"
+def _only(role: str, places: Sequence[int], cells: Sequence[str]) -> int | None:
+    """Return the one column that could be of a role; None without any.
+
+    :raises HeadingError: several could be.
+    """
+    named = [cells[i] for i in places]
+    if len(named) < 2:
+        return places[0] if places else None
+    if len(set(named)) == 1:
+        raise HeadingError(_twice(role, named[0]))
+    raise HeadingError(
+        f"the columns {quoted(named)} could all be {role}; say which: readings: {{columns:"
+        f" {{{role}: {shorten(named[0])}}}}}"
     )
 
 
@@ -377,8 +386,7 @@ def _found_groups(cells: Sequence[str], words: Vocabulary) -> tuple[Group, ...] 
         return None
     for axes in groups.values():
         for axis, places in axes.items():
-            if len(places) > 1:
-                raise HeadingError(_which(axis, [cells[i] for i in places]))
+            _only(axis, places, cells)
     if "" in groups and len(groups) > 1:
         names = listing(beside for beside in groups if beside)
         raise HeadingError(

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import csv
 import re
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Collection, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -85,12 +85,9 @@ class Form:
 
     def content(self) -> tuple[object, ...]:
         """What it reads; of two forms with the same content either will do."""
-        places = [axis.place for group in self.headings.groups for axis in group.axes]
-        texts = [c.place for c in self.headings.roles.values() if c.constant is None]
+        places = [*self.headings.places.values(), *self.headings.axes]
         sign = DECIMALS[self.decimal]
-        return tuple(
-            tuple(cells[i].replace(sign, ".") for i in (*texts, *places)) for _, cells in self.rows
-        )
+        return tuple(tuple(cells[i].replace(sign, ".") for i in places) for _, cells in self.rows)
 
 
 def split(text: str, separator: str) -> list[str] | None:
@@ -192,6 +189,11 @@ def _find_headings(
     raise wrong or widest
 
 
+def holds_nothing(cells: Sequence[str], places: Iterable[int]) -> bool:
+    """True if none of these cells has an entry."""
+    return all(cells[i].casefold() in NOTHING for i in places)
+
+
 def _is_number(cell: str) -> bool:
     return any(pattern.fullmatch(cell) for pattern in NUMBERS.values())
 
@@ -207,8 +209,7 @@ def _form_without_decimals(
     as `empty` lines of another width that hold no number.
     """
     sign = SEPARATORS[separator][0]
-    roles = {role: c.place for role, c in headings.roles.items() if c.constant is None}
-    axes = [axis.place for group in headings.groups for axis in group.axes]
+    roles, axes = headings.places, headings.axes
     places = [headings.by_axis[1]] if headings.by_axis else axes
     needed = [*places, *roles.values()]
     # Co-ordinates of rows per axis are written behind the cells of the table.
@@ -243,7 +244,7 @@ def _form_without_decimals(
         (line_number, place)
         for line_number, cells in rows
         for place in texts
-        if not cells[place] and not all(cells[i].casefold() in NOTHING for i in places)
+        if not cells[place] and not holds_nothing(cells, places)
     )
     if headings.by_axis and units:
         units |= dict.fromkeys(axes, units[places[0]])
@@ -257,7 +258,7 @@ def _form(cells_below: Form, decimal: str, words: Vocabulary, is_stated: bool) -
     stated.
     """
     headings = cells_below.headings
-    places = [axis.place for group in headings.groups for axis in group.axes]
+    places = headings.axes
     joined, wrong_axes = joined_axes(cells_below.rows, headings, words.axes)
     joined, between = without_thousands(joined, places, DECIMALS[decimal], is_stated)
     rows: list[Row] = []
@@ -267,7 +268,7 @@ def _form(cells_below: Form, decimal: str, words: Vocabulary, is_stated: bool) -
     for line_number, cells in joined:
         if len(wrong) > MOST_MESSAGES:
             break
-        if all(cells[i].casefold() in NOTHING for i in places):
+        if holds_nothing(cells, places):
             (empty if cells[ball] else remarks).append(line_number)
             continue
         if reason := _wrong_row(cells, headings, NUMBERS[decimal], decimal, words.empty):
@@ -326,10 +327,10 @@ def _wrong_row(
 ) -> str:
     """Faults of a row; empty where nothing is."""
     for group in headings.groups:
-        cells_of_axes = [cells[axis.place] for axis in group.axes]
-        if len(headings.groups) > 1 and all(cell.casefold() in NOTHING for cell in cells_of_axes):
+        places = [axis.place for axis in group.axes]
+        if len(headings.groups) > 1 and holds_nothing(cells, places):
             continue
-        for name, cell in zip("xyz", cells_of_axes, strict=False):
+        for name, cell in zip("xyz", (cells[i] for i in places), strict=False):
             if name in may_be_empty and cell.casefold() in NOTHING:
                 continue
             if not number.fullmatch(cell):
