@@ -155,7 +155,7 @@ def run(
     ensure_positive("a ratio above 0 and at most 1, such as 0.01", 1.0, until=until)
     ensure_report(report)
     if trials is None and until is None and (seed is not None or workers != 1):
-        raise ValueError("seed and workers go with trials or until only; leave them out")
+        raise ValueError("seed and workers apply to trials or until only; leave them out")
     chosen = experiment_of(experiment)
     predicted = study.predict(chosen, with_scale=True)
     if trials is None and until is None:
@@ -201,6 +201,8 @@ def fit(
     unit: str | None = None,
     coordinates: str | None = None,
     names: str | None = None,
+    fill_down: bool | None = None,
+    sheet: str | None = None,
     swap_names: bool | None = None,
     trials: int | None = None,
     seed: int | None = None,
@@ -228,6 +230,8 @@ def fit(
     unit: str | None = None,
     coordinates: str | None = None,
     names: str | None = None,
+    fill_down: bool | None = None,
+    sheet: str | None = None,
     swap_names: bool | None = None,
     trials: int | None = None,
     seed: int | None = None,
@@ -254,6 +258,8 @@ def fit(
     unit: str | None = None,
     coordinates: str | None = None,
     names: str | None = None,
+    fill_down: bool | None = None,
+    sheet: str | None = None,
     swap_names: bool | None = None,
     trials: int | None = None,
     seed: int | None = None,
@@ -266,7 +272,8 @@ def fit(
     `columns`, `unit` and `coordinates` say how tables are written, instead of the experiment's
     section `readings`: columns by role, the unit of those that state none, and whether
     co-ordinates are scale readings, ball centres or those of a part. `names` is the rule of names
-    in reports; with `swap_names` those of two balls are swapped where readings show that they are.
+    in reports; with `fill_down` blank names are those above; `sheet` is that of a workbook, or all;
+    with `swap_names` those of two balls are swapped where readings show that they are.
     `sigma` overrides what the experiment says; with `monomials` the machine's parameters are the
     coefficients of t, t^2, ... on [0, 1]. A `certificate` has values instead of the experiment's
     own. Of the `ballplate.ESTIMATORS` those of distances take `pairs` of balls, also
@@ -305,10 +312,10 @@ def fit(
     ensure_whole(1, workers=workers)
     ensure_report(report)
     if trials is None and (seed is not None or workers != 1):
-        raise ValueError("seed and workers go with trials only; leave them out")
+        raise ValueError("seed and workers apply to trials only; leave them out")
     wrong = takers(estimator, [name for name, value in asked.items() if value])
     if wrong is not None:
-        raise ValueError(f"{wrong[0]} goes with the estimator {wrong[1]} only; leave it out")
+        raise ValueError(f"{wrong[0]} applies to the estimator {wrong[1]} only; leave it out")
     reason = misused(components, reweight, sigma)
     if reason:
         raise ValueError(reason)
@@ -318,6 +325,7 @@ def fit(
         "coordinates": coordinates,
     }
     column_settings |= {"names": names, "swap_names": swap_names}
+    column_settings |= {"fill_down": fill_down, "sheet": sheet}
     chosen_experiment = experiment_of(experiment).with_readings(column_settings)
     chosen, observed = observed_of(chosen_experiment, readings, certificate)
     fit_result = fit_readings(

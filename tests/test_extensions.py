@@ -225,6 +225,7 @@ OPTIONS = {
         ["fit", "designs/quickstart.yaml", "READINGS", "--certificate", "values.csv"],
         ["simulate", "designs/quickstart.yaml", "-o", "again.csv", "--certificate", "values.csv"],
     ),
+    "assumptions": (["run", "designs/quickstart.yaml", "--assumptions"],),
     "ci": (
         ["check", "designs/quickstart.yaml", "--format", "github"],
         ["check", "designs/quickstart.yaml", "--format", "junit"],

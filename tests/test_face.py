@@ -200,12 +200,12 @@ WRONG: list[tuple[Callable[[], object], type[Exception], str]] = [
     (
         lambda: bp.fit(QUICKSTART, "a.csv", pairs="corners"),
         ValueError,
-        "pairs goes with the estimator distances, cresto or kruth only",
+        "pairs applies to the estimator distances, cresto or kruth only",
     ),
     (
         lambda: bp.fit(QUICKSTART, "a.csv", offsets=False),
         ValueError,
-        "offsets goes with the estimator reversal only",
+        "offsets applies to the estimator reversal only",
     ),
     (lambda: bp.compare(QUICKSTART, "full"), ValueError, 'estimator: "full" is unknown'),
     (lambda: bp.compare(QUICKSTART, trials=0), ValueError, "trials=0; give 1 at least"),

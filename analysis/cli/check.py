@@ -110,7 +110,9 @@ def run(options: Namespace) -> int:
     goals = _goals(options)
     is_repairing = options.fix or options.diff
     if options.diff and options.format != "text":
-        raise UsageError(f"--diff cannot be combined with --format {options.format}; leave one out")
+        raise UsageError(
+            f"--diff cannot be combined with --format {options.format}; give only one of them"
+        )
     wanted = Wanted(
         goals, options.fail_weak, options.suggest or is_repairing, not options.no_modules
     )

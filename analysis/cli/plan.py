@@ -64,8 +64,8 @@ def add_options(parser: ArgumentParser) -> None:
         choices=ORDER_NAMES,
         help=(
             "change-over: the least; mirrored: there and back; blocks: random in blocks, by --seed;"
-            " least-drift: that in which drift of the scales does least. Tells what a drift does in"
-            " each; default: change-over"
+            " least-drift: that in which drift of the scales does least. Prints the effect of a"
+            " drift in each; default: change-over"
         ),
     )
     order.add_argument(
@@ -74,7 +74,7 @@ def add_options(parser: ArgumentParser) -> None:
         action="append",
         type=_drift,
         help=(
-            "size of the drift that is told of, such as 0.5um/h of the reference point or 0.2ppm/h"
+            "drift rate to evaluate, such as 0.5um/h of the reference point or 0.2ppm/h"
             " of the scales; may be given for both; default: that of the file, or 1 um/h and"
             " 1 ppm/h"
         ),

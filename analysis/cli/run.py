@@ -6,6 +6,7 @@ from argparse import ArgumentParser, ArgumentTypeError, Namespace
 from typing import TYPE_CHECKING
 
 from ballplate.presentation.formatting import Data
+from ballplate.simulator.inputs.extensions import function, service
 
 from .common import add_file, add_json, add_page, add_workers, percentage, trial_count, whole
 from .notes import complain
@@ -70,6 +71,8 @@ def run(options: Namespace) -> int:
     with_trials = options.trials is not None or options.until is not None
     if not with_trials and (options.seed is not None or options.workers is not None):
         raise UsageError("--seed and --workers apply to --trials or --until only; leave them out")
+    if options.assumptions:
+        service("assumption_effects")
     written_before = options.interruption.kept
     chosen = experiments(options)
     if options.report and len(chosen) > 1:
@@ -81,8 +84,10 @@ def run(options: Namespace) -> int:
             _write_page(options, plans[-1])
         if not options.json:
             print_lines([*([""] if len(plans) > 1 else []), *plans[-1].lines()])
-            if options.assumptions and plans[-1].assumptions is not None:
-                print_lines(["", *plans[-1].assumptions.lines()])
+            if options.assumptions:
+                assumed = plans[-1].assumptions
+                none = ["assumptions: not evaluated; U6 is undetermined or not computed"]
+                print_lines(["", *(none if assumed is None else assumed.lines())])
         data: Data = plans[-1].to_dict()
         if with_trials:
             from ..montecarlo.comparison_tables import trials_data, trials_lines
@@ -107,8 +112,6 @@ def run(options: Namespace) -> int:
 
 
 def _write_page(options: Namespace, prediction: Prediction) -> None:
-    from ballplate.simulator.inputs.extensions import function
-
     from .progress_bars import progress
 
     with progress(options) as shown:

@@ -70,7 +70,7 @@ def parse_line(text: str) -> dict[str, float]:
                 " 200 mm"
             )
         if name in values:
-            raise LineError(f"{name} is given twice; leave one of them out")
+            raise LineError(f"{name} is given twice; give it once")
         try:
             values[name] = parse_length(value)
         except QuantityError as error:

@@ -159,7 +159,9 @@ def _task(
         problems.add((*steps, "name"), text)
     if settings.probe is not None and settings.probes is not None:
         problems.add(
-            (*steps, "probe"), 'does not go with "probes"; remove one of the two', of_key=True
+            (*steps, "probe"),
+            'cannot be combined with "probes"; give only one of the two',
+            of_key=True,
         )
     used = settings.probes or (settings.probe or probe,) * 2
     if settings.probe is not None or settings.probes is not None:

@@ -73,7 +73,7 @@ class SmoothingSettings(Settings):
     @model_validator(mode="after")
     def _one_kind_of_knots(self) -> Self:
         if self.every is not None and self.knots is not None:
-            raise ValueError('"every" and "knots" both state the knots; leave one of them out')
+            raise ValueError('"every" and "knots" both state the knots; give only one of them')
         return self
 
 
@@ -95,7 +95,7 @@ class _ErrorSettings(Settings):
         polynomial, bandwidth = getattr(self, "polynomial", None), getattr(self, "bandwidth", None)
         if polynomial is not None and self.file is not None:
             raise ValueError(
-                "a polynomial and a file cannot both be the error; leave one of them out"
+                "a polynomial and a file cannot both be the error; give only one of them"
             )
         if self.fit is not None and self.file is None:
             raise ValueError("fit has no points; name a file with measured points, or remove fit")

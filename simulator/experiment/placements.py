@@ -72,7 +72,7 @@ def _readings(
         if getattr(settings, key) is not None:
             references.problems.add(
                 (*steps, key),
-                'does not go with "readings"; move it there, or remove "readings"',
+                'cannot be combined with "readings"; move it there, or remove "readings"',
                 of_key=True,
             )
             complete = False
@@ -111,7 +111,9 @@ def _placement(
     if settings.pose is not None:
         for key in plane_keys:
             problems.add(
-                (*steps, key), 'does not go with "pose"; remove one of the two', of_key=True
+                (*steps, key),
+                'cannot be combined with "pose"; give only one of the two',
+                of_key=True,
             )
         pose = _free_placement(settings.pose, (*steps, "pose"), references)
         return None if plane_keys else pose
@@ -137,7 +139,9 @@ def _placement(
         return None
     if settings.corner is not None and settings.centre is not None:
         problems.add(
-            (*steps, "centre"), 'does not go with "corner"; remove one of the two', of_key=True
+            (*steps, "centre"),
+            'cannot be combined with "corner"; give only one of the two',
+            of_key=True,
         )
         return None
     plane: Axis | None = "z" if dimension == 2 else settings.plane

@@ -48,7 +48,7 @@ class ProbeSettings(Settings):
         if (self.offset is None) == (self.a is None):
             raise ValueError('needs either "offset" or the angle "A"; give exactly one of them')
         if self.a is None and (self.b is not None or self.tip is not None):
-            raise ValueError('"B" and "tip" go with the angle "A"; add it, or remove them')
+            raise ValueError('"B" and "tip" belong to the angle "A"; add it, or remove them')
         return self
 
 

@@ -214,7 +214,7 @@ def _offset_uncertainty(
     if settings.unknown and stated is not None:
         problems.add(
             (*steps, "unknown"),
-            'does not go with "standard_uncertainty"; remove one of the two',
+            'cannot be combined with "standard_uncertainty"; give only one of the two',
             True,
         )
     if settings.reference and (settings.unknown or stated is not None):

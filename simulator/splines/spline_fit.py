@@ -171,7 +171,7 @@ def _contradiction(
         and np.allclose(constraint.places, constraints[k].places, rtol=1e-12, atol=0.0)
     ):
         return SplineProblem(
-            f"the {constraints[k].words} is prescribed twice, differently; leave one of them out",
+            f"the {constraints[k].words} is prescribed twice, differently; give only one of them",
             constraints[k].places,
         )
     texts = []
@@ -181,7 +181,7 @@ def _contradiction(
         texts.append(constraint.words.format(*indices))
         places += constraint.places
     text = (
-        f"the {texts[0]} contradicts the {', the '.join(texts[1:])}; leave one of them out or add a"
+        f"the {texts[0]} contradicts the {', the '.join(texts[1:])}; remove one of them or add a"
         " knot"
     )
     return SplineProblem(text, tuple(places))

@@ -253,7 +253,7 @@ def test_a_held_pose_has_no_prior(written: Callable[[str], Path]) -> None:
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [
-        ("unknown: true}", "unknown: true, standard_uncertainty: 1 um}", "does not go with"),
+        ("unknown: true}", "unknown: true, standard_uncertainty: 1 um}", "cannot be combined with"),
         (
             "unknown: true}",
             "unknown: true, reference: true}",

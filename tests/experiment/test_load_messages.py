@@ -250,12 +250,12 @@ POSITIONS = [
     (LOW, LOW.replace("corner: {x: 0 mm, y: 0 mm}", "quarter_turns: 1"), [
         '11:5: positions[0].corner: missing; add "corner" or "centre"']),
     (LOW, LOW.replace("corner:", "centre: {x: 1 m, y: 1 m}, corner:"), [
-        '11:57: positions[0].centre: does not go with "corner"; remove one of the two']),
+        '11:57: positions[0].centre: cannot be combined with "corner"; give only one of the two']),
     (LOW, LOW.replace("plane: z, level: 0 mm, corner: {x: 0 mm, y: 0 mm}", "repeats: 2"), [
         "11:5: positions[0]: does not state the artefact's location; add plane, level and"
         " corner or centre, or pose"]),
     (LOW, LOW.replace("plane: z, level: 0 mm, corner:", "pose: {origin: [0 m, 0 m, 0 m]}, corner:"), [
-        '11:67: positions[0].corner: does not go with "pose"; remove one of the two']),
+        '11:67: positions[0].corner: cannot be combined with "pose"; give only one of the two']),
     (LOW, LOW.replace("plane: z, level: 0 mm, corner: {x: 0 mm, y: 0 mm}",
                       "pose: {origin: [0 m, 0 m], rotation: 90 deg}"), [
         "11:49: positions[0].pose.origin: has 2 co-ordinates, but the experiment has 3 dimensions; give 3",
@@ -272,7 +272,7 @@ POSITIONS = [
         "8:3: artefacts.plate: no position reads balls r1c2, r1c3, r2c1, r2c2, r2c3, r3c1, r3c2, r3c3; "
         "read them, or leave them out of the artefact"]),
     (LOW, LOW.replace("y: 0 mm}}", "y: 0 mm}, repeats: 2, readings: [{balls: [r1c7]}]}", 1), [
-        '11:85: positions[0].repeats: does not go with "readings"; move it there, or remove "readings"',
+        '11:85: positions[0].repeats: cannot be combined with "readings"; move it there, or remove "readings"',
         '11:117: positions[0].readings[0].balls[0]: unknown ball "r1c7"; did you mean "r1c3"?',
     ]),
     (LOW, LOW.replace("x: 0 mm", "x: 600 mm"), [

@@ -58,7 +58,7 @@ WRONG = [
     ("name: b", "name: a",
      '13:14: evaluation.tasks[1].name: "a" is the name of tasks[0] already; names must differ'),
     ("probes: [down, side]", "probes: [down, side], probe: down",
-     '14:89: evaluation.tasks[2].probe: does not go with "probes"; remove one of the two'),
+     '14:89: evaluation.tasks[2].probe: cannot be combined with "probes"; give only one of the two'),
     ("from: [0 mm, 0 mm, 0 mm], to: [1 m, 0 mm, 0 mm]}", "to: [1 m, 0 mm, 0 mm]}",
      '12:7: evaluation.tasks[0].from: missing; add "from" (start of the length: co-ordinates as those of points)'),
     (TEXT[TEXT.index("  tasks"):], "",

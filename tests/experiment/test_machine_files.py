@@ -134,8 +134,8 @@ probing: 0 um
         "m.yaml:6:15: errors.EYX.file: none.csv: there is no such file",
         'm.yaml:7:3: errors.EYQ: unknown key; did you mean "EZY"?',
         (
-            "m.yaml:8:8: errors.EBX: a polynomial and a file cannot both be the error; leave one of"
-            " them out"
+            "m.yaml:8:8: errors.EBX: a polynomial and a file cannot both be the error; give only one"
+            " of them"
         ),
         (
             "m.yaml:8:46: errors.EBX.file: eyx.csv: the file should have EBX alone, but has EYX,"
@@ -249,7 +249,7 @@ def test_what_is_wrong_with_a_machine(tmp_path: Path, old: str, new: str, messag
         (
             "y = 400 mm, z",
             "y = 400 mm, y",
-            ["eyx.csv:2:9: y is given twice; leave one of them out"],
+            ["eyx.csv:2:9: y is given twice; give it once"],
         ),
         (
             "y = 400 mm",

@@ -395,7 +395,7 @@ WRONG_TABLES: dict[str, tuple[str, dict[str, Any], str]] = {
     ),
     "none": (table(HEADER, *LINES), {}, 'missing; add "standard_uncertainty"'),
     "a factor of nothing": (EXPANDED, {"coverage_factor": 0}, "above 0"),
-    "a result of a table": (EXPANDED, {"result": "a"}, "goes with values in a DCC"),
+    "a result of a table": (EXPANDED, {"result": "a"}, "applies only to values in a DCC"),
     "two kinds": (
         with_columns(
             "expanded_uncertainty_um,standard_uncertainty_um,k", [f"{u},{u},2" for u in U]

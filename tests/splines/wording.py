@@ -10,5 +10,5 @@ THE_SECOND_DERIVATIVE_AT_IS_ZERO = (
     "the second derivative at 0 is zero for every spline of this order"
 )
 THE_SLOPE_AT_IS_PRESCRIBED_TWICE = (
-    "^the slope at 0 is prescribed twice, differently; leave one of them out$"
+    "^the slope at 0 is prescribed twice, differently; give only one of them$"
 )

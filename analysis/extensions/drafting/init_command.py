@@ -40,7 +40,7 @@ def drafted(options: Namespace) -> tuple[str, str] | None:
     texts = {name: getattr(options, name) for name in READERS if getattr(options, name) is not None}
     if options.machine or options.example:
         if texts:
-            raise UsageError("--machine and --example take no data sheet; leave one of them out")
+            raise UsageError("--machine and --example take no data sheet; give only one of them")
         return None
     is_terminal = bool(sys.stdin and sys.stdin.isatty() and sys.stdout.isatty())
     if not texts and not is_terminal:

@@ -386,14 +386,12 @@ def _probe(feature: Feature, position: str, design: Design | None, file: str) ->
     possible = planned or set(names)
     if len(possible) == 1:
         return possible.pop()
-    sensor_text = f'the sensor "{shorten(feature.probe, 30)}"' if feature.probe else "no sensor"
+    sensor = f'the sensor "{shorten(feature.probe, 30)}" does not state' if feature.probe else ""
     text = (
-        f"{sensor_text} tells which probe read"
+        f"{sensor or 'no sensor states'} which probe read"
         f' "{shorten(feature.name, 30)}": {listing(sorted(possible))}; name features or sensors'
         " by the experiment's probes, or state the rule with --name"
     )
-    if feature.probe:
-        text = text.replace("tells which", "does not tell which", 1)
     raise feature.mark.refused(text)
 
 

@@ -260,7 +260,7 @@ def _misplaced_corners(
     for corner in corners:
         if corner in boundaries:
             problems.append(
-                SplineProblem("{0} is a corner and a boundary; leave one out", (corner,))
+                SplineProblem("{0} is a corner and a boundary; give only one of the two", (corner,))
             )
         if (x == corner).any():
             text = "a point is on the corner at {0}, so its feature is ambiguous; leave it out"
@@ -428,7 +428,7 @@ def _refuse_coincident(places: Array) -> None:
     :raises SplineError: there are such.
     """
     same = [
-        SplineProblem("two neighbouring points are at ({0}, {1}); leave one out", tuple(place))
+        SplineProblem("two neighbouring points are at ({0}, {1}); remove one", tuple(place))
         for place, two in pairwise(places.tolist())
         if place == two
     ]

@@ -30,7 +30,7 @@ from starlette.staticfiles import StaticFiles
 from starlette.types import ASGIApp, Receive, Scope, Send
 
 from .actions import ActionError
-from .session import RefusedError, Session
+from .session import OutdatedError, RefusedError, Session
 
 # What answers a request with its content.
 Work = Callable[[Request, dict[str, Any]], Any]
@@ -181,7 +181,7 @@ def _answering(
         except KeyError as error:
             return _error(f"the request needs {error}")
         except (ActionError, RefusedError) as error:
-            return _error(str(error))
+            return _json({"error": str(error), "outdated": isinstance(error, OutdatedError)})
         except Exception as error:
             # Nothing has changed by it; whoever looks after the program finds it in the terminal.
             logger.exception("the studio failed to answer %s", request.url.path)

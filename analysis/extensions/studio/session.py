@@ -39,6 +39,10 @@ class RefusedError(Exception):
     """A request is not permitted, or not possible now; the text states why."""
 
 
+class OutdatedError(RefusedError):
+    """The page shows a design that has been replaced."""
+
+
 class Session:
     """Session of one user in the studio; every method may be called from any thread.
 
@@ -243,12 +247,12 @@ class Session:
     def _ensure_seen(self, action: Mapping[str, Any]) -> None:
         """Ensure that the page shows the state it is about to change.
 
-        :raises RefusedError: it shows another one.
+        :raises OutdatedError: it shows another one.
         """
         if action.get("session", self.name) != self.name:
-            raise RefusedError("the studio was restarted; this page shows an earlier design")
+            raise OutdatedError("the studio was restarted; this page shows an earlier design")
         if action.get("revision", self.revision) != self.revision:
-            raise RefusedError("the design has changed in another window; look again")
+            raise OutdatedError("the design has changed in another window; look again")
 
     def _become(self, document: DesignDocument) -> None:
         """Continue with another document, which is kept at once, and begin its evaluation; until
@@ -404,4 +408,4 @@ def _message_data(message: Message) -> Data:
     }
 
 
-__all__ = ["ActionError", "RefusedError", "Session"]
+__all__ = ["ActionError", "OutdatedError", "RefusedError", "Session"]

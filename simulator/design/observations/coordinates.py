@@ -230,7 +230,9 @@ def _axes(settings: CoordinatesSettings, steps: Steps, references: References) -
         return sorted(axes) if is_once and in_plane else None
     axes = list(uncertainty.stated)
     if settings.axes is not None:
-        text = "go with the uncertainties of a file; standard_uncertainty names the axes; remove it"
+        text = (
+            "belong to the uncertainties of a file; standard_uncertainty names the axes; remove it"
+        )
         references.problems.add((*steps, "axes"), text, of_key=True)
         return None
     is_right = references.require(

@@ -108,8 +108,8 @@ def check_keys(settings: Any, steps: Steps, references: References) -> bool:
     of_file = isinstance(settings.values, str)
     digital = is_digital(settings.values)
     for key, fits, instead in (
-        ("result", digital, "goes with values in a DCC (XML)"),
-        ("coverage_factor", of_file and not digital, "goes with values in a CSV file"),
+        ("result", digital, "applies only to values in a DCC (XML)"),
+        ("coverage_factor", of_file and not digital, "applies only to values in a CSV file"),
         *((key, not digital, OWN_COVARIANCE) for key in JOINT_KEYS),
     ):
         if getattr(settings, key, None) is not None and not fits:

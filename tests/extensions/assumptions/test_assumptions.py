@@ -282,13 +282,18 @@ def test_the_headline_names_what_more_than_doubles_the_uncertainty() -> None:
     assert "times" not in bp.run(small_quickstart(**narrow)).headline()
 
 
-def test_undetermined_lengths_have_no_table() -> None:
+def test_undetermined_lengths_have_no_table(capsys: pytest.CaptureFixture[str]) -> None:
     path = TOP / "designs" / "planning" / "campaign.yaml"
     prediction = bp.run(path)
     assert np.isnan(prediction["U6"].average)
     assert prediction.assumptions is None
     with pytest.raises(ValueError, match="undetermined"):
         bp.assumptions(path)
+    assert main(["run", str(path)]) == 0
+    without = capsys.readouterr().out
+    assert main(["run", str(path), "--assumptions"]) == 0
+    line = "assumptions: not evaluated; U6 is undetermined or not computed"
+    assert capsys.readouterr().out == f"{without}\n{line}\n"
 
 
 def test_the_page_has_all_rows() -> None:

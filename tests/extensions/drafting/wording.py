@@ -42,6 +42,6 @@ LACKS_VALUES = (
     'the data sheet lacks values; add for example --volume "900 1200 700 mm" --plate'
     ' "6 x 6, 420 mm"'
 )
-NO_DATA_SHEET = "--machine and --example take no data sheet; leave one of them out"
+NO_DATA_SHEET = "--machine and --example take no data sheet; give only one of them"
 NO_ANSWER = "no answer about the type of machine; nothing is written"
 HALF_THE_MPE = "lengths of the corrected machine: half the MPE."

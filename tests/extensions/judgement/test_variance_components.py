@@ -383,7 +383,7 @@ def write(tmp_path: Path) -> Callable[[bp.Experiment], Path]:
         ),
         (
             {"components": "axis", "estimator": "distances"},
-            "components goes with the estimator full",
+            "components applies to the estimator full",
         ),
     ],
 )

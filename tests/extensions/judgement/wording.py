@@ -13,5 +13,5 @@ SIGMA_TIMES_THE_STATED_UNCERTAINTIES = (
     "sigma = 1 times the stated uncertainties (those of groups as estimated below)"
 )
 SOURCES_BY_THEIR_PART = "sources by their part of U6, the largest first"
-TRIALS_GOES_WITH_THE_ESTIMATOR_FULL = "trials goes with the estimator full"
+TRIALS_GOES_WITH_THE_ESTIMATOR_FULL = "trials applies to the estimator full"
 UNDETERMINED_AND_ARE_LEFT_OUT = "undetermined, and are left out"

@@ -153,7 +153,7 @@ def test_a_probe_that_nothing_tells_is_asked_for(tmp_path: Path) -> None:
     with pytest.raises(ExperimentError) as caught:
         bp.read_report(path, QUICKSTART)
     assert str(caught.value) == (
-        f'{path}:3:1: the sensor "TIP_9" does not tell which probe read "xlow_r1c1": left, right;'
+        f'{path}:3:1: the sensor "TIP_9" does not state which probe read "xlow_r1c1": left, right;'
         " name features or sensors by the experiment's probes, or state the rule with --name"
     )
 

@@ -44,4 +44,4 @@ SEVERAL_COLUMNS_MAY_BE_THE_ERROR = (
     "data.csv:1:1: several columns may be the error: first, second; choose one with --y"
 )
 THIS_IS_YAML = "this is YAML, not a table; give a CSV file that begins with"
-TWO_NEIGHBOURING_POINTS_ARE_AT_MM = "two neighbouring points are at (9 mm, 1 mm); leave one out"
+TWO_NEIGHBOURING_POINTS_ARE_AT_MM = "two neighbouring points are at (9 mm, 1 mm); remove one"

@@ -174,7 +174,10 @@ def test_a_change_in_another_window_is_not_lost(client):
     state = client.get("/api/state").json()
     turn = {"do": "turn", "position": "z low", "revision": state["revision"]}
     assert "error" not in client.post("/api/do", json=turn).json()
-    assert "another window" in client.post("/api/do", json=turn).json()["error"]
+    refused = client.post("/api/do", json=turn).json()
+    assert "another window" in refused["error"] and refused["outdated"]
+    unknown = {**turn, "do": "nothing", "revision": state["revision"] + 1}
+    assert client.post("/api/do", json=unknown).json()["outdated"] is False
 
 
 def test_saving_over_what_another_program_wrote_is_refused(client, design):

@@ -6,11 +6,9 @@ AMOUNTS_OF_CELL = "values of case 0"
 ANOTHER_PROCESS_IS_COMPUTING_INTO = "another process is computing into it"
 ARE_THE_LIMIT_OF_A_STORE = "are the limit of a store"
 AVERAGE_IS_THE_SAME = "1 average is the same."
-CELLS_MORE_ARE_NOT_SHOWN_HERE = (
-    "7800 more cases are not shown here; ballplate sweep --export gives all."
-)
+CELLS_MORE_ARE_NOT_SHOWN_HERE = "Cases not shown here: 7800; ballplate sweep --export gives all."
 CELLS_MORE_ARE_NOT_SHOWN_HERE_BALLPLATE = (
-    "50 more cases are not shown here; ballplate sweep --export gives all."
+    "Cases not shown here: 50; ballplate sweep --export gives all."
 )
 UNREADABLE_CELL = "1 unreadable case"
 UNREADABLE_CELL_ITS_CONTENT = (

@@ -36,7 +36,7 @@ async function ask(path, body) {
   } catch {
     throw new Error(text.trim());
   }
-  if (!response.ok || data.error !== undefined) throw new Error(data.error);
+  if (!response.ok || data.error !== undefined) throw Object.assign(new Error(data.error), { outdated: data.outdated });
   return data;
 }
 
@@ -97,7 +97,7 @@ function act(action, said = "") {
     } catch (error) {
       clearTimeout(slow);
       tell(error.message, true);
-      if (/another window|restarted/.test(error.message)) await refresh();
+      if (error.outdated) await refresh();
       else show();
       return false;
     }

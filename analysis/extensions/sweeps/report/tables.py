@@ -154,7 +154,7 @@ def _rows_table(
     more = len(results.frame) - len(cell_rows)
     if more > 0 and rows is None:
         notes = (
-            f"{more} more cases are not shown here; ballplate sweep --export gives all.",
+            f"Cases not shown here: {more}; ballplate sweep --export gives all.",
             *notes,
         )
     headings = ("cell", *(axis.name for axis in results.axes))
