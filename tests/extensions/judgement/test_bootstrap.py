@@ -132,9 +132,9 @@ def test_monomials_and_names() -> None:
 
 
 def test_what_goes_with_trials_only_is_refused() -> None:
-    with pytest.raises(ValueError, match=wording.GO_WITH_TRIALS_ONLY):
+    with pytest.raises(ValueError, match=wording.APPLY_TO_TRIALS_ONLY):
         bp.fit(small(), bp.simulate(small()), seed=3)
-    with pytest.raises(ValueError, match=wording.TRIALS_GOES_WITH_THE_ESTIMATOR_FULL):
+    with pytest.raises(ValueError, match=wording.TRIALS_APPLIES_TO_THE_ESTIMATOR_FULL):
         bp.fit(small(), bp.simulate(small()), estimator="distances", trials=3)  # type: ignore[call-overload]
     with pytest.raises(ValueError, match="has not converged|unknown"):
         replace(fitted(), estimated=None).with_trials(2, 1)
