@@ -73,7 +73,8 @@ class DataSheet:
     @property
     def tips_there(self) -> Tips:
         """Return the tips of this machine."""
-        return tips_of(self.tips.form, ARRANGEMENTS[self.arrangement].probe_side[-1], self.volume)
+        pointing = ARRANGEMENTS[self.arrangement].probe_side[-1]
+        return tips_of(self.tips, pointing, self.volume)
 
     @property
     def places(self) -> list[Settings]:

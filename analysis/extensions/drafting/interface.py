@@ -25,10 +25,10 @@ def design(
     bridge, gantry, cantilever, horizontal arm, column, or an arrangement such as MB1; the volume
     has three edges; of an MPE such as 0.9 um + L/400, L is in mm and the result in um; the
     certificate is an expanded uncertainty with its k; tips are one, star or head, with or without
-    the standard uncertainty of their offsets. The target is one of the expanded uncertainty of
-    lengths, by default half the MPE; the repeatability is a standard deviation, by default a third
-    of the constant part of the MPE; the temperature is the standard uncertainty of temperatures,
-    by default exactly known.
+    the length of a stylus and the standard uncertainty of offsets. The target is one of the
+    expanded uncertainty of lengths, by default half the MPE; the repeatability is a standard
+    deviation, by default a third of the constant part of the MPE; the temperature is the standard
+    uncertainty of temperatures, by default exactly known.
 
     :raises ValueError: a text cannot be read, or the plate does not fit into the volume within the
         reach of the tips.

@@ -13,11 +13,11 @@ from ballplate.simulator.inputs import format_length, typed_length
 from ballplate.simulator.machines import Array
 
 from .machine_tables import table
-from .sheet_values import Plate
+from .sheet_values import Plate, StatedTips
 
 Settings = dict[str, Any]
 
-# Length of a stylus, at most a tenth of the shortest edge of the volume.
+# Usual length of a stylus, at most a tenth of the shortest edge of the volume.
 LONGEST = 0.060
 # Of levels and of corners along an axis: more make plans slow, and hardly better.
 MOST_PLACES = 3
@@ -54,12 +54,14 @@ class Tips:
         return np.array([along.max(axis=0), volume + along.min(axis=0)])
 
 
-def tips_of(form: str, pointing: str, volume: tuple[float, ...]) -> Tips:
+def tips_of(tips: StatedTips, pointing: str, volume: tuple[float, ...]) -> Tips:
     """Return the tips of a machine of this volume whose last carriage moves along an axis."""
     # Whole tenths of a millimetre.
     length = min(LONGEST, int(1e3 * min(volume)) / 1e4)
-    listed = table("tips")[form][pointing].items()
-    return Tips(form, length, {name: length * np.array(offset) for name, offset in listed})
+    if tips.length is not None:
+        length = tips.length if tips.form == "star" else tips.length / 2
+    listed = table("tips")[tips.form][pointing].items()
+    return Tips(tips.form, length, {name: length * np.array(offset) for name, offset in listed})
 
 
 def places_of(plate: Plate, tips: Tips, volume: tuple[float, ...]) -> Iterator[Settings]:
@@ -84,8 +86,8 @@ def places_of(plate: Plate, tips: Tips, volume: tuple[float, ...]) -> Iterator[S
         if not places:
             raise ValueError(
                 f"{size} does not fit {where} within the reach of the tips {', '.join(names)},"
-                f" {_crossed(np.maximum(0.0, ends[1] - ends[0]))}; give a smaller plate, or"
-                " correct the volume"
+                f" {_crossed(np.maximum(0.0, ends[1] - ends[0]))}; give a smaller plate or"
+                " shorter tips, or correct the volume"
             )
         yield from (place | {"probes": names} for place in places)
 

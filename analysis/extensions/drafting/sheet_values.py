@@ -48,9 +48,12 @@ class Plate:
 
 @dataclass(frozen=True)
 class StatedTips:
-    """The ``form`` of tips; ``uncertainty`` of their offsets in metres."""
+    """The ``form`` of tips, the ``length`` of styli in metres, None for the usual one, and the
+    ``uncertainty`` of their offsets in metres.
+    """
 
     form: str
+    length: float | None
     uncertainty: float
 
 
@@ -164,19 +167,27 @@ def plate(text: str) -> Plate:
 
 
 def tips(text: str) -> StatedTips:
-    """Return the form of tips with the standard uncertainty of each offset, the usual one if none
-    is stated.
+    """Return the form of tips, which the length of a stylus, from the centre of a star or the pivot
+    of a head to the tip, and the standard uncertainty of each offset may follow, below a
+    millimetre.
 
-    :raises ValueError: an unknown form, or no uncertainty of 1 mm at most.
+    :raises ValueError: an unknown form, or other lengths.
 
-    >>> tips("star"), tips("head, 0.3 um").uncertainty
-    (StatedTips(form='star', uncertainty=5e-07), 3e-07)
+    >>> tips("star, 40 mm")
+    StatedTips(form='star', length=0.04, uncertainty=5e-07)
+    >>> tips("head, 0.3 um").uncertainty
+    3e-07
     """
-    form, comma, length = text.partition(",")
-    uncertainty = parse_positive_length(length) if comma else QUALIFICATION
-    if uncertainty > 1e-3:
-        raise ValueError(f'"{text}" has offsets known to 1 mm or less; write "star, 0.5 um"')
-    return StatedTips(known("tips", form, [*table("tips")]), uncertainty)
+    form, *words = text.split(",")
+    stated = [parse_positive_length(word) for word in words]
+    long = [length for length in stated if length >= 1e-3]
+    small = [length for length in stated if length < 1e-3]
+    if max(len(long), len(small)) > 1:
+        raise ValueError(
+            f'"{text}" states a length or an uncertainty twice; write "star, 60 mm, 0.5 um"'
+        )
+    name = known("tips", form, [*table("tips")])
+    return StatedTips(name, long[0] if long else None, small[0] if small else QUALIFICATION)
 
 
 def temperature(text: str) -> str:

@@ -138,8 +138,9 @@ def test_stated_values() -> None:
     average = bp.run(stated).quantities["U6"].average
     assert average == pytest.approx(rows["temperature"].average, rel=1e-9)
     assert "temperature" not in {one.assumption.name for one in bp.assumptions(stated).effects}
-    text = drafted(BRIDGE, repeatability="0.25 um", tips="head, 0.3 um")
-    assert "repeatability: 0.25 um" in text and text.count("standard_uncertainty: 0.3 um}") == 4
+    text = drafted(BRIDGE, repeatability="0.25 um", tips="head, 200 mm, 0.3 um")
+    assert "repeatability: 0.25 um" in text and "tip: [0 mm, 0 mm, -200 mm]" in text
+    assert text.count("standard_uncertainty: 0.3 um}") == 4
 
 
 @pytest.mark.parametrize("name", SHEETS)

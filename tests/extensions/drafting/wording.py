@@ -25,7 +25,10 @@ NO_UNCERTAINTY_OF_TEMPERATURE = '"20 degC" is no uncertainty of a temperature'
 COARSE_REPEATABILITY = (
     "repeatability 2 µm is above the constant part of the MPE, 0.9 µm; correct one of them"
 )
-COARSE_TIPS = '"star, 2 mm" has offsets known to 1 mm or less; write "star, 0.5 um"'
+TWO_UNCERTAINTIES = '"star, 2 um, 3 um" states a length or an uncertainty twice; write'
+LONG_TIPS = (
+    "does not fit across x within the reach of the tips right, left, 100 mm x 1200 mm x 300 mm"
+)
 NO_TIME = '"0" leaves no time for measuring'
 LARGER_THAN_THE_VOLUME = (
     "the plate of 1300 mm x 1300 mm is larger than the volume, 900 mm x 1200 mm x 700 mm"

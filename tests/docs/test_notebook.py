@@ -1,0 +1,53 @@
+"""The notebook of the page on Python: its cells are those of the page, and its outputs those of its
+programs.
+"""
+
+from __future__ import annotations
+
+import importlib
+import json
+import re
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+sys.path.insert(0, str(Path("docs/_extensions").resolve()))
+notebook = importlib.import_module("notebook")
+NUMBER = r"-?\d+(?:\.\d+)?"
+
+
+def page() -> str:
+    return str(notebook.PAGE.read_text(encoding="utf-8"))
+
+
+def stored() -> dict[str, Any]:
+    content: dict[str, Any] = json.loads(notebook.NOTEBOOK.read_text(encoding="utf-8"))
+    return content
+
+
+def printed(content: dict[str, Any]) -> str:
+    """What all programs of a notebook have printed."""
+    outputs = [one for cell in content["cells"] for one in cell.get("outputs", [])]
+    return "".join(one.get("text", "") for one in outputs)
+
+
+def test_cells_are_those_of_the_page() -> None:
+    cells = notebook.cells(page())
+    assert [cell["source"] for cell in stored()["cells"]] == [cell["source"] for cell in cells]
+    programs = re.findall(r"^import|^campaign = bp.plan|^readings = bp.simulate", page(), re.M)
+    sources = "\n".join(cell["source"] for cell in cells if cell["cell_type"] == "code")
+    assert len(programs) == 4 and "```" not in sources and ":continued:" not in sources
+    pictures = sum(len(cell.get("pictures", ())) for cell in cells)
+    data = [o["data"] for c in stored()["cells"] for o in c.get("outputs", []) if "data" in o]
+    assert pictures == len(data) == 3 and sum(len(one["image/png"]) for one in data) < 150e3
+
+
+@pytest.mark.slow
+def test_outputs_are_those_of_the_programs() -> None:
+    texts = [printed(content) for content in (stored(), notebook.executed(page()))]
+    assert texts[0]
+    assert re.sub(NUMBER, "#", texts[0]) == re.sub(NUMBER, "#", texts[1])
+    values = [[float(value) for value in re.findall(NUMBER, text)] for text in texts]
+    assert values[0] == pytest.approx(values[1], rel=1e-3, abs=2e-3)
