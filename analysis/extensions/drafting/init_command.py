@@ -98,7 +98,7 @@ def _answer(name: str, texts: dict[str, str], options: Namespace) -> str:
         print(f"{entry['question']} [{default}]: ", end="", file=sys.stderr, flush=True)
         line = sys.stdin.readline()
         if not line:
-            raise UsageError(f"no answer about the {entry['question']}; nothing is written")
+            raise UsageError(f"no answer for {_option(name)}; nothing is written")
         answer = line.strip() or str(entry["default"])
         try:
             stated = {**texts, name: answer}

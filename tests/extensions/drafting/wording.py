@@ -46,5 +46,5 @@ LACKS_VALUES = (
     ' "6 x 6, 420 mm"'
 )
 NO_DATA_SHEET = "--machine and --example take no data sheet; give only one of them"
-NO_ANSWER = "no answer about the type of machine; nothing is written"
+NO_ANSWER = "no answer for --machine-type; nothing is written"
 HALF_THE_MPE = "lengths of the corrected machine: half the MPE."
