@@ -37,10 +37,15 @@ class PredictedAssumptions(AskedResult, Protocol):
 
 
 class AskedAssumptions(AskedResult, Protocol):
-    """Answers of readings to assumptions; `verdict` has the causes that contradict them."""
+    """Answers of readings to assumptions; `verdict` has the causes that contradict them, of which
+    one `explains` the residuals if none may be further terms of the error model.
+    """
 
     @property
     def verdict(self) -> tuple[str, ...]: ...
+
+    @property
+    def explains(self) -> bool: ...
 
 
 class GroupVariances(AskedResult, Protocol):

@@ -614,7 +614,7 @@ class Fit(FitResult):
         explains.
         """
         found = self.diagnosis
-        is_explained = self.assumptions is not None and bool(self.assumptions.verdict)
+        is_explained = self.assumptions is not None and self.assumptions.explains
         return None if found and not found.names_causes and is_explained else found
 
     def _residual_groups(self) -> dict[str, list[dict[str, Any]]]:

@@ -118,7 +118,8 @@ def _second(options: Namespace) -> tuple[FittedMap | None, bool]:
     """The map of the second campaign, and whether there is something to complain of."""
     from ballplate.simulator.experiment import is_map_file
 
-    if is_map_file(options.after[0]):
+    # A table of readings is named for what it is, whether it is there or not.
+    if options.after[0].suffix.lower() != ".csv" and is_map_file(options.after[0]):
         return _fitted(options, options.after[0], options.after[1:])
     if is_map_file(options.files[0]):
         raise UsageError(

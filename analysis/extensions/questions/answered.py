@@ -89,6 +89,11 @@ class Answers:
         """Causes that the readings show."""
         return tuple(each.verdict for each in self.contradicted)
 
+    @property
+    def explains(self) -> bool:
+        """Whether residuals need no further terms of the error model."""
+        return bool(self.contradicted) and not any(each.may_be_model for each in self.contradicted)
+
     def lines(self) -> list[str]:
         lines = [f"contradicted: {each.words}" for each in self.contradicted]
         columns = {

@@ -191,8 +191,10 @@ def _sag(design: Design) -> Iterator[PossibleCause]:
         name = design.artefacts.names[artefact]
         if design.dimension < 3 or len(design.balls.of(artefact)) < 3:
             continue
-        influence = SagSettings.model_construct(kind="sag", artefact=name).influence(parts)
-        if influence.parameter.name not in known:
+        # Balls at the outermost places only do not sag.
+        with np.errstate(invalid="ignore"):
+            influence = SagSettings.model_construct(kind="sag", artefact=name).influence(parts)
+        if influence.parameter.name not in known and np.isfinite(influence.shape).all():
             cure = "support the plate at other points, or state its sag"
             yield _added(design, "sag", f"sag of {name}", cure, influence)
 
