@@ -17,6 +17,7 @@ if TYPE_CHECKING:
         amount_of,
         as_data,
         ascii_units,
+        chance_words,
         finite,
         fixed,
         given,

@@ -88,6 +88,21 @@ def number(value: float, digits: int = 4) -> str:
     return f"{magnitude:.{decimals}f}" if decimals < 12 else f"{value:.{digits - 1}e}"
 
 
+# P-values below this are shown as a bound.
+LEAST_CHANCE_SHOWN = 1e-6
+
+
+def chance_words(chance: float) -> str:
+    """Return a p-value in two digits, a bound of a tiny one, or a dash for NaN.
+
+    >>> chance_words(0.0345), chance_words(1e-300), chance_words(float("nan"))
+    ('0.035', '<1e-06', '-')
+    """
+    if math.isnan(chance):
+        return "-"
+    return f"{chance:.2g}" if chance >= LEAST_CHANCE_SHOWN else f"<{LEAST_CHANCE_SHOWN:.0e}"
+
+
 def fixed(value: float, decimals: int) -> str:
     """Return a number with `decimals` decimals; zero has no sign.
 

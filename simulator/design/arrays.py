@@ -9,6 +9,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from pathlib import Path
 from typing import Any, ClassVar, Self, TypeVar, cast
 
 import numpy as np
@@ -16,7 +17,7 @@ import numpy as np
 from ..inputs.own_code import error_text, own_frame
 from ..inputs.unusable import UnusableError
 from ..machines.protocol import Array, ErrorModel, Integers, Unit
-from .influences.protocol import Disturbed, Influence, InfluenceParameter
+from .influences.protocol import DesignParts, Disturbed, Influence, InfluenceParameter
 from .noise import Noise
 from .objects import (
     Artefacts,
@@ -62,6 +63,18 @@ class Design:
     @property
     def dimension(self) -> int:
         return len(self.machine.repeatability)
+
+    def parts(self, folder: Path) -> DesignParts:
+        """Return what influence quantities are laid out for, with the folder of file names."""
+        return DesignParts(
+            self.machine,
+            self.probes,
+            self.artefacts,
+            self.balls,
+            self.positions,
+            self.readings,
+            folder,
+        )
 
     @cached_property
     def plate_readings(self) -> Integers:

@@ -15,7 +15,7 @@ from ..design.arrays import (
     nominal_state,
 )
 from ..design.influences.checks import few, wrong_of_parameters, wrong_of_shifts
-from ..design.influences.protocol import DesignParts, InfluenceParameter, InfluenceSettings
+from ..design.influences.protocol import InfluenceParameter, InfluenceSettings
 from ..design.lookup import References
 from ..design.observations.priors import Priors
 from ..inputs.messages import ExperimentError
@@ -60,15 +60,7 @@ def with_influences(design: Design, experiment: Experiment, is_pool: bool = Fals
     """
     if not experiment.influences:
         return design
-    parts = DesignParts(
-        design.machine,
-        design.probes,
-        design.artefacts,
-        design.balls,
-        design.positions,
-        design.readings,
-        experiment.source.parent,
-    )
+    parts = design.parts(experiment.source.parent)
     influences = []
     for i, parameter in enumerate(experiment.influences):
         try:

@@ -17,6 +17,7 @@ from ballplate.extensions.reliability.exact_values import diagnosis_of_all
 from ballplate.extensions.reliability.refits import diagnosis_with_refits
 from ballplate.extensions.reliability.remainders import too_many_entries
 from ballplate.extensions.reliability.wording import refit_words
+from ballplate.presentation import chance_words
 from ballplate.simulator.computing import ProgressStep, Report, single_threaded, unreported
 from ballplate.simulator.design import Design, State
 from ballplate.simulator.estimation import Linearisation, corrected_points, estimate, linearised_fit
@@ -27,7 +28,7 @@ from ballplate.simulator.readings import ObservedReadings
 from ballplate.uncertainty import uncertainties
 
 from .compared_models_result import ComparedModels, LengthChange, Rung
-from .lack_of_fit import PureError, chance_of, chance_words, pure_error
+from .lack_of_fit import PureError, chance_of, pure_error
 from .nested import nested_sums
 from .rung_choice import (
     ROUNDING,

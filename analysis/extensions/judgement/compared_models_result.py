@@ -6,12 +6,12 @@ import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from ballplate.presentation import Data, FitResult, number, picked, table_lines
+from ballplate.presentation import Data, FitResult, chance_words, number, picked, table_lines
 from ballplate.results import freedom_words
 from ballplate.simulator.readings import ObservedReadings
 from ballplate.uncertainty import Quantity
 
-from .lack_of_fit import PureError, chance_words
+from .lack_of_fit import PureError
 from .rung_choice import FALSE_STEP, Beaten, Criteria
 from .rungs import FILE
 
@@ -161,10 +161,7 @@ class ComparedModels(FitResult):
             "parameters": "parameters",
             "freedom": "degrees_of_freedom",
             "sigma": ("sigma", "{:.4g}".format),
-            f"{test}: p-value": (
-                _chance,
-                lambda p_value: "-" if math.isnan(p_value) else chance_words(p_value),
-            ),
+            f"{test}: p-value": (_chance, chance_words),
             "AIC": (lambda rung: rung.criteria.aic - least[0], "{:.1f}".format),
             "BIC": (lambda rung: rung.criteria.bic - least[1], "{:.1f}".format),
             "largest change": ("change.largest", self._length),

@@ -58,19 +58,6 @@ def pure_error(design: Design, state: State, x: Array) -> PureError:
     return PureError(float((weight * (off - mean[group]) ** 2).sum()), freedom)
 
 
-# Chances below this are told as that.
-LEAST_TOLD = 1e-6
-
-
-def chance_words(chance: float) -> str:
-    """Return a p-value in two digits, or a bound of a tiny one.
-
-    >>> chance_words(0.0345), chance_words(1e-300)
-    ('0.035', '<1e-06')
-    """
-    return f"{chance:.2g}" if chance >= LEAST_TOLD else f"<{LEAST_TOLD:.0e}"
-
-
 def chance_of(
     square: float, dimensions: int, sum_of_rest: float, freedom: int, is_given: bool
 ) -> float:

@@ -4,10 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from ballplate.presentation import Data, FitResult, MainTable, aligned, number, picked
+from ballplate.presentation import Data, FitResult, MainTable, aligned, chance_words, number, picked
 from ballplate.simulator.readings import ObservedReadings
-
-from .lack_of_fit import chance_words
 
 # Chance, of all that is left out together, below which a prediction fails.
 FAILED = 0.01

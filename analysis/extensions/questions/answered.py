@@ -5,23 +5,20 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from ballplate.presentation import SHOWN, Data, given, number, picked, table_lines
+from ballplate.presentation import (
+    SHOWN,
+    Data,
+    chance_words,
+    given,
+    number,
+    picked,
+    table_lines,
+)
+from ballplate.results import ParameterEstimate
+from ballplate.simulator.inputs import listing
 from ballplate.simulator.machines import Unit
 
 from .score_tests import LEVEL
-
-# Chances below this are shown as a bound.
-LEAST_SHOWN = 1e-6
-
-
-@dataclass(frozen=True)
-class Size:
-    """The estimate of a parameter of a cause, in `unit`."""
-
-    name: str
-    value: float
-    standard_uncertainty: float
-    unit: Unit
 
 
 @dataclass(frozen=True)
@@ -39,7 +36,7 @@ class Contradicted:
     cure: str
     chance: float
     others: tuple[str, ...] = ()
-    sizes: tuple[Size, ...] = ()
+    sizes: tuple[ParameterEstimate, ...] = ()
     times: float = np.nan
     lengths: tuple[float, float] | None = None
     may_be_model: bool = False
@@ -52,7 +49,7 @@ class Contradicted:
     @property
     def words(self) -> str:
         """The verdict with its chance, size, effect on U6, and cure."""
-        facts = [f"chance {_chance(self.chance)}", *map(_size, self.sizes)]
+        facts = [f"chance {chance_words(self.chance)}", *map(_size, self.sizes)]
         if not np.isnan(self.times):
             facts.append(f"then sigma {number(self.times, 3)}")
         if self.lengths is not None:
@@ -98,9 +95,9 @@ class Answers:
         lines = [f"contradicted: {each.words}" for each in self.contradicted]
         columns = {
             "asked of the readings": "assumed",
-            "chance": ([each.chance for each in self.asked], _chance),
+            "chance": ("chance", chance_words),
             "noticed from": [_amount(each.noticed_from, each.unit) for each in self.asked],
-            "not seen": [_listed(each.not_seen) for each in self.asked],
+            "not seen": [listing(each.not_seen, 2) for each in self.asked],
         }
         return [*lines, *table_lines(columns, self.asked)]
 
@@ -110,7 +107,10 @@ class Answers:
             "contradicted": [
                 {
                     **picked(each, "assumed", "cause", "others", "chance", "cure", "words"),
-                    "parameters": [vars(size) for size in each.sizes],
+                    "parameters": [
+                        picked(size, "name", "value", "standard_uncertainty", "unit")
+                        for size in each.sizes
+                    ],
                     **given(
                         sigma=each.times,
                         U6=each.lengths
@@ -123,21 +123,10 @@ class Answers:
         }
 
 
-def _chance(chance: float) -> str:
-    if np.isnan(chance):
-        return "-"
-    return f"{chance:.2g}" if chance >= LEAST_SHOWN else f"<{LEAST_SHOWN:.0e}"
-
-
-def _size(size: Size) -> str:
+def _size(size: ParameterEstimate) -> str:
     value, u = 1e6 * size.value, 1e6 * size.standard_uncertainty
     return f"{size.name} {number(value, 3)} ± {number(u, 2)} {SHOWN[size.unit]}"
 
 
 def _amount(value: float, unit: Unit) -> str:
     return "-" if np.isnan(value) else f"{number(1e6 * value, 2)} {SHOWN[unit]}"
-
-
-def _listed(words: tuple[str, ...]) -> str:
-    more = len(words) - 2
-    return ", ".join(words[:2]) + (f" and {more} more" if more > 0 else "")

@@ -13,13 +13,13 @@ from ballplate.extensions.reliability.remainders import Leftover, too_many_entri
 from ballplate.extensions.reliability.scatter import Scatter, scatters, with_scatter
 from ballplate.extensions.reliability.scatter import log_chances as scatter_chances
 from ballplate.extensions.reliability.suspects import Diagnosis, Suspect
-from ballplate.results import Fit
+from ballplate.results import Fit, ParameterEstimate
 from ballplate.simulator.computing import single_threaded
 from ballplate.simulator.estimation import Linearisation, estimate, linearise, linearised_fit
 from ballplate.simulator.machines import Array, Integers
 from ballplate.uncertainty import uncertainties
 
-from .answered import Answers, AssumptionAnswer, Contradicted, Size
+from .answered import Answers, AssumptionAnswer, Contradicted
 from .possible_causes import MODEL, PossibleCause
 from .score_tests import (
     LEVEL,
@@ -121,7 +121,9 @@ def _contradicted(x: Array, sigma_is_estimated: bool, found: Contradiction) -> C
     values, columns = _parameters(cause, at)
     u = sigma * at.of_shared(np.eye(len(at.layout))[columns])
     sizes = tuple(
-        Size(name, value, uncertainty, cause.unit)
+        ParameterEstimate(
+            name, value, uncertainty, cause.unit, "offset" if cause.probe >= 0 else "influence"
+        )
         for name, value, uncertainty in zip(
             cause.parameters, values.tolist(), u.tolist(), strict=True
         )
@@ -153,8 +155,8 @@ def _answers(
         noticed = []
         for k in seen:
             cause = every[k].cause
-            u = every[k].uncertainties(left)
             if 0 < len(cause.parameters) <= search.design.dimension:
+                u = every[k].uncertainties(left)
                 noticed += (least * u[np.isfinite(u)]).tolist()
                 names = np.array(cause.parameters)[~np.isfinite(u)]
                 not_seen += [f"{cause.words}, {name}" for name in names]

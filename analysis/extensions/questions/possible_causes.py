@@ -10,7 +10,6 @@ import numpy as np
 from ballplate.simulator.design import (
     Clock,
     Design,
-    DesignParts,
     Disturbed,
     Drift,
     Influence,
@@ -178,15 +177,7 @@ def _scale(design: Design, positions: Integers, by_axis: bool = False) -> Positi
 
 def _sag(design: Design) -> Iterator[PossibleCause]:
     known = {one.parameter.name for one in design.influences if isinstance(one, Sag)}
-    parts = DesignParts(
-        design.machine,
-        design.probes,
-        design.artefacts,
-        design.balls,
-        design.positions,
-        design.readings,
-        Path(),
-    )
+    parts = design.parts(Path())
     for artefact in np.unique(design.positions.artefact[design.plate_positions]).tolist():
         name = design.artefacts.names[artefact]
         if design.dimension < 3 or len(design.balls.of(artefact)) < 3:

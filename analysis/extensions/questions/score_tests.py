@@ -9,16 +9,22 @@ from dataclasses import dataclass
 import numpy as np
 from ballplate.extensions.reliability.bias_patterns import LinearisedDesign
 from ballplate.extensions.reliability.cause_search import (
-    LOG_ODDS_LIMIT,
     Search,
     basis_of,
     explained_by,
     further_basis,
+    unbeaten,
 )
 from ballplate.extensions.reliability.power import noncentrality
 from ballplate.extensions.reliability.remainders import HIDDEN, Leftover
 from ballplate.extensions.reliability.smooth import rows_of
-from ballplate.simulator.design import Design, State, disturbed_readings, expected_readings
+from ballplate.simulator.design import (
+    Design,
+    Disturbed,
+    State,
+    disturbed_readings,
+    expected_readings,
+)
 from ballplate.simulator.estimation import estimate
 from ballplate.simulator.machines import Array
 
@@ -72,11 +78,12 @@ class Tested:
 
 def tested(search: Search) -> Iterator[Tested]:
     """Return all causes with what the residuals of a search show of them."""
-    design = search.design
-    for cause in possible_causes(design):
-        nominal = _rows(design, search.drawn.state, cause)
-        most = basis_of(search.nominal, nominal).shape[1]
-        columns = _rows(design, search.state, cause)
+    nominal, expected = (
+        _linearised(search.design, state) for state in (search.drawn.state, search.state)
+    )
+    for cause in possible_causes(search.design):
+        most = basis_of(search.nominal, _rows(*nominal, cause)).shape[1]
+        columns = _rows(*expected, cause)
         yield Tested(cause, search.visible(columns, most), columns)
     for smooth in search.smooth:
         assumed = "drift" if smooth.is_drift else MODEL
@@ -85,12 +92,17 @@ def tested(search: Search) -> Iterator[Tested]:
         yield Tested(cause, smooth.columns, smooth.columns[:, :0])
 
 
-def _rows(design: Design, state: State, cause: PossibleCause) -> Array:
-    """Return the whitened changes (n, k) of all rows by a unit of each parameter."""
+def _linearised(design: Design, state: State) -> tuple[LinearisedDesign, Disturbed]:
+    """Return a design linearised at a state, and the readings that it expects."""
     readings = design.readings
     at = disturbed_readings(state, readings, expected_readings(design, state, readings))
+    return LinearisedDesign(design, state, None), at
+
+
+def _rows(linearised: LinearisedDesign, at: Disturbed, cause: PossibleCause) -> Array:
+    """Return the whitened changes (n, k) of all rows by a unit of each parameter."""
     assert cause.displaced is not None
-    return rows_of(LinearisedDesign(design, state, None), cause.displaced(at))
+    return rows_of(linearised, cause.displaced(at))
 
 
 @dataclass(frozen=True)
@@ -151,17 +163,14 @@ def _chains(search: Search, every: list[Tested], candidates: list[int]) -> list[
 
     A score test adds a chain's errors to those of the stated one, which it replaces.
     """
-    squares = {}
+    fits = []
     for k in candidates:
         cause = every[k].cause
         if cause.assumed == CHAIN and cause.design is not None:
             solution = estimate(cause.design, search.x)
             is_good = solution.status == "converged"
-            squares[k] = solution.factor.sum_of_squares if is_good else math.inf
-    least = min(squares.values())
-    variance = max(least / search.freedom, 1.0) if search.estimated else 1.0
-    near = least + 2.0 * LOG_ODDS_LIMIT * variance
-    return [k for k in sorted(squares, key=squares.__getitem__) if squares[k] <= near]
+            fits.append((solution.factor.sum_of_squares if is_good else math.inf, k))
+    return unbeaten(fits, search.freedom, search.estimated)
 
 
 def noticeable(search: Search, left: Leftover, tests: int) -> float:

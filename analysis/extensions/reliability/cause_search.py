@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from typing import TypeVar
 
 import numpy as np
 from ballplate.simulator.computing import single_threaded
@@ -18,6 +19,8 @@ from .scatter import Scatter, log_chances, ratio, scatters, with_scatter
 from .smooth import Smooth, smooth_errors
 from .suspects import Diagnosis, MoreScatter, Suspect, Unexplained
 from .tails import log_chance, normal_equivalent
+
+Explanation = TypeVar("Explanation")
 
 # Significance level of the whole search: half for gross errors, half for everything else.
 FAMILY = 0.01
@@ -423,6 +426,28 @@ class Search:
                     if alternative != own_cause:
                         alternatives.setdefault(alternative, tuple(row.tolist()))
         return tuple(alternatives.values())
+
+
+def variance(least: float, freedom: int, sigma_is_estimated: bool) -> float:
+    """Return the variance of residuals of which `least` remains, relative to the stated one."""
+    return max(least / freedom, 1.0) if sigma_is_estimated else 1.0
+
+
+def clear_odds(least: float, freedom: int, sigma_is_estimated: bool) -> float:
+    """Return the difference of sums of squares that makes one explanation clearly better."""
+    return 2.0 * LOG_ODDS_LIMIT * variance(least, freedom, sigma_is_estimated)
+
+
+def unbeaten(
+    fits: list[tuple[float, Explanation]], freedom: int, sigma_is_estimated: bool
+) -> list[Explanation]:
+    """Return the explanations, given with remaining sums of squares, that the best does not clearly
+    beat.
+    """
+    fits = sorted(fits, key=lambda fit: fit[0])
+    least = min((remaining for remaining, _ in fits), default=0.0)
+    most = least + clear_odds(least, freedom, sigma_is_estimated)
+    return [explanation for remaining, explanation in fits if remaining <= most]
 
 
 def basis_of(remainder: Leftover, columns: Array, most: int | None = None) -> Array:

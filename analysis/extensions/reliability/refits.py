@@ -9,7 +9,6 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from typing import TypeVar
 
 import numpy as np
 from ballplate.extensions.laboratory.wrong_offsets import (
@@ -27,19 +26,14 @@ from ballplate.simulator.estimation import (
     linearise,
     linearised_fit,
 )
-from ballplate.simulator.machines import (
-    Array,
-    Integers,
-)
+from ballplate.simulator.machines import Array, Integers
 
 from .bias_patterns import patterns
-from .cause_search import FAMILY, LOG_ODDS_LIMIT, Search
+from .cause_search import FAMILY, Search, clear_odds, unbeaten, variance
 from .exact_values import diagnosis_of_all
 from .remainders import leftover
 from .suspects import Diagnosis, Refit
 from .tails import log_chance, normal_equivalent
-
-Made = TypeVar("Made")
 
 # Significance level of a sum of squares that needs refits, and of the excess of an error's sum of
 # squares over that with all offsets free.
@@ -96,7 +90,8 @@ class _Refits:
             for mistakes in (discrete_mistakes(design), free.single())
         ]
         least = min([free.least, *(remaining for remaining, _ in kinds[0])])
-        most = min(least + self._variance(least) * free.tolerance, self.total - self._odds(least))
+        given = least, self.freedom, self.estimated
+        most = min(least + variance(*given) * free.tolerance, self.total - clear_odds(*given))
         limit = math.log(0.5 * FAMILY / max(sum(map(len, kinds)), 1))
         for mistakes, dimensions in zip(kinds, (1, design.dimension), strict=True):
             possible = [
@@ -104,7 +99,7 @@ class _Refits:
                 for remaining, mistake in mistakes
                 if remaining <= most and self._log_p(remaining, dimensions) < limit
             ]
-            near = self._near(possible)
+            near = unbeaten(possible, self.freedom, self.estimated)
             named = self._offset_diagnosis(near, limit) if near else None
             if named:
                 return named
@@ -149,24 +144,6 @@ class _Refits:
         """Return the logarithm of the p-value of a remaining sum of squares."""
         square = max(self.total - remaining, 0.0)
         return float(log_chance(square, self.total, dimensions, self.freedom, False))
-
-    def _variance(self, remaining: float) -> float:
-        return max(remaining / self.freedom, 1.0) if self.estimated else 1.0
-
-    def _odds(self, least: float) -> float:
-        """Return the difference of sums of squares that makes one explanation clearly better."""
-        return 2.0 * LOG_ODDS_LIMIT * self._variance(least)
-
-    def _near(self, fits: list[tuple[float, Made]]) -> list[Made]:
-        """Return the explanations, given with remaining sums of squares, that the best does not
-        clearly beat.
-        """
-        fits = sorted(fits, key=lambda fit: fit[0])
-        return [
-            explanation
-            for remaining, explanation in fits
-            if remaining <= fits[0][0] + self._odds(fits[0][0])
-        ]
 
     def _without(self, design: Design) -> tuple[Search, Diagnosis] | None:
         """Return the search with a corrected design, and its diagnosis; None if residuals remain
