@@ -25,7 +25,8 @@ function fits(schema, data, root) {
   if (data === undefined) return true;
   if (Array.isArray(data)) return schema.type === "array";
   if (data !== null && typeof data === "object") {
-    if (schema.type !== "object" && !schema.properties && !schema.additionalProperties) return false;
+    const { type, properties, additionalProperties } = schema;
+    if (type !== "object" && !properties && !additionalProperties) return false;
     return Object.entries(schema.properties ?? {}).every(([key, value]) => {
       const part = resolve(value, root);
       return part.const === undefined || data[key] === part.const;
@@ -41,7 +42,8 @@ function choices(schemas, root) {
     (one.enum ?? []).forEach((value) => found.add(String(value)));
     if (one.type === "boolean") ["true", "false"].forEach((value) => found.add(value));
   }
-  const free = schemas.some((one) => one.enum === undefined && one.const === undefined && one.type !== "boolean" && one.type !== "null");
+  const free = schemas.some((one) =>
+    one.enum === undefined && one.const === undefined && !["boolean", "null"].includes(one.type));
   return free ? null : [...found];
 }
 
@@ -49,7 +51,10 @@ function choices(schemas, root) {
 export function flow(value) {
   if (value === null || value === undefined) return "";
   if (Array.isArray(value)) return `[${value.map(flow).join(", ")}]`;
-  if (typeof value === "object") return `{${Object.entries(value).map(([key, one]) => `${key}: ${flow(one)}`).join(", ")}}`;
+  if (typeof value === "object") {
+    const entries = Object.entries(value).map(([key, one]) => `${key}: ${flow(one)}`);
+    return `{${entries.join(", ")}}`;
+  }
   return String(value);
 }
 
@@ -72,20 +77,24 @@ export function build(container, data, schema, messages, onSet) {
     if (!details) {
       details = element("details", { "data-section": section });
       const description = resolve(part, schema).description ?? part.description ?? "";
-      details.append(element("summary", { title: description }, section.replaceAll("_", " ")), element("div"));
+      const heading = section.replaceAll("_", " ");
+      details.append(element("summary", { title: description }, heading), element("div"));
       details.addEventListener("toggle", () => details.fill());
       container.append(details);
     }
-    const wrong = messages.filter((one) => one.path === section || one.path.startsWith(`${section}.`) || one.path.startsWith(`${section}[`));
+    const wrong = messages.filter((one) => one.path.split(/[.[]/)[0] === section);
     details.classList.toggle("wrong", wrong.length > 0);
     const said = JSON.stringify([data?.[section], wrong]);
     details.fill = () => {
       if (!details.open || details.said === said) return;
       details.said = said;
-      const open = new Set([...details.querySelectorAll("details[open]")].map((one) => one.dataset.of));
+      const unfolded = [...details.querySelectorAll("details[open]")];
+      const open = new Set(unfolded.map((one) => one.dataset.of));
       const box = element("div");
       fields(box, [section], data?.[section], part, schema, messages, onSet, section);
-      box.querySelectorAll("details").forEach((one) => { one.open = open.has(one.dataset.of); });
+      box.querySelectorAll("details").forEach((one) => {
+        one.open = open.has(one.dataset.of);
+      });
       details.lastElementChild.replaceWith(box);
     };
     details.fill();
@@ -94,21 +103,24 @@ export function build(container, data, schema, messages, onSet) {
 
 function fields(into, path, data, part, root, messages, onSet, label) {
   const possible = forms(part, data, root);
-  const description = part.description ?? resolve(part, root).description ?? possible[0]?.description ?? "";
-  const isMapping = data !== null && typeof data === "object" && !Array.isArray(data);
-  const isList = Array.isArray(data) && data.some((one) => one !== null && typeof one === "object" && !Array.isArray(one));
-  if (isMapping) {
+  const description =
+    part.description ?? resolve(part, root).description ?? possible[0]?.description ?? "";
+  const isMapping = (one) => one !== null && typeof one === "object" && !Array.isArray(one);
+  const deep = path.length > 1;
+  if (isMapping(data)) {
     for (const [key, value] of Object.entries(data)) {
       const below = property(possible, key, root);
-      fields(into, [...path, key], value, below, root, messages, onSet, path.length > 1 ? `${label}.${key}` : key);
+      const name = deep ? `${label}.${key}` : key;
+      fields(into, [...path, key], value, below, root, messages, onSet, name);
     }
     adding(into, path, data, possible, root, onSet, label);
     return;
   }
-  if (isList) {
+  if (Array.isArray(data) && data.some(isMapping)) {
     data.forEach((value, k) => {
       const below = possible.find((one) => one.items)?.items ?? {};
-      fields(into, [...path, k], value, below, root, messages, onSet, path.length > 1 ? `${label}[${k + 1}]` : value?.name ?? `${k + 1}`);
+      const name = deep ? `${label}[${k + 1}]` : value?.name ?? `${k + 1}`;
+      fields(into, [...path, k], value, below, root, messages, onSet, name);
     });
     return;
   }
@@ -117,7 +129,8 @@ function fields(into, path, data, part, root, messages, onSet, label) {
   let input;
   if (options && options.length > 1) {
     input = element("select");
-    [...new Set([said, ...options])].forEach((one) => input.append(new Option(one, one, one === said, one === said)));
+    [...new Set([said, ...options])].forEach((one) =>
+      input.append(new Option(one, one, one === said, one === said)));
   } else {
     input = element("input", { value: said, placeholder: data === undefined ? "not stated" : "" });
   }
@@ -125,7 +138,9 @@ function fields(into, path, data, part, root, messages, onSet, label) {
   input.addEventListener("change", () => onSet(path, input.value, input));
   const name = element("span", { title: description }, label === path[0] ? "value" : label);
   const box = element("label", {}, name, input);
-  const steps = path.reduce((text, step) => (typeof step === "number" ? `${text}[${step}]` : text ? `${text}.${step}` : step), "");
+  const joined = (text, step) =>
+    (typeof step === "number" ? `${text}[${step}]` : text ? `${text}.${step}` : step);
+  const steps = path.reduce(joined, "");
   for (const message of messages.filter((one) => one.path === steps)) {
     input.classList.add("bad-field");
     box.append(element("span", { class: "field-error" }, message.text));
@@ -136,25 +151,30 @@ function fields(into, path, data, part, root, messages, onSet, label) {
 function property(possible, key, root) {
   for (const one of possible) {
     if (one.properties?.[key]) return one.properties[key];
-    if (one.additionalProperties && typeof one.additionalProperties === "object") return one.additionalProperties;
+    if (typeof (one.additionalProperties ?? false) === "object") return one.additionalProperties;
   }
   return {};
 }
 
 // A key that is not there yet: one of the schema's, or a name of the user's own.
 function adding(into, path, data, possible, root, onSet, label) {
-  const known = [...new Set(possible.flatMap((one) => Object.keys(one.properties ?? {})))].filter((key) => !(key in data));
+  const keys = new Set(possible.flatMap((one) => Object.keys(one.properties ?? {})));
+  const known = [...keys].filter((key) => !(key in data));
   const isOpen = possible.some((one) => one.additionalProperties);
   if (!known.length && !isOpen) return;
   const list = `keys-${path.join("-")}`;
   const names = element("datalist", { id: list });
-  known.forEach((key) => names.append(new Option(property(possible, key, root).description ?? "", key)));
-  const key = element("input", { list, placeholder: "another key", "aria-label": `another key of ${label}`, "data-key": path.join(".") });
-  const value = element("input", { placeholder: "value", "aria-label": `value of another key of ${label}` });
+  known.forEach((key) =>
+    names.append(new Option(property(possible, key, root).description ?? "", key)));
+  const key = element("input", { list, placeholder: "another key",
+    "aria-label": `another key of ${label}`, "data-key": path.join(".") });
+  const value = element("input", { placeholder: "value",
+    "aria-label": `value of another key of ${label}` });
   const set = () => {
-    if (key.value.trim() && value.value.trim()) onSet([...path, key.value.trim()], value.value, value);
+    const name = key.value.trim();
+    if (name && value.value.trim()) onSet([...path, name], value.value, value);
   };
   value.addEventListener("change", set);
-  const more = element("details", { "data-of": path.join(".") }, element("summary", {}, `add to ${label.replaceAll("_", " ")}`), key, names, value);
-  into.append(more);
+  into.append(element("details", { "data-of": path.join(".") },
+    element("summary", {}, `add to ${label.replaceAll("_", " ")}`), key, names, value));
 }
