@@ -132,7 +132,7 @@ class Positions:
     `held` (k, pose size) marks the pose parameters (origin, then rotation about the machine's
     axes) that fix a frame or that turn an artefact of collinear balls about its own axis. `across`
     (k,) is the machine's axis across an artefact read only in its plane, otherwise -1; absent if
-    all co-ordinates are read.
+    all co-ordinates are read. `switched_off` names positions of the file that are not read.
     """
 
     names: tuple[str, ...]
@@ -141,6 +141,7 @@ class Positions:
     origins: Array
     held: Flags
     across: Integers | None = None
+    switched_off: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)

@@ -55,7 +55,11 @@ def lay_out(experiment: Experiment, is_pool: bool = False) -> Design:
     >>> from ballplate.simulator.experiment.loading import load
     >>> lay_out(load(Path("designs/quickstart.yaml"))[0]).dimension
     3
+
+    :raises ExperimentError: the experiment was loaded with its faults, and has some.
     """
+    if experiment.faults:
+        raise ExperimentError(experiment.faults)
     machine, d = experiment.machine, experiment.dimension
     model = build_error_model(experiment.error_model, *machine.volume.corners)
     artefacts = list(experiment.artefacts)
@@ -120,6 +124,7 @@ def lay_out(experiment: Experiment, is_pool: bool = False) -> Design:
             origins,
             held_flags,
             across,
+            experiment.switched_off,
         ),
         readings,
         (distances, coordinates, lengths, priors, *other_observations, *_stars(experiment)),

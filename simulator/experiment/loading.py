@@ -9,6 +9,8 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from ..inputs.decoding import refuse_long_lines
 from ..inputs.messages import ExperimentError, Message
 from ..inputs.problems import Problems, in_order, written_count
@@ -31,10 +33,10 @@ from .checks import (
 from .exact_values import check_exact_values
 from .influences import resolve_influences
 from .machine import resolve_evaluation, resolve_machine, resolve_noise, target_of
-from .model import Experiment
+from .model import Evaluation, Experiment
 from .own_sections import needed_extensions, resolve_own_sections
 from .placements import resolve_position
-from .pool import placed_only
+from .pool import enabled_only, placed_only
 from .pools import resolve_candidates, resolve_pool
 from .priors import resolve_priors
 from .probes import resolve_probes, resolve_stars
@@ -50,6 +52,7 @@ def load(
     planning: bool = False,
     trust: Trust = OPENED,
     text: str | None = None,
+    tolerant: bool = False,
 ) -> tuple[Experiment, ...]:
     """Load an experiment file.
 
@@ -57,9 +60,11 @@ def load(
     are read from its folder. For ``planning`` an experiment has its pool, and positions may be
     missing if it has one; otherwise artefacts of the pool alone are omitted. Error models in
     Python are code that loading runs, if ``trust`` allows it. A ``text`` is read as the content of
-    the file.
+    the file. A ``tolerant`` reader gets experiments with their ``faults``, and positions that are
+    switched off or cannot be read, to be changed and not to be evaluated.
 
-    :raises ExperimentError: the file, or a table it names, is invalid; holds all faults found.
+    :raises ExperimentError: the file, or a table it names, is invalid; holds all faults found. For
+        a ``tolerant`` reader: its machine, or the YAML, cannot be understood.
     """
     source = Path(path)
     refused: list[Message] = []
@@ -68,16 +73,18 @@ def load(
     written = read_text(source) if text is None else text
     root, trees, base_problems = trees_of(written, source, refused)
     if not trees:
-        experiment, messages = build(_without_variants(root), source, None, trust, planning)
-        _raise_if_any([*base_problems.messages, *messages], refused, source)
-        assert experiment is not None
-        return (experiment,)
+        tree = _without_variants(root)
+        experiment, messages = build(tree, source, None, trust, planning, tolerant)
+        faults = in_order([*base_problems.messages, *messages], refused, source)
+        return (_with_faults(experiment, faults, tolerant),)
     experiments = []
     variants_of: dict[Message, list[str]] = {}
     size = 0
     for name, tree in trees.items():
-        experiment, messages = build(tree, source, name, trust, planning)
+        experiment, messages = build(tree, source, name, trust, planning, tolerant)
         if experiment is not None:
+            if tolerant:
+                experiment = _with_faults(experiment, in_order(messages, refused, source), True)
             mark = mark_of(root, ("variants", name), of_key=True)
             experiments.append(replace(experiment, mark=mark))
             size += experiment.size
@@ -104,8 +111,22 @@ def load(
         )
         for message, names in variants_of.items()
     ]
-    _raise_if_any(found, refused, source)
+    faults = in_order(found, refused, source)
+    if faults and not (tolerant and experiments):
+        raise ExperimentError(faults)
     return tuple(experiments)
+
+
+def _with_faults(
+    experiment: Experiment | None, faults: list[Message], tolerant: bool
+) -> Experiment:
+    """Return the experiment, for a tolerant reader with its faults.
+
+    :raises ExperimentError: there are faults, and the reader is not tolerant, or none was built.
+    """
+    if experiment is None or (faults and not tolerant):
+        raise ExperimentError(faults)
+    return replace(experiment, faults=tuple(faults)) if tolerant else experiment
 
 
 def trees_of(
@@ -159,11 +180,16 @@ def _built(root: Node, source: Path, name: str | None, trust: Trust, planning: b
 
 
 def build(
-    root: Node, source: Path, name: str | None, trust: Trust, planning: bool = False
+    root: Node,
+    source: Path,
+    name: str | None,
+    trust: Trust,
+    planning: bool = False,
+    tolerant: bool = False,
 ) -> tuple[Experiment | None, list[Message]]:
-    """Return the experiment of a tree without variants, or None with its faults."""
+    """Return the experiment of a tree without variants, or None, with its faults."""
     try:
-        return _build(root, source, name, trust, planning)
+        return _build(root, source, name, trust, planning, tolerant)
     except ExperimentError as too_many:
         return None, list(too_many.messages)
 
@@ -171,7 +197,7 @@ def build(
 # In one piece: the order in which sections are resolved, each from those before it, stands in one
 # place.
 def _build(
-    root: Node, source: Path, name: str | None, trust: Trust, planning: bool
+    root: Node, source: Path, name: str | None, trust: Trust, planning: bool, tolerant: bool
 ) -> tuple[Experiment | None, list[Message]]:
     problems = Problems(root)
     sections = validate_sections(root, problems, planning)
@@ -196,16 +222,20 @@ def _build(
         position = resolve_position(settings, ("positions", i), references)
         if position is not None:
             positions[i] = position
-            if machine is not None and machine.dimension == references.dimension:
-                check_inside(position, ("positions", i), machine.volume, probes, references)
+            volume = machine.volume if machine is not None and position.enabled else None
+            if volume is not None and len(volume.lower) == references.dimension:
+                check_inside(position, ("positions", i), volume, probes, references)
     candidates = resolve_candidates(sections, positions, machine, probes, references)
     possible = candidates.positions if candidates.complete else None
     check_use(sections, positions, position_count, references, possible, planning)
     # What may read calibrated balls, and have priors; more than there is of it where some is wrong.
-    named = dict(enumerate(candidates.positions or positions.values()))
-    readers, reader_count = (
-        (named, len(named) + (not candidates.complete)) if planning else (positions, position_count)
-    )
+    off = [position for position in positions.values() if not position.enabled]
+    enabled = {i: position for i, position in positions.items() if position.enabled}
+    readers, reader_count = enabled, position_count - len(off)
+    named = dict(enumerate((*(candidates.positions or enabled.values()), *off)))
+    if planning:
+        readers = dict(enumerate(candidates.positions or enabled.values()))
+        reader_count = len(readers) + (not candidates.complete)
     calibrations = {}
     for key, settings in sections.entries("calibration").items():
         i = int(key)
@@ -220,15 +250,17 @@ def _build(
     pool = resolve_pool(sections, candidates, calibrations, references)
     priors = resolve_priors(sections, machine, named, probes, references)
     influences = resolve_influences(sections, named, references)
-    check_size(sections, machine, positions, calibrations, probes, references)
+    check_size(sections, machine, enabled, calibrations, probes, references)
     noise = resolve_noise(sections.get("noise"), problems)
     evaluation = resolve_evaluation(sections, machine, probes, references)
     check_derivatives(sections, machine, evaluation, references)
     check_readings(sections, references)
     stars = resolve_stars(sections, probes, references)
     own_sections = resolve_own_sections(sections, references)
-    if problems.messages or machine is None or evaluation is None:
+    if problems.messages and not tolerant or machine is None:
         return None, problems.messages
+    if evaluation is None:
+        evaluation = Evaluation(np.zeros((0, machine.dimension)), "")
     experiment = Experiment(
         title=sections.get("title"),
         description=sections.get("description") or "",
@@ -263,6 +295,9 @@ def _build(
         sections=own_sections,
         extensions=needed_extensions(sections),
     )
+    if tolerant:
+        return experiment, problems.messages
+    experiment = enabled_only(experiment)
     return experiment if planning or pool is None else placed_only(experiment), []
 
 
@@ -271,8 +306,3 @@ def _without_variants(root: Node) -> Node:
         return root
     items = {key: node for key, node in root.items.items() if key != "variants"}
     return Mapping(root.mark, items, {key: root.key_marks[key] for key in items})
-
-
-def _raise_if_any(messages: list[Message], refused: list[Message], source: Path) -> None:
-    if every := in_order(messages, refused, source):
-        raise ExperimentError(every)

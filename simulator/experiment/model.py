@@ -85,7 +85,8 @@ class ReadingGroup:
 class Position:
     """A position of an artefact, its nominal pose in the machine and its readings.
 
-    ``description`` completes a short name; possibly empty.
+    ``description`` completes a short name; possibly empty. One that is not ``enabled`` is not read,
+    and no experiment that can be evaluated has it.
     """
 
     name: str
@@ -93,6 +94,7 @@ class Position:
     pose: Pose
     readings: tuple[ReadingGroup, ...]
     description: str = ""
+    enabled: bool = True
 
     @property
     def count(self) -> int:
@@ -231,7 +233,8 @@ class Experiment:
     tables of readings. ``sections``: entries under keys that extensions provide. ``extensions``:
     names of required ones. ``tree``: the file's content without variants, ``mark``: the location
     of the experiment, and ``builder``: function from a tree to an experiment, with the ``trust``
-    in the file.
+    in the file. ``switched_off``: names of positions of the file that are not read. ``faults``: of
+    an experiment that was loaded with them, to be changed and not to be evaluated; otherwise None.
     """
 
     title: str
@@ -266,6 +269,8 @@ class Experiment:
     notes: tuple[str, ...] = ()
     sections: Mapping[str, Any] = field(default_factory=dict)
     extensions: tuple[str, ...] = ()
+    switched_off: tuple[str, ...] = ()
+    faults: tuple[Message, ...] | None = None
 
     @property
     def dimension(self) -> int:

@@ -51,7 +51,8 @@ def resolve_position(
     is_across = float(np.abs(pose.rotation[:, -1]).max()) > 1.0 - OBLIQUE
     if not references.require(is_across or not in_plane, (*steps, "pose"), text):
         return None
-    return Position(settings.name, artefact, pose, readings, settings.description or "")
+    words = settings.description or ""
+    return Position(settings.name, artefact, pose, readings, words, settings.enabled)
 
 
 def _readings(

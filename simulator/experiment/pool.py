@@ -22,6 +22,26 @@ def with_chosen(experiment: Experiment, chosen: Sequence[Candidate]) -> Experime
     )
 
 
+def enabled_only(experiment: Experiment) -> Experiment:
+    """Return the experiment without positions that are switched off and priors about them, and
+    without a pool also without artefacts that are in no other position.
+
+    :raises ExperimentError: no position is left, and there is no pool.
+    """
+    off = tuple(position.name for position in experiment.positions if not position.enabled)
+    if not off:
+        return experiment
+    positions = tuple(position for position in experiment.positions if position.enabled)
+    priors = tuple(prior for prior in experiment.priors if prior.position not in off)
+    kept = replace(experiment, positions=positions, priors=priors, switched_off=off)
+    if experiment.pool is not None:
+        return kept
+    if not positions:
+        text = "all are switched off; remove enabled: false from at least one"
+        raise experiment.refused(("positions",), text)
+    return placed_only(kept)
+
+
 def placed_only(experiment: Experiment) -> Experiment:
     """Return the experiment without its pool, artefacts without a position and priors about other
     positions.

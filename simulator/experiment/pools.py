@@ -116,6 +116,8 @@ def resolve_candidates(
     all_drawn = len(positions) == written_count(root, "positions")
     result.complete = is_known and is_list and names_differ and all_drawn
     for i, position in positions.items():
+        if not position.enabled:
+            continue
         settings = sections.get("positions", i)
         item_settings = to_python(written(root, "positions", i))  # type: ignore[arg-type]
         own_times = (times.positions or {}).get(position.name)
@@ -143,6 +145,9 @@ def resolve_candidates(
             listed = resolve_position(settings, steps, references)
             if listed is None:
                 result.complete = False
+                continue
+            if not listed.enabled:
+                result.drop("switched off")
                 continue
             if bounds is not None:
                 before = len(problems.messages)

@@ -77,6 +77,9 @@ class PositionSettings(Settings):
     description: Name | None = Field(
         None, description="one-line description in addition to a short name; shown on run sheets"
     )
+    enabled: bool = Field(
+        True, description="false: the position stays in the file, and is not read"
+    )
     artefact: Name | None = Field(
         None, description="name of the artefact; optional if there is exactly one"
     )

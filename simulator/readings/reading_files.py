@@ -175,7 +175,9 @@ def _indices(rows: tuple[FileRow, ...], design: Design) -> tuple[Integers, list[
             position, ball, probe = row.texts
             texts = faults.setdefault(row.texts, [])
             balls_of_plate = {}
-            if position not in positions:
+            if position in design.positions.switched_off:
+                texts.append(f'position "{position}" is switched off; leave its rows out')
+            elif position not in positions:
                 texts.append(f'unknown position "{position}"; {hint(position, positions)}')
             else:
                 balls_of_plate = balls[design.positions.artefact[positions[position]]]

@@ -5,6 +5,7 @@ An extension reads other layouts, reports and other names.
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -18,6 +19,7 @@ from ..inputs.decoding import END_OF_FILE, refuse_long_lines, text_and_encoding
 from ..inputs.extensions import optional_service
 from ..inputs.messages import ExperimentError, Message, refused
 from ..inputs.quantities import Units
+from ..inputs.settings import number_of
 from ..inputs.tables import FileRow, header_names, header_texts, read_table
 from ..inputs.yamltree import GivenText, read_bytes
 from ..machines.protocol import Array
@@ -112,19 +114,32 @@ def source_rows(
     if not foreign:
         for table in tables:
             rows += plain_rows(table, names, axes, errors, units, empty)
+        rows, notes = _without_switched_off(rows, design.positions.switched_off)
         name_sets = [set(of_role) for of_role in names.values()]
         # Without the extension, `read_readings` reports unknown names of all rows together.
         if not errors and (
             reader is None
             or all(row.texts[k] in name_sets[k] for row in rows for k in range(len(name_sets)))
         ):
-            return SourceRows(tuple(rows), (), settings)
+            return SourceRows(tuple(rows), notes, settings)
     if reader is None:
         raise ExperimentError(errors) if errors else _not_plain(foreign[0])
     matched: SourceRows = reader.of_sources(
         tables, design, settings, messages, is_possible, units, empty
     )
     return matched
+
+
+def _without_switched_off(
+    rows: list[FileRow], names: Sequence[str]
+) -> tuple[list[FileRow], tuple[str, ...]]:
+    """Return rows of positions that are read, and notes on those left out."""
+    counts = Counter(row.texts[0] for row in rows if row.texts[0] in names)
+    notes = (
+        f'position "{name}" is switched off: {number_of(count, "reading")} left out'
+        for name, count in counts.items()
+    )
+    return [row for row in rows if row.texts[0] not in counts], tuple(notes)
 
 
 def named_rows(
