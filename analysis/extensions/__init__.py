@@ -51,7 +51,10 @@ SHIPPED = (
     _here(
         "drafting",
         functions=_from("interface", "design"),
-        services=_from("init_command", "add_data_sheet", "drafted"),
+        services={
+            **_from("init_command", "add_data_sheet", "drafted"),
+            **_from("sheet_form", "sheet_questions", "sheet_draft"),
+        },
     ),
     _here(
         "campaign",

@@ -13,7 +13,8 @@ from pathlib import Path
 
 import ballplate
 import numpy as np
-from ballplate.extensions.drafting.machine_tables import arrangement_of, chain_words
+from ballplate.extensions.drafting.machine_tables import arrangement_of, chain_words, table
+from ballplate.extensions.drafting.shapes import VIEW, machine_shapes
 from ballplate.simulator.geometry.artefacts import GridSettings
 from ballplate.simulator.geometry.ball_layouts import BallLayout
 from ballplate.simulator.geometry.positions import (
@@ -30,8 +31,6 @@ PICTURES = Path(__file__).resolve().parents[1] / "pictures"
 INK, NOTE, PALE = "#1c2330", "#4d5665", "#8a93a3"
 PROBE, PLATE, WARM = "#0b5cad", "#0f7a52", "#b4430e"
 FILLS = {PLATE: "#dff1e8", PROBE: "#dbe9f8", WARM: "#fbe6da", PALE: "#eef0f3"}
-# Directions on the paper of the machine's x, y and z, for one metre.
-VIEW = np.array([[0.86, 0.17], [0.48, -0.30], [0.0, -0.92]])
 
 Point = Sequence[float] | NDArray[np.float64]
 
@@ -320,72 +319,30 @@ def _axis_block(
     drawing.dimension(place - direction, place + direction, INK)
 
 
-# Boxes of each kind of machine from back to front, in a cube of one metre: what moves it, nothing
-# for what stands still, and its lowest and highest co-ordinates.
-Box = tuple[str, Point, Point]
-TABLE: Box = ("", (0, 0, 0), (1, 1, 0.2))
-RAM: Box = ("z", (0.5, 0.3, 0.35), (0.6, 0.42, 1.25))
-CARRIAGE: Box = ("x", (0.4, 0.3, 0.72), (0.7, 0.42, 0.95))
-BEAM: tuple[Point, Point] = ((0, 0.42, 0.75), (1, 0.6, 0.92))
-LEG, OTHER_LEG = (((x, 0.42, 0.2), (x + 0.12, 0.6, 0.75)) for x in (0.0, 0.88))
-KINDS: dict[str, list[Box]] = {
-    "moving bridge": [TABLE, ("y", *LEG), ("y", *OTHER_LEG), ("y", *BEAM), RAM, CARRIAGE],
-    "fixed bridge": [
-        ("", (0, 0, 0), (1, 1, 0.1)),
-        ("", *LEG),
-        ("", *OTHER_LEG),
-        ("", *BEAM),
-        ("y", (0.18, 0.1, 0.1), (0.82, 0.9, 0.2)),
-        RAM,
-        CARRIAGE,
-    ],
-    "gantry": [
-        *(("", (0, y, 0), (0.12, y + 0.1, 0.6)) for y in (0.9, 0.0)),
-        ("", (0, 0, 0.6), (0.12, 1, 0.72)),
-        ("", (0.88, 0.9, 0), (1, 1, 0.6)),
-        ("y", (0, 0.42, 0.72), (1, 0.6, 0.92)),
-        ("", (0.88, 0, 0.6), (1, 1, 0.72)),
-        ("", (0.88, 0, 0), (1, 0.1, 0.6)),
-        ("z", (0.5, 0.3, 0.25), (0.6, 0.42, 1.25)),
-        CARRIAGE,
-    ],
-    "cantilever": [TABLE, ("y", *LEG), ("y", *BEAM), RAM, CARRIAGE],
-    "horizontal arm": [
-        ("", (0, 0, 0), (1, 1, 0.1)),
-        ("y", (0.02, 0.35, 0.1), (0.2, 0.6, 1.2)),
-        ("z", (0, 0.25, 0.4), (0.24, 0.35, 0.85)),
-        ("x", (0, 0.15, 0.62), (0.85, 0.25, 0.73)),
-    ],
-    "column": [
-        ("", (0, 0, 0), (1, 1, 0.1)),
-        ("", (0.4, 0.75, 0.1), (0.65, 0.95, 1.2)),
-        ("y", (0.2, 0.05, 0.1), (0.8, 0.7, 0.2)),
-        ("x", (0.1, 0.15, 0.2), (0.9, 0.6, 0.3)),
-        ("z", (0.45, 0.5, 0.55), (0.6, 0.75, 0.95)),
-    ],
-}
+COLOURS = {"probe": PROBE, "workpiece": PLATE, "still": PALE}
 
 
 def machines() -> Drawing:
     """Kinds of machines with the axis that moves each part, and which axis carries which."""
     drawing = Drawing(860, 600, "Kinds of machines and which axis carries which")
-    for number, (kind, boxes) in enumerate(KINDS.items()):
+    for number, kind in enumerate(table("kinds")):
         row, column = divmod(number, 3)
         left, top = 15 + 285 * column, 10 + 285 * row
         arrangement = arrangement_of(kind, (1.0, 1.0, 1.0))
         drawing.text((left, top + 20), kind, size=15, weight="bold")
         drawing.text((left, top + 38), f"{arrangement}: {chain_words(arrangement)}", NOTE, 12)
         volume = Volume(drawing, (left + 20, top + 225), 130)
-        chain = ARRANGEMENTS[arrangement]
-        for axis, low, high in boxes:
-            colour = PLATE if axis in chain.workpiece_side else PROBE if axis else PALE
-            if axis == chain.probe_side[-1]:
-                _stylus(volume, np.array([low, high], float), axis)
-            _box(volume, np.array([low, high], float), colour)
-        for axis, low, high in boxes:
-            wide, tall = np.subtract(high, low)[[0, 2]]
-            place = low + np.array([min(wide / 2, 0.12), 0, min(tall / 2, 0.12)])
-            drawing.text(volume.at(place) + np.array([0.0, 5.0]), axis, INK, 14, "middle", "bold")
+        for shape in machine_shapes(kind):
+            points = [volume.at(point) for point in shape.points]
+            if shape.role == "stylus":
+                drawing.line(points, WARM, 2)
+                drawing.circle(points[1], 4, WARM, INK)
+            elif shape.role == "letter":
+                drawing.text(
+                    points[0] + np.array([0.0, 5.0]), shape.text, INK, 14, "middle", "bold"
+                )
+            else:
+                drawing.area(points, COLOURS[shape.role], 1)
     drawing.text(
         (20, 588),
         "A letter is the axis that moves the part: blue parts carry the probe, green ones the"
@@ -394,26 +351,6 @@ def machines() -> Drawing:
         12,
     )
     return drawing
-
-
-def _stylus(volume: Volume, ends: NDArray[np.float64], axis: str) -> None:
-    """A stylus at the lower end of a ram, or at the upper one of an arm."""
-    start = ends.mean(axis=0)
-    moved = "xyz".index(axis)
-    start[moved] = ends[int(axis == "x"), moved]
-    tip = start + (0.12 if axis == "x" else -0.12) * np.eye(3)[moved]
-    volume.drawing.line([volume.at(start), volume.at(tip)], WARM, 2)
-    volume.drawing.circle(volume.at(tip), 4, WARM, INK)
-
-
-def _box(volume: Volume, ends: NDArray[np.float64], colour: str) -> None:
-    """The front, right and upper face of a box."""
-    for normal, end in ((1, 0), (0, 1), (2, 1)):
-        one, other = sorted({0, 1, 2} - {normal})
-        corners = np.tile(ends[end], (4, 1))
-        corners[:, one] = ends[[0, 1, 1, 0], one]
-        corners[:, other] = ends[[0, 0, 1, 1], other]
-        volume.drawing.area([volume.at(corner) for corner in corners], colour, 1)
 
 
 def uncertainties() -> Drawing:

@@ -4,17 +4,14 @@ at a terminal.
 
 from __future__ import annotations
 
-import shlex
 import sys
 from argparse import ArgumentParser, Namespace
 from collections.abc import Callable
-from math import ceil
 
 from ballplate.cli import UsageError, argument_type
-from ballplate.simulator.experiment import Experiment, load
 
-from .data_sheet import NEEDED, READERS, DataSheet, data_sheet
-from .draft import draft
+from .checked_draft import checked_draft
+from .data_sheet import NEEDED, READERS, data_sheet
 from .machine_tables import table
 
 
@@ -53,38 +50,10 @@ def drafted(options: Namespace) -> tuple[str, str] | None:
     for name in wanted:
         texts[name] = _answer(name, texts, options)
     try:
-        return _draft(options, data_sheet(texts), texts)
+        text, command, _ = checked_draft(options.file, data_sheet(texts), texts)
+        return text, command
     except ValueError as error:
         raise UsageError(str(error)) from None
-
-
-def _draft(options: Namespace, sheet: DataSheet, texts: dict[str, str]) -> tuple[str, str]:
-    """Return the text of the file, as the file format allows it, and the next command.
-
-    :raises ValueError: the plate and the hours do not go with the machine.
-    """
-    chosen = options.file.with_name(f"{options.file.stem}-chosen.yaml")
-    plan = ["ballplate", "plan", options.file, "--hours", f"{sheet.hours:g}", "-o", chosen]
-    command = shlex.join(map(str, plan))
-    text = draft(sheet, texts, command)
-    (experiment,) = load(options.file, planning=True, text=text)
-    least = _least_hours(experiment)
-    if sheet.hours < least:
-        raise ValueError(
-            f"{sheet.hours:g} h is too short: three positions with a change of plane take"
-            f" {ceil(10 * least) / 10:g} h; give more"
-        )
-    return text, command
-
-
-def _least_hours(experiment: Experiment) -> float:
-    """Return the hours of the three quickest positions with a change of plane; fewer positions, or
-    those of one plane, leave something undetermined.
-    """
-    pool = experiment.pool
-    assert pool is not None
-    quickest = sorted(candidate.seconds for candidate in pool.candidates)[:3]
-    return (sum(quickest) + pool.changes.plane) / 3600
 
 
 def _answer(name: str, texts: dict[str, str], options: Namespace) -> str:
@@ -107,7 +76,7 @@ def _answer(name: str, texts: dict[str, str], options: Namespace) -> str:
             if "plate" in stated:
                 _ = sheet.places
             if name == "hours":
-                _draft(options, sheet, stated)
+                checked_draft(options.file, sheet, stated)
         except ValueError as error:
             print(error, file=sys.stderr)
         else:

@@ -1,0 +1,44 @@
+"""A drafted file as `ballplate init` writes it, checked as the file format allows it."""
+
+from __future__ import annotations
+
+import shlex
+from collections.abc import Mapping
+from math import ceil
+from pathlib import Path
+
+from ballplate.simulator.experiment import Experiment, load
+
+from .data_sheet import DataSheet
+from .draft import draft
+
+
+def checked_draft(
+    path: Path, sheet: DataSheet, texts: Mapping[str, str]
+) -> tuple[str, str, Experiment]:
+    """Return the text of a file, the next command, and the experiment.
+
+    :raises ValueError: the plate and the hours do not go with the machine.
+    """
+    chosen = path.with_name(f"{path.stem}-chosen.yaml")
+    plan = ["ballplate", "plan", path, "--hours", f"{sheet.hours:g}", "-o", chosen]
+    command = shlex.join(map(str, plan))
+    text = draft(sheet, texts, command)
+    (experiment,) = load(path, planning=True, text=text)
+    least = _least_hours(experiment)
+    if sheet.hours < least:
+        raise ValueError(
+            f"{sheet.hours:g} h is too short: three positions with a change of plane take"
+            f" {ceil(10 * least) / 10:g} h; give more"
+        )
+    return text, command, experiment
+
+
+def _least_hours(experiment: Experiment) -> float:
+    """Return the hours of the three quickest positions with a change of plane; fewer positions, or
+    those of one plane, leave something undetermined.
+    """
+    pool = experiment.pool
+    assert pool is not None
+    quickest = sorted(candidate.seconds for candidate in pool.candidates)[:3]
+    return (sum(quickest) + pool.changes.plane) / 3600
