@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from ballplate.extensions.certificates.interface import certificate
     from ballplate.extensions.compensation.interface import compensation, read_compensation
     from ballplate.extensions.drafting.interface import design
+    from ballplate.extensions.information.interface import information
     from ballplate.extensions.judgement.interface import budget, compare_models, validate
     from ballplate.extensions.laboratory.interface import read_report
     from ballplate.extensions.maps.interface import (
@@ -135,6 +136,7 @@ __all__ = [
     "experiment",
     "fit",
     "in_processes",
+    "information",
     "lay_out",
     "lengths",
     "linear_functions",

@@ -27,6 +27,17 @@ SHIPPED = (
         sections={"assumptions": "sections"},
     ),
     _here(
+        "information",
+        commands={
+            "run --errors": Command(
+                "errors_command",
+                "how much of each error's information goes with each position",
+            ),
+        },
+        functions=_from("interface", "information"),
+        services=_from("position_information", "position_information"),
+    ),
+    _here(
         "requirements",
         commands={
             "reach": Command(

@@ -15,6 +15,7 @@ if TYPE_CHECKING:
         effects,
         independent_mixture,
         length,
+        moved_positions,
         null_changes,
         relative_changes,
         verdict,

@@ -500,11 +500,7 @@ def in_words(direction: Direction) -> str:
     for artefact in direction.artefacts:
         parts.append(f"{artefact.name} {artefact.words} (balls by up to {length(artefact.peak)})")
     if direction.positions:
-        described = [_position_words(part) for part in direction.positions[:6]]
-        more = len(direction.positions) - len(described)
-        parts.append(
-            "moved positions: " + ", ".join(described) + (f" and {more} more" if more > 0 else "")
-        )
+        parts.append(f"moved positions: {moved_positions(direction)}")
     if direction.probes:
         parts.append(
             "offsets of probes: "
@@ -533,6 +529,13 @@ def in_words(direction: Direction) -> str:
             f" {length(direction.limit)} at {direction.beyond} points)"
         )
     return "; ".join(parts) + f": {end}"
+
+
+def moved_positions(direction: Direction) -> str:
+    """Return the motions of positions along a direction as text, of at most six; may be empty."""
+    described = [_position_words(part) for part in direction.positions[:6]]
+    more = len(direction.positions) - len(described)
+    return ", ".join(described) + (f" and {more} more" if more > 0 else "")
 
 
 def _function_words(part: FunctionPart) -> str:

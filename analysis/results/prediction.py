@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import numpy as np
 from ballplate.presentation.formatting import Data
 from ballplate.simulator.design.arrays import Design
-from ballplate.simulator.inputs.extensions import optional_service
+from ballplate.simulator.inputs.extensions import optional_service, service
 from ballplate.simulator.inputs.settings import hint, number_of
 
 from ..presentation.formatting import given
@@ -41,6 +41,7 @@ from .text_blocks import (
 )
 
 if TYPE_CHECKING:
+    import pandas
     from ballplate.simulator.experiment.model import Experiment
     from matplotlib.figure import Figure
 
@@ -90,6 +91,16 @@ class Prediction(Result):
             return None
         effects = optional_service("assumption_effects")
         return None if effects is None else effects(self.experiment, lengths)
+
+    @cached_property
+    def information(self) -> pandas.DataFrame:
+        """Part of each error's information that goes with each position: a row for each error, a
+        column for each position; `ballplate.information` has more.
+
+        :raises MissingExtensionError: the extension that computes it is not installed.
+        """
+        frame: pandas.DataFrame = service("position_information")(self).frame()
+        return frame
 
     @property
     def tasks(self) -> tuple[TaskUncertainty, ...]:

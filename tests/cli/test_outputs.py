@@ -127,6 +127,7 @@ WALK = {
         {},
         also=("balls.csv",),
     ),
+    "run --errors": Walk(EXPERIMENT, {}, also=("balls.csv",)),
     "next": Walk(
         EXPERIMENT | {"READINGS": "readings.csv", "--watch": "."}, {}, also=("balls.csv",)
     ),

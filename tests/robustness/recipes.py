@@ -36,6 +36,8 @@ RECIPES = (
     "'run --lengths' small.yaml --grid 3 -o out.csv --pairs pairs.csv",
     "'run --lengths' tables.yaml --grid 3,2,2 --target '1 um + L/100000' --probe right --json",
     "'run --lengths' small.yaml --grid 2 --plot out.svg --coverage-factor 2 --with-repeatability --fail",
+    "'run --errors' small.yaml",
+    "'run --errors' tables.yaml --json",
     "'run --reliability' small.yaml -o out.csv --all",
     "'run --reliability' tables.yaml --false-alarm 1% --power 90% --sigma given --json",
     "simulate small.yaml -o out.csv --certificate certificate.csv --seed 4",
