@@ -128,12 +128,12 @@ class PositionInformation(Result):
         for start in range(0, len(self.positions), SIDE_BY_SIDE):
             stop = min(start + SIDE_BY_SIDE, len(self.positions))
             lines += ["", *self._table(range(start, stop))]
-        cells, legend = range(len(self.positions)), [""]
+        cells, legend = range(len(self.positions)), list(self._hidden())
         if any(error.is_lost(k) for error in self.errors for k in cells):
-            legend += ["all: without the position, the error is undetermined"]
+            legend.insert(0, "all: without the position, the error is undetermined")
         if any(error.is_undetermined for error in self.errors):
-            legend += ["-: the error is undetermined with all positions"]
-        return [*lines, *legend, *self._hidden()]
+            legend.insert(0, "-: the error is undetermined with all positions")
+        return [*lines, *([""] if legend else []), *legend]
 
     def _table(self, chosen: range) -> list[str]:
         positions = [self.positions[k] for k in chosen]
