@@ -106,15 +106,17 @@ def with_experiment(
     """Return the text of an experiment's file with the changes of the experiment; values that a
     variant inherits are changed for that variant alone.
 
-    `needed` are the edits, if known, and `extra` further changes.
+    `needed` are the edits, if known, and `extra` further changes. An experiment that was loaded
+    with its faults may have some afterwards.
 
     :raises ExperimentError: writing would change neighbouring text, or text that aliases refer to.
     """
+    is_tolerant = experiment.faults is not None
     before = {experiment.name: experiment}
     if experiment.name is not None:
         before = {
             variant_experiment.name: variant_experiment
-            for variant_experiment in load(source, True, experiment.trust, text)
+            for variant_experiment in load(source, True, experiment.trust, text, is_tolerant)
         }
     # A variant with more entries of a list has a list of its own, in which the others are changed.
     changes = sorted(
@@ -131,7 +133,7 @@ def with_experiment(
     new = with_text_changes(text, source, experiment.name, changes)
     after = {
         variant_experiment.name: variant_experiment
-        for variant_experiment in load(source, True, experiment.trust, new)
+        for variant_experiment in load(source, True, experiment.trust, new, is_tolerant)
     }
     others_differ = before.keys() != after.keys() or any(
         to_python(before[name].tree) != to_python(variant_experiment.tree)

@@ -19,10 +19,10 @@ from ballplate.extensions.repair.mending import (
 )
 from ballplate.extensions.repair.placing import middle_of
 from ballplate.extensions.repair.positions import with_added
-from ballplate.extensions.repair.written import Edit, position_settings
+from ballplate.extensions.repair.written import Edit
 from ballplate.extensions.repair.yamltext import TextChange
 from ballplate.simulator.experiment import Experiment, Position, ReadingGroup
-from ballplate.simulator.geometry import QUARTER_TURNS, Pose, plane_rotation
+from ballplate.simulator.geometry import QUARTER_TURNS, Pose, ball_coordinates, plane_rotation
 from ballplate.simulator.inputs import ExperimentError, Steps, parse_tree, to_python
 from ballplate.simulator.machines import Array
 
@@ -99,7 +99,7 @@ def _stood(document: DesignDocument, action: Arguments) -> str:
 def _posed(
     document: DesignDocument, name: str, pose: Callable[[Experiment, Position], Pose]
 ) -> str:
-    experiment = experiment_of(document, planning=True)
+    experiment = experiment_of(document, planning=True, tolerant=True)
     place = _position(experiment, name)
     position_pose = pose(experiment, place)
     origin = np.round(position_pose.origin / STEP) * STEP
@@ -116,7 +116,7 @@ def _about_middle(experiment: Experiment, place: Position, rotation: Array) -> P
 
 def _copied(document: DesignDocument, action: Arguments) -> str:
     """Copy a position at its location."""
-    experiment = experiment_of(document, planning=True)
+    experiment = experiment_of(document, planning=True, tolerant=True)
     new = with_added(experiment, _position(experiment, str(action["position"])))
     return with_experiment(document.text, document.path, experiment, new)
 
@@ -130,7 +130,7 @@ def _added(document: DesignDocument, action: Arguments) -> str:
 def _repaired(document: DesignDocument, action: Arguments) -> str:
     """Apply the edits of a suggested repair to the file."""
     text = document.text
-    experiment = experiment_of(document, planning=True)
+    experiment = experiment_of(document, planning=True, tolerant=True)
     needed = [
         Edit(_steps(edit["path"]), _plain(edit["value"]), bool(edit["is_new"]))
         for edit in action["edits"]
@@ -141,8 +141,83 @@ def _repaired(document: DesignDocument, action: Arguments) -> str:
 
 def _removed(document: DesignDocument, action: Arguments) -> str:
     """The design without a position."""
-    steps = _place_of(document, str(action["position"]))
+    steps, count = _place_of(document, str(action["position"]))
+    if count == 1:
+        return _with(document, [TextChange(("positions",), [])])
     return _with(document, [TextChange(steps, kind="remove")])
+
+
+def _switched_off(document: DesignDocument, action: Arguments) -> str:
+    """A position stays in the file, and is not read."""
+    steps, _ = _place_of(document, str(action["position"]))
+    return _with(document, [TextChange((*steps, "enabled"), False)])
+
+
+def _switched_on(document: DesignDocument, action: Arguments) -> str:
+    """A position that was switched off is read again."""
+    steps, _ = _place_of(document, str(action["position"]))
+    return _with(document, [TextChange((*steps, "enabled"), kind="remove")])
+
+
+def _put(document: DesignDocument, action: Arguments) -> str:
+    """A further position with the middle of its balls at a point, like the one that is named or
+    the last one, or else across z with all balls and probes.
+    """
+    at = _vector(action["at"])
+    experiment = experiment_of(document, planning=True, tolerant=True)
+    if len(at) != experiment.dimension:
+        raise ActionError(f"at has {len(at)} co-ordinates in {experiment.dimension} dimensions")
+    name = action.get("like")
+    if name is None and not experiment.positions:
+        new = _whole(experiment)
+    else:
+        new = experiment.positions[-1] if name is None else _position(experiment, str(name))
+    middle = middle_of(experiment.layouts[new.artefact])[: len(at)]
+    origin = np.round((at - new.pose.rotation @ middle) / STEP) * STEP
+    pose = Pose(new.pose.rotation, np.round(origin, 9) + 0.0)
+    added = with_added(experiment, replace(new, pose=pose, enabled=True))
+    return with_experiment(document.text, document.path, experiment, added)
+
+
+def _whole(experiment: Experiment) -> Position:
+    """Return a position of the first artefact with all its balls and probes."""
+    for artefact, layout in experiment.layouts.items():
+        d, every = experiment.dimension, np.arange(len(layout.names))
+        group = ReadingGroup(tuple(experiment.probes), layout.names, every, 1)
+        return Position("position", artefact, Pose(np.eye(d), np.zeros(d)), (group,))
+    raise ActionError("no artefact to put there; add one")
+
+
+def _fitted(document: DesignDocument, action: Arguments) -> str:
+    """All positions moved so that they fill the volume as they filled the space that they take."""
+    experiment = experiment_of(document, planning=True, tolerant=True)
+    enabled = [place for place in experiment.positions if place.enabled]
+    if not enabled:
+        raise ActionError("no position to fit")
+    ends = np.array([_ends(experiment, place) for place in enabled])
+    lowest, highest = ends[:, 0].min(axis=0), ends[:, 1].max(axis=0)
+    volume, new = experiment.machine.volume, experiment
+    for place, (low, high) in zip(enabled, ends, strict=True):
+        was_free = (highest - lowest) - (high - low)
+        is_free = np.maximum((volume.upper - volume.lower) - (high - low), 0.0)
+        share = np.where(was_free > STEP, (low - lowest) / np.maximum(was_free, STEP), 0.5)
+        by = volume.lower + share * is_free - low
+        origin = np.round((place.pose.origin + by) / STEP) * STEP
+        new = with_pose(new, place.name, Pose(place.pose.rotation, np.round(origin, 9) + 0.0))
+    return with_experiment(document.text, document.path, experiment, new)
+
+
+def _ends(experiment: Experiment, place: Position) -> Array:
+    """Return the lowest and the highest scale readings (2, d) of a position."""
+    balls = ball_coordinates(place.pose, experiment.layouts[place.artefact])
+    readings = np.concatenate(
+        [
+            balls[group.ball_indices] - experiment.probes[probe].offset
+            for group in place.readings
+            for probe in group.probes
+        ]
+    )
+    return np.array([readings.min(axis=0), readings.max(axis=0)])
 
 
 def _read_with(document: DesignDocument, action: Arguments) -> str:
@@ -154,7 +229,7 @@ def _read_with(document: DesignDocument, action: Arguments) -> str:
 def _read_balls(document: DesignDocument, action: Arguments) -> str:
     """Other balls of a position read, all with the same probes."""
     names = tuple(str(ball) for ball in action["balls"])
-    experiment = experiment_of(document, planning=True)
+    experiment = experiment_of(document, planning=True, tolerant=True)
     place = _position(experiment, str(action["position"]))
     every = experiment.layouts[place.artefact].names
     unknown = [name for name in names if name not in every]
@@ -170,7 +245,7 @@ def _read_balls(document: DesignDocument, action: Arguments) -> str:
 def _with_groups(
     document: DesignDocument, action: Arguments, change: Callable[[ReadingGroup], ReadingGroup]
 ) -> str:
-    experiment = experiment_of(document, planning=True)
+    experiment = experiment_of(document, planning=True, tolerant=True)
     place = _position(experiment, str(action["position"]))
     if len(place.readings) > 1:
         text = f'position "{place.name}" has several groups of readings; change them in the text'
@@ -219,21 +294,14 @@ def _position(experiment: Experiment, name: str) -> Position:
     raise ActionError(f'no position "{name}"')
 
 
-def _place_of(document: DesignDocument, name: str) -> Steps:
-    settings = to_python(experiment_of(document, planning=True).tree)
-    for i, entry in enumerate(settings["positions"]):
-        if str(entry["name"]) == name:
-            return ("positions", i)
+def _place_of(document: DesignDocument, name: str) -> tuple[Steps, int]:
+    """Return the path of a position, and the number of positions."""
+    tree = to_python(experiment_of(document, planning=True, tolerant=True).tree)
+    entries = tree.get("positions") or ()
+    for i, entry in enumerate(entries):
+        if isinstance(entry, Mapping) and str(entry.get("name")) == name:
+            return ("positions", i), len(entries)
     raise ActionError(f'no position "{name}"')
-
-
-def settings_of(document: DesignDocument, name: str) -> dict[str, Any]:
-    """Return a position in the form of a file.
-
-    :raises ActionError: there is no such position.
-    """
-    experiment = experiment_of(document, planning=True)
-    return position_settings(experiment, _position(experiment, name))
 
 
 def _vector(value: Any) -> Array:
@@ -267,6 +335,10 @@ ACTIONS: Mapping[str, Callable[[DesignDocument, Arguments], str]] = {
     "add": _added,
     "repair": _repaired,
     "remove": _removed,
+    "off": _switched_off,
+    "on": _switched_on,
+    "put": _put,
+    "fit": _fitted,
     "probes": _read_with,
     "balls": _read_balls,
     "set": _set,

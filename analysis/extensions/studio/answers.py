@@ -4,6 +4,7 @@ directions.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from time import perf_counter
 from typing import Any
 
@@ -56,7 +57,6 @@ def answer(experiment: Experiment) -> dict[str, Any]:
     lengths = quantities.get("U6")
     return {
         **picked(experiment, "title", "label"),
-        "scene": _scene(experiment),
         "rank": {
             "words": rank_words(judged),
             **picked(judged, "deficiency", "expected", "parameters", "observations"),
@@ -96,7 +96,10 @@ def _row(quantity: Quantity) -> Data:
     }
 
 
-def _scene(experiment: Experiment) -> dict[str, Any]:
+def scene(experiment: Experiment, problems: Mapping[str, str]) -> dict[str, Any]:
+    """Return the volume and all positions, with what is wrong with some by their names, as plain
+    data in metres.
+    """
     volume = experiment.machine.volume
     return {
         "dimension": experiment.dimension,
@@ -104,7 +107,10 @@ def _scene(experiment: Experiment) -> dict[str, Any]:
         "upper": volume.upper.tolist(),
         "probes": {name: entry.offset.tolist() for name, entry in experiment.probes.items()},
         "artefacts": {name: list(entry.names) for name, entry in experiment.layouts.items()},
-        "positions": [place_data(experiment, place) for place in experiment.positions],
+        "positions": [
+            place_data(experiment, place) | {"problem": problems.get(place.name)}
+            for place in experiment.positions
+        ],
     }
 
 
@@ -115,7 +121,7 @@ def place_data(experiment: Experiment, place: Position) -> Data:
     is_read = np.zeros(len(layout.names), bool)
     is_read[place.balls] = True
     return {
-        **picked(place, "name", "artefact"),
+        **picked(place, "name", "artefact", "enabled"),
         "probes": list(place.probes),
         "groups": len(place.readings),
         "readings": place.count,
@@ -172,6 +178,7 @@ def _motions(
     numbers = np.arange(len(first)) - first
     return {
         "nodes": NODES,
+        "names": list(design.positions.names),
         "position": of_plates.position.tolist(),
         "ball": numbers[of_plates.ball].tolist(),
         "directions": motions,

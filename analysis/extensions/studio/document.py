@@ -72,12 +72,14 @@ def opened(path: Path, variant: str | None = None, trust: Trust = OPENED) -> Des
     return DesignDocument(path, variant, utf8_text(content, str(path)), content, trust)
 
 
-def experiment_of(document: DesignDocument, planning: bool = False) -> Experiment:
-    """Return the experiment of the text.
+def experiment_of(
+    document: DesignDocument, planning: bool = False, tolerant: bool = False
+) -> Experiment:
+    """Return the experiment of the text, for `tolerant` with its faults, to be changed and drawn.
 
     :raises ExperimentError: the text is invalid, or has no such variant.
     """
-    experiments = load(document.path, planning, document.trust, document.text)
+    experiments = load(document.path, planning, document.trust, document.text, tolerant)
     for experiment in experiments:
         if experiment.name == document.variant or len(experiments) == 1:
             return experiment
@@ -94,9 +96,9 @@ def data_of(document: DesignDocument) -> Any:
 
 
 def variants_of(document: DesignDocument) -> tuple[str, ...]:
-    """Return the names of the text's variants; empty for an invalid text."""
+    """Return the names of the text's variants; empty for a text that cannot be understood."""
     try:
-        experiments = load(document.path, True, document.trust, document.text)
+        experiments = load(document.path, True, document.trust, document.text, tolerant=True)
     except ExperimentError:
         return ()
     return tuple(experiment.name for experiment in experiments if experiment.name is not None)

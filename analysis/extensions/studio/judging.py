@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import multiprocessing
 import os
-from collections.abc import Callable
+import re
+from collections.abc import Callable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from multiprocessing.connection import Connection
@@ -12,16 +13,23 @@ from multiprocessing.process import BaseProcess
 from typing import Any
 
 from ballplate.simulator.computing import begin_worker, interruptions_blocked
+from ballplate.simulator.experiment import Experiment
 from ballplate.simulator.inputs import ExperimentError, Message, refused, to_python
 
-from .answers import answer, later_answer
+from .answers import answer, later_answer, scene
 from .document import DesignDocument, data_of, experiment_of, variants_of
+
+# A position in the path of a message, by its number.
+POSITION = re.compile(r"positions\[(\d+)\]")
 
 
 @dataclass(frozen=True)
 class DesignJudgement:
-    """View of a document's text; without an `answer` for an invalid one."""
+    """View of a document's text: its `scene`, None for a text that cannot be understood, and the
+    `answer` to what of it can be evaluated, if anything.
+    """
 
+    scene: dict[str, Any] | None
     answer: dict[str, Any] | None
     messages: tuple[Message, ...]
     data: Any
@@ -29,30 +37,75 @@ class DesignJudgement:
 
 
 def judgement(document: DesignDocument) -> DesignJudgement:
-    """Return the view of a document, or faults of its text."""
+    """Return the view of a document, and faults of its text."""
     variants = variants_of(document) if document.variant else ()
     try:
-        experiment = experiment_of(document)
-        data = answer(experiment)
+        draft = experiment_of(document, tolerant=True)
     except ExperimentError as error:
-        return DesignJudgement(None, error.messages, data_of(document), variants)
-    return DesignJudgement(data, (), to_python(experiment.tree), variants)
+        return DesignJudgement(None, None, error.messages, data_of(document), variants)
+    messages, data = draft.faults or (), to_python(draft.tree)
+    found = None
+    try:
+        found = answer(evaluable(draft))
+    except ExperimentError as error:
+        messages = tuple(dict.fromkeys((*messages, *error.messages)))
+    seen = scene(draft, _problems(draft))
+    return DesignJudgement(seen, found, messages, data, variants)
+
+
+def evaluable(draft: Experiment) -> Experiment:
+    """Return the experiment without the positions that have faults.
+
+    :raises ExperimentError: something else is wrong too, or nothing is left.
+    """
+    entries = to_python(draft.tree).get("positions") or ()
+    drawn = {place.name for place in draft.positions}
+    changes: dict[str, Any] = {}
+    # From the last on: what is taken out changes the numbers of those after it.
+    for i in sorted(_faulty(draft), reverse=True):
+        name = entries[i].get("name") if isinstance(entries[i], Mapping) else None
+        if str(name) in drawn:
+            changes[f"positions[{i}].enabled"] = False
+        else:
+            changes[f"positions[{i}]"] = None
+    return draft.with_(changes)
+
+
+def _faulty(draft: Experiment) -> dict[int, str]:
+    """Return the first fault of each position that has any, by its number."""
+    faults: dict[int, str] = {}
+    for message in draft.faults or ():
+        if found := POSITION.match(message.path):
+            faults.setdefault(int(found[1]), message.text)
+    return faults
+
+
+def _problems(draft: Experiment) -> dict[str, str]:
+    entries = to_python(draft.tree).get("positions") or ()
+    return {
+        str(entries[i].get("name")): text
+        for i, text in _faulty(draft).items()
+        if isinstance(entries[i], Mapping)
+    }
 
 
 def figures(document: DesignDocument) -> dict[str, Any]:
-    """Return the answer to a document.
+    """Return the scene of a document and the answer to what of it can be evaluated.
 
-    :raises ExperimentError: its text is invalid.
+    :raises ExperimentError: nothing can.
     """
-    return answer(experiment_of(document))
+    judged = judgement(document)
+    if judged.answer is None:
+        raise ExperimentError(judged.messages)
+    return {**judged.answer, "scene": judged.scene}
 
 
 def later(document: DesignDocument) -> dict[str, Any]:
     """Return the source of scale of a document's design, and its assumptions.
 
-    :raises ExperimentError: its text is invalid.
+    :raises ExperimentError: nothing of it can be evaluated.
     """
-    return later_answer(experiment_of(document))
+    return later_answer(evaluable(experiment_of(document, tolerant=True)))
 
 
 class Judge:

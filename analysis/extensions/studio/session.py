@@ -5,6 +5,7 @@ from __future__ import annotations
 import secrets
 import time
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 from threading import RLock
@@ -13,7 +14,7 @@ from typing import Any
 from ballplate.presentation import Data, picked
 from ballplate.simulator.inputs import OPENED, UNKNOWN, ExperimentError, Message, refused
 
-from .actions import ActionError, done, settings_of
+from .actions import ActionError, done
 from .document import (
     ChangedOnDiskError,
     DesignDocument,
@@ -26,7 +27,7 @@ from .document import (
     variants_of,
 )
 from .jobs import JOBS, MOST_RUNNING, Job, started
-from .judging import DesignJudgement, Judge, figures, judgement, later
+from .judging import POSITION, DesignJudgement, Judge, figures, judgement, later
 from .recovery import give_up, keep, recovered
 
 ENDINGS = (".yaml", ".yml")
@@ -74,12 +75,13 @@ class Session:
         if variant is None:
             document = _with_first_variant(document)
         self._kept: dict[str, Any] | None = None
-        self._off: dict[str, dict[str, Any]] = {}
         self._jobs: dict[int, Job] = {}
         self.revision = 0
         self._judge, self._aside, self._asked = Judge(), Judge(), 0
         self._answer: dict[str, Any] | None = None
-        self._judgement = DesignJudgement(None, (), None, ())
+        self._scene: dict[str, Any] | None = None
+        self._burst: tuple[Any, ...] = ()
+        self._judgement = DesignJudgement(None, None, (), None, ())
         self._document = document
         self._begin()
 
@@ -92,7 +94,6 @@ class Session:
         with self._lock:
             document, answer, judged = self._document, self._answer, self._judgement
             pending = self._judge.is_busy
-            there = {entry["name"] for entry in answer["scene"]["positions"]} if answer else set()
             return {
                 "session": self.name,
                 "revision": self.revision,
@@ -107,10 +108,10 @@ class Session:
                 "forward": len(document.forward),
                 "messages": []
                 if pending
-                else [_message_data(message) for message in judged.messages],
+                else [_message_data(message, judged.data) for message in judged.messages],
                 "pending": pending,
-                "design": answer,
-                "off": [name for name in self._off if name not in there],
+                "design": self._scene and {**(answer or {}), "scene": self._scene},
+                "stale": judged.answer is None,
                 "kept": self._kept,
                 "files": [file.name for file in self._files()],
                 "jobs": list(JOBS),
@@ -150,10 +151,16 @@ class Session:
         with self._lock:
             self._ensure_seen(action)
             control = self._controls().get(str(action.get("do")))
+            burst = (action.get("do"), action.get("position"), bool(action.get("burst")))
             if control is None:
-                self._become(done(self._document, action))
+                document = done(self._document, action)
+                if burst[-1] and burst[:2] == self._burst[:2]:
+                    # Moves by one key after another are one step back.
+                    document = replace(document, back=self._document.back)
+                self._become(document)
             else:
                 control(action)
+            self._burst = burst
 
     def preview(self, action: Mapping[str, Any]) -> dict[str, Any]:
         """Return the view of the design after an action, without the change.
@@ -240,8 +247,6 @@ class Session:
             "save": self._save,
             "open": self._open,
             "reopen": lambda action: self._become(reopened(self._document)),
-            "off": self._switch_off,
-            "on": self._switch_on,
         }
 
     def _ensure_seen(self, action: Mapping[str, Any]) -> None:
@@ -260,7 +265,7 @@ class Session:
         """
         last, self._document = self._document, document
         if (document.path, document.variant) != (last.path, last.variant):
-            self._answer = None
+            self._answer = self._scene = None
         self.revision += 1
         self.note = ""
         keep(document, self.name)
@@ -291,6 +296,7 @@ class Session:
         if result is not None:
             self._judgement = result
             self._answer = result.answer or self._answer
+            self._scene = result.scene or self._scene
 
     def _computed(self, work: Callable[[DesignDocument], Any], document: DesignDocument) -> Any:
         """Return the result for a document that is not evaluated in the view; further such
@@ -321,24 +327,10 @@ class Session:
         self._await()
         if self._judge.is_busy:
             raise RefusedError("the results are being computed; wait for them")
-        if self._judgement.messages:
-            raise RefusedError("the text is invalid; correct it before keeping the design")
+        if self._judgement.answer is None:
+            raise RefusedError("there are no figures of this design; correct it before keeping it")
         self._kept = None if action.get("off") else self._answer
         self.revision += 1
-
-    def _switch_off(self, action: Mapping[str, Any]) -> None:
-        """Remove a position, and remember its text."""
-        name, document = str(action.get("position")), self._document
-        settings = settings_of(document, name)
-        self._become(done(document, {"do": "remove", "position": name}))
-        self._off[name] = settings
-
-    def _switch_on(self, action: Mapping[str, Any]) -> None:
-        name = str(action.get("position"))
-        if name not in self._off:
-            raise RefusedError(f'no position "{name}" was switched off')
-        self._become(done(self._document, {"do": "add", "settings": self._off[name]}))
-        del self._off[name]
 
     def _save(self, action: Mapping[str, Any]) -> None:
         name = action.get("name")
@@ -366,7 +358,7 @@ class Session:
         is_left = document.path.name == before.path.name
         document, note = (document, "") if is_left else recovered(document, self.name)
         self._become(_with_first_variant(document))
-        self._kept, self._off, self.note = None, {}, note
+        self._kept, self.note = None, note
         if not is_left:
             give_up(before, self.name)
 
@@ -402,10 +394,14 @@ def _with_first_variant(document: DesignDocument) -> DesignDocument:
     return replace(document, variant=names[0] if names else None)
 
 
-def _message_data(message: Message) -> Data:
-    return {
-        **picked(message, "line", "column", "path", "text"),
-    }
+def _message_data(message: Message, data: Any) -> Data:
+    """Return a message as plain data; it is about `what`, a position by its name."""
+    found, path = POSITION.match(message.path), message.path
+    with suppress(LookupError, TypeError):
+        if found:
+            name = data["positions"][int(found[1])]["name"]
+            path = f'position "{name}"{path[found.end() :].replace(".", ", ", 1)}'
+    return {**picked(message, "line", "column", "path", "text"), "what": path}
 
 
 __all__ = ["ActionError", "OutdatedError", "RefusedError", "Session"]

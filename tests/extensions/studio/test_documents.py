@@ -128,21 +128,6 @@ def test_standing_across_another_axis_keeps_the_middle(design):
     assert abs(new.positions[0].pose.rotation[:, 2]) == pytest.approx([1.0, 0.0, 0.0])
 
 
-def test_a_position_that_was_removed_is_put_back_as_it_was(design):
-    from ballplate.extensions.studio.actions import settings_of
-
-    before = opened(design)
-    settings = settings_of(before, "y low")
-    without = done(before, {"do": "remove", "position": "y low"})
-    names = [one.name for one in experiment_of(without).positions]
-    assert names == ["z low", "z high", "x low", "x high", "y high"]
-    after = done(without, {"do": "add", "settings": settings})
-    old, new = experiment_of(before).positions[4], experiment_of(after).positions[-1]
-    assert (new.name, new.probes, new.count) == (old.name, old.probes, old.count)
-    assert (new.pose.rotation == old.pose.rotation).all()
-    assert (new.pose.origin == old.pose.origin).all()
-
-
 def test_balls_and_probes_are_chosen(design):
     document = done(
         opened(design), {"do": "balls", "position": "x low", "balls": ["r5c5", "r1c1", "r1c5"]}

@@ -233,19 +233,23 @@ def test_whatever_a_text_says_the_state_is_an_answer(client, value):
         client.post("/api/do", json={"do": "undo"})
 
 
-def test_positions_that_are_off_are_there_after_a_reload_and_once(client):
-    client.post("/api/do", json={"do": "off", "position": "y low"})
-    state = client.get("/api/state").json()
-    assert state["off"] == ["y low"] and "name: y low" not in state["text"]
+def test_a_position_that_is_off_stays_in_the_file_in_its_order_with_its_comment(client):
+    before = client.get("/api/state").json()
+
+    def enabled(state):
+        return {one["name"]: one["enabled"] for one in state["design"]["scene"]["positions"]}
+
+    state = client.post("/api/do", json={"do": "off", "position": "y low"}).json()
+    assert list(enabled(state)) == list(enabled(before)) and not enabled(state)["y low"]
+    assert state["text"].replace(", enabled: false", "") == before["text"]
+    assert state["design"]["rank"]["observations"] < before["design"]["rank"]["observations"]
     state = client.post("/api/do", json={"do": "undo"}).json()
-    assert state["off"] == [] and "name: y low" in state["text"]
+    assert state["text"] == before["text"]
     client.post("/api/do", json={"do": "redo"})
     state = client.post("/api/do", json={"do": "on", "position": "y low"}).json()
-    assert state["off"] == [] and state["text"].count("name: y low") == 1
-    assert (
-        "was switched off"
-        in client.post("/api/do", json={"do": "on", "position": "y"}).json()["error"]
-    )
+    assert state["text"] == before["text"] and all(enabled(state).values())
+    refused = client.post("/api/do", json={"do": "on", "position": "y"}).json()["error"]
+    assert 'no position "y"' in refused
 
 
 def test_a_page_of_an_earlier_studio_changes_nothing(client, session, design):

@@ -1,5 +1,5 @@
 // The verdict, its figures, what is assumed and what is undetermined.
-import { $, ask, make, micro, page, refocus } from "./page.js";
+import { $, act, ask, make, micro, page, refocus } from "./page.js";
 
 export function legend() {
   const range = page.view.mapRange();
@@ -18,29 +18,34 @@ export function legend() {
 export function figures(design, messages, pending = false) {
   const box = $("verdict");
   const rank = design?.rank;
-  const wrong = messages.length > 0 || pending;
+  const wrong = page.state.stale || pending;
   box.classList.toggle("bad", wrong || rank.deficiency > 0);
+  const left_out = design?.scene.positions.filter((place) => place.problem) ?? [];
   const is_missed = design?.within !== null && design?.within < 1;
   box.classList.toggle("warn", !wrong && !rank.deficiency && is_missed);
   const reason = pending ? "Computing"
     : messages[0]?.line ? "The text is invalid" : "The text cannot be evaluated";
   const expected = rank?.expected ?? 0;
-  const head = wrong ? [make("strong", {}, design
+  const head = wrong ? [make("strong", {}, rank
     ? `${reason}; these are the figures before it.` : `${reason}; there are no figures yet.`)]
     : [make("strong", {}, rank.words),
       rank.deficiency === expected ? "" : ` (the file expects ${expected})`];
-  const figured = design ? [
+  const figured = rank ? [
+    ...(left_out.length && !wrong ? [`of the positions without ${left_out.map((one) => one.name)
+      .join(", ")}, which cannot be read there`] : []),
     `${rank.parameters} parameters, ${rank.observations} observations`,
     // The target's words have U6 in them.
     ...(design.target.length ? design.target : design.headline),
     ...rank.reasons,
   ] : [];
-  box.replaceChildren(make("p", {}, ...head), ...figured.map((text) => make("p", {}, text)));
+  box.replaceChildren(make("p", {}, ...head), ...figured.map((text) => make("p", {}, text)),
+    left_out.length ? make("p", {}, make("button", { id: "fit", onclick: () => act({ do: "fit" }) },
+      "Fit all positions to the volume")) : "");
   $("messages").replaceChildren(...messages.map(message),
     ...(design?.doubts ?? []).map((text) => make("li", {}, text)));
-  if (design) quantities(design);
+  if (rank) quantities(design);
   else $("quantities").replaceChildren();
-  if (design && !wrong) ask_later();
+  if (rank && !wrong) ask_later();
   else {
     $("scale").replaceChildren();
     assumed(null);
@@ -48,10 +53,10 @@ export function figures(design, messages, pending = false) {
   directions(design, messages, pending);
 }
 
-function message({ line, path, text }) {
+function message({ line, path, what, text }) {
   const where = line ? make("button", { class: "link", "data-focus": `line ${line} ${path}`,
     title: "show the line", onclick: () => show_line(line) }, `line ${line}`) : null;
-  return make("li", {}, where, `${path ? `, ${path}` : ""}${line ? ": " : ""}${text}`);
+  return make("li", {}, where, `${what ? `, ${what}` : ""}${line ? ": " : ""}${text}`);
 }
 
 function show_line(line) {
@@ -74,7 +79,7 @@ const MOST_DIRECTIONS = 4; // that are told before a person asks for the others
 function directions(design, messages, pending) {
   const unfolded = $("motions").querySelector("details")?.open;
   $("motions").replaceChildren();
-  const found = design?.motions.directions ?? [];
+  const found = design?.motions?.directions ?? [];
   if (!found.length) return;
   const swing = (index) => {
     page.motion = index === page.motion ? null : index;

@@ -13,28 +13,25 @@ export function choose(name) {
 export function positions() {
   const { state, selected } = page;
   const list = state.design?.scene.positions ?? [];
-  $("positions").replaceChildren(...list.map(item), ...state.off.map((name) =>
-    make("li", { class: "off" },
-      make("input", { type: "checkbox", title: "switch this position on",
-        "aria-label": `read ${name}`, onchange: () => act({ do: "on", position: name }) }),
-      make("span", { class: "swatch" }), make("span", {}, `${name} (off)`),
-    )));
+  $("positions").replaceChildren(...list.map(item));
   const place = list.find((one) => one.name === selected);
   $("position").hidden = !place;
   if (place) details(place);
 }
 
 function item(place, index) {
-  const { name } = place;
+  const { name, enabled, problem } = place;
   const swatch = make("span", { class: "swatch" });
   swatch.style.background = colourOf(index);
-  return make("li", { class: name === page.selected ? "chosen" : "" },
-    make("input", { type: "checkbox", checked: true, title: "switch this position off",
-      "aria-label": `read ${name}`, onchange: () => act({ do: "off", position: name }) }),
+  const look = [name === page.selected && "chosen", !enabled && "off", problem && "wrong"];
+  const does = enabled ? "off" : "on";
+  return make("li", { class: look.filter(Boolean).join(" "), title: problem ?? undefined },
+    make("input", { type: "checkbox", checked: enabled, title: `switch this position ${does}`,
+      "aria-label": `read ${name}`, onchange: () => act({ do: does, position: name }) }),
     swatch,
     make("button", { class: "name", "aria-label": `choose ${name}`, onclick: () => choose(name) },
       name),
-    make("small", { title: "readings" }, `${place.readings}`),
+    make("small", { title: "readings" }, enabled ? `${place.readings}` : "off"),
   );
 }
 
@@ -59,6 +56,7 @@ function details(place) {
     make("button", { ...attributes, onclick: () => act({ ...action, position: name }) }, words);
   $("position").replaceChildren(
     make("strong", {}, name), make("div", {}, `${place.artefact}; ${place.readings} readings`),
+    place.problem ? make("div", { class: "field-error" }, place.problem) : null,
     make("div", { class: "bar" },
       button("Turn", { do: "turn" }, { id: "turn" }),
       ...axes.map((axis) => button(`⟂ ${axis}`, { do: "stand", across: axis },

@@ -14,6 +14,7 @@ const view = new View($("view"), {
   onDrag: (name, by) =>
     preview({ do: "move", position: name, by }, (design) => figures(design, [])),
   onDrop: (name, by) => act({ do: "move", position: name, by }),
+  onPlace: (at) => act({ do: "put", at, like: page.selected ?? undefined }, "position added"),
 });
 page.view = view;
 page.show = show;
@@ -46,11 +47,11 @@ function show() {
 }
 
 function draw(design) {
-  const { directions } = design.motions;
+  const directions = design.motions?.directions ?? [];
   const { selected, motion } = page;
   if (!design.scene.positions.some((place) => place.name === selected)) page.selected = null;
   if (motion !== null && motion >= directions.length) page.motion = null;
-  if (page.motion === null && design.rank.deficiency) page.motion = 0;
+  if (page.motion === null && design.rank?.deficiency) page.motion = 0;
   if (page.motion !== null && !directions.length) page.motion = null;
   view.motion = page.motion;
   view.show(design, page.selected, { withMap: $("show-map").checked });
@@ -139,15 +140,20 @@ const ARROWS = {
   ArrowRight: [0, 1], ArrowLeft: [0, -1], ArrowUp: [1, 1], ArrowDown: [1, -1],
   PageUp: [2, 1], PageDown: [2, -1],
 };
+let pressed = -Infinity;
 $("view").addEventListener("keydown", (event) => {
   const { selected, state } = page;
   const place = state.design?.scene.positions.find((one) => one.name === selected);
   if (!place) return;
   const [axis, sign] = ARROWS[event.key] ?? [];
+  // Keys in quick succession are one step back.
+  const burst = event.timeStamp - pressed < 1000 ? true : undefined;
   if (event.key.toLowerCase() === "r") act({ do: "turn", position: selected });
+  else if (event.key === "Delete") act({ do: "remove", position: selected });
   else if (axis < place.rotation.length) {
     const by = place.rotation.map((row) => sign * row[axis] * view.step);
-    act({ do: "move", position: selected, by });
+    act({ do: "move", position: selected, by, burst });
+    pressed = event.timeStamp;
   } else return;
   event.preventDefault();
 });
@@ -157,7 +163,7 @@ window.addEventListener("focus", () => { if (page.state) refresh(); });
 window.studio = { view, latency, state: () => page.state, act, flow };
 try {
   [page.state, page.schema] = await Promise.all([ask("/api/state"), ask("/api/schema")]);
-  page.motion = page.state.design?.rank.deficiency ? 0 : null;
+  page.motion = page.state.design?.rank?.deficiency ? 0 : null;
   show();
   if (page.state.note) tell(page.state.note);
   poll();

@@ -155,7 +155,8 @@ export class View {
 
   map() {
     // Uncertainty of corrected points on levels of the volume, as a transparent sheet of colours.
-    const map = this.design.map;
+    const { map } = this.design;
+    if (!map) return;
     const values = map.slices.flatMap((slice) => slice.values.flat()).filter((v) => v !== null);
     // Where everything is undetermined there is nothing to compare.
     if (!values.length || Math.max(...values) === 0) return;
@@ -185,6 +186,7 @@ export class View {
   }
 
   mapRange() {
+    if (!this.design.map) return null;
     const every = this.design.map.slices.flatMap((slice) => slice.values.flat());
     const values = every.filter((v) => v !== null);
     return values.length ? { low: Math.min(...values), high: Math.max(...values), open: values.length < every.length } : null;
@@ -201,8 +203,9 @@ export class View {
 
   plate(place, index, ghost = false) {
     const group = new THREE.Group();
-    const colour = ghost ? 0x2a9d63 : COLOURS[index % COLOURS.length];
     const chosen = place.name === this.selected && !ghost;
+    const colour = ghost ? 0x2a9d63 : place.problem ? 0xd7301f : place.enabled === false ? 0x888888
+      : COLOURS[index % COLOURS.length];
     const balls = place.balls.map((ball) => this.vector(ball));
     const radius = Math.max(0.006 * this.size, 0.002);
     const sphere = new THREE.SphereGeometry(radius, 12, 8);
@@ -293,7 +296,7 @@ export class View {
       this.lines.geometry.dispose();
       this.lines = null;
     }
-    const direction = this.design?.motions.directions[index ?? -1];
+    const direction = this.design?.motions?.directions[index ?? -1];
     if (!direction) {
       this.motion = null;
       this.amplitude = 0;
@@ -318,7 +321,7 @@ export class View {
 
   swing() {
     if (!this.design) return;
-    const data = this.design.motions;
+    const data = this.design.motions ?? { directions: [] };
     const direction = this.motion === null ? null : data.directions[this.motion];
     if (direction && this.lines) this.lines.geometry.setFromPoints(this.lattice(direction.nodes, data.nodes));
     this.plates.forEach((plate, index) => {
@@ -326,7 +329,7 @@ export class View {
       const by = new Map();
       if (direction) {
         data.position.forEach((position, k) => {
-          if (position === index) by.set(data.ball[k], direction.readings[k]);
+          if (data.names[position] === plate.place.name) by.set(data.ball[k], direction.readings[k]);
         });
       }
       let k = 0;

@@ -1,0 +1,165 @@
+"""Designs that are wrong in some place: they are drawn, changed, and evaluated as far as they go."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import ballplate as bp
+import numpy as np
+import pytest
+from ballplate.designs import shipped
+
+pytest.importorskip("starlette", reason="the studio is an extra")
+
+from ballplate.extensions.studio.actions import done
+from ballplate.extensions.studio.document import DesignDocument, experiment_of, opened, undone
+from ballplate.extensions.studio.judging import figures, judgement
+from ballplate.extensions.studio.session import Session
+
+TEXT = Path(shipped("quickstart.yaml")).read_text(encoding="utf-8")
+NAMES = ["z low", "z high", "x low", "x high", "y low", "y high"]
+
+
+@pytest.fixture
+def document(tmp_path: Path) -> DesignDocument:
+    path = tmp_path / "plate.yaml"
+    path.write_text(TEXT, encoding="utf-8")
+    return opened(path)
+
+
+def scene_of(document: DesignDocument) -> dict:
+    found = judgement(document).scene
+    assert found is not None
+    return found
+
+
+def without(document: DesignDocument, *names: str) -> bp.Experiment:
+    text = "".join(
+        line
+        for line in document.text.splitlines(keepends=True)
+        if not any(f"name: {name}," in line for name in names)
+    )
+    path = document.path.with_name("without.yaml")
+    path.write_text(text, encoding="utf-8")
+    return bp.load(path)
+
+
+def u6(found: dict) -> float:
+    return next(row["average"] for row in found["quantities"] if row["symbol"] == "U6")
+
+
+def test_a_plate_outside_is_drawn_there_and_the_rest_is_evaluated(document):
+    moved = done(document, {"do": "move", "position": "z high", "by": [0, 0, 2]})
+    found = judgement(moved)
+    assert [place["name"] for place in found.scene["positions"]] == NAMES
+    wrong = {p["name"]: p["problem"] for p in found.scene["positions"] if p["problem"]}
+    assert list(wrong) == ["z high"] and "above the measuring volume" in wrong["z high"]
+    expected = bp.run(without(document, "z high"))
+    assert u6(found.answer) == expected.quantities["U6"].average
+    # Other places are changed meanwhile, and it is brought back.
+    other = done(moved, {"do": "turn", "position": "x low"})
+    back = done(other, {"do": "move", "position": "z high", "by": [0, 0, -2]})
+    assert judgement(back).messages == ()
+    assert undone(back).text == other.text
+
+
+def test_nothing_is_refused_because_of_another_place(document):
+    """Each action works while a plate is outside, a value is wrong and a name is unknown."""
+    wrong = done(document, {"do": "move", "position": "z high", "by": [0, 0, 2]})
+    wrong = done(wrong, {"do": "set", "path": ["target_uncertainty"], "value": "much"})
+    wrong = done(wrong, {"do": "probes", "position": "y high", "probes": ["back"]})
+    wrong = done(wrong, {"do": "text", "text": wrong.text.replace("[back]", "[bakc]")})
+    for action in (
+        {"do": "move", "position": "z high", "by": [0.01, 0, 0]},
+        {"do": "move", "position": "x low", "by": [0.0, 0.01, 0]},
+        {"do": "turn", "position": "x low"},
+        {"do": "stand", "position": "x low", "across": "y"},
+        {"do": "copy", "position": "x low"},
+        {"do": "remove", "position": "y high"},
+        {"do": "off", "position": "y high"},
+        {"do": "put", "at": [0.5, 0.5, 0.5], "like": "x low"},
+        {"do": "fit"},
+        {"do": "set", "path": ["seed"], "value": "5"},
+    ):
+        assert done(wrong, action).text != wrong.text, action
+    found = judgement(wrong)
+    assert found.scene is not None and found.answer is None
+    assert {"target_uncertainty", "positions[1]"} <= {m.path for m in found.messages}
+
+
+def test_what_cannot_be_understood_is_left_out_too(document):
+    wrong = done(document, {"do": "text", "text": document.text.replace("[back, front]", "[bakc]")})
+    found = judgement(wrong)
+    assert [place["name"] for place in found.scene["positions"]] == NAMES[:4]
+    expected = bp.run(without(document, "y low", "y high"))
+    assert found.answer["rank"]["deficiency"] == expected.verdict.deficiency > 0
+    assert found.answer["rank"]["observations"] == expected.verdict.observations
+
+
+def test_the_last_position_goes_and_the_first_comes(document):
+    empty = document
+    for name in NAMES:
+        empty = done(empty, {"do": "remove", "position": name})
+    assert scene_of(empty)["positions"] == [] and judgement(empty).answer is None
+    first = done(empty, {"do": "put", "at": [0.5, 0.5, 0.5]})
+    (place,) = scene_of(first)["positions"]
+    assert np.mean(place["balls"], axis=0) == pytest.approx([0.5, 0.5, 0.5])
+    assert judgement(first).answer["rank"]["deficiency"] > 0
+
+
+@pytest.mark.parametrize("sides", [(1.2, 0.9, 0.7), (3.0, 2.0, 1.0), (0.62, 0.62, 0.62)])
+def test_positions_are_fitted_to_another_volume(document, sides):
+    """They touch its walls where they touched the ends of what they took up."""
+    written = ", ".join(f"{1e3 * side:g} mm" for side in sides)
+    entered = done(document, {"do": "set", "path": ["machine", "volume"], "value": f"[{written}]"})
+    entered = done(
+        entered, {"do": "set", "path": ["artefacts", "plate", "size"], "value": "[500 mm, 500 mm]"}
+    )
+    fitted = done(entered, {"do": "fit"})
+    experiment = experiment_of(fitted)
+    lowest, highest = np.full(3, np.inf), np.full(3, -np.inf)
+    for place in experiment.positions:
+        balls = place.pose.origin + (
+            experiment.layouts["plate"].coordinates @ place.pose.rotation.T
+        )
+        for probe in place.probes:
+            ends = balls - experiment.probes[probe].offset
+            lowest, highest = np.minimum(lowest, ends.min(0)), np.maximum(highest, ends.max(0))
+    assert lowest == pytest.approx([0, 0, 0], abs=2e-5)
+    assert highest == pytest.approx(sides, abs=2e-5)
+    # Comments and everything else are as they were.
+    assert [line for line in fitted.text.splitlines() if line.startswith("#")] == [
+        line for line in document.text.splitlines() if line.startswith("#")
+    ]
+
+
+def test_a_preview_of_a_plate_outside_says_so_and_has_figures(document):
+    by = [0, 0, 2]
+    moved = done(document, {"do": "move", "position": "z high", "by": by})
+    found = figures(moved)
+    assert found["scene"]["positions"][1]["problem"] and u6(found) > 0
+
+
+def test_keys_in_a_burst_are_one_step_back(document):
+    session = Session(document.path)
+    try:
+        for k in range(5):
+            action = {"do": "move", "position": "x low", "by": [0.0, 0.01, 0.0], "burst": k > 0}
+            session.act({**action, "burst": True} if k else action)
+        session.act({"do": "move", "position": "y low", "by": [0.01, 0.0, 0.0], "burst": True})
+        session.act({"do": "undo"})
+        session.act({"do": "undo"})
+        state = session.state()
+        assert state["text"] == TEXT and not state["back"]
+    finally:
+        session.close()
+
+
+def test_messages_name_the_position(document):
+    session = Session(document.path)
+    try:
+        session.act({"do": "move", "position": "z high", "by": [0, 0, 2]})
+        (message,) = session.state()["messages"]
+        assert message["what"] == 'position "z high"'
+    finally:
+        session.close()
