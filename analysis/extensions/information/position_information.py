@@ -16,7 +16,7 @@ from ballplate.presentation import Data, MainTable, Result, aligned, number, pic
 from ballplate.rank import Verdict, moved_positions, null_changes, weak_changes
 from ballplate.results import Prediction
 from ballplate.simulator.computing import single_threaded
-from ballplate.simulator.design import Design, Lengths
+from ballplate.simulator.design import Design, Lengths, Priors
 from ballplate.simulator.estimation import Linearisation, linearise
 from ballplate.simulator.experiment import Experiment, lay_out, with_pool
 from ballplate.simulator.inputs import ExperimentError, Target
@@ -284,13 +284,24 @@ def _motions(judged: Verdict) -> tuple[str, ...]:
 
 
 def _unread(design: Design, position: int) -> Design:
-    """Return a design without the readings of a position, whose pose stays a parameter."""
-    readings, lengths = design.readings, design.of(Lengths)
-    kept = np.flatnonzero(readings.position != position)
-    place = np.full(len(readings), -1)
-    place[kept] = np.arange(len(kept))
-    chosen = lengths.select(readings.position[lengths.first] != position)
-    return replace(design, readings=readings.select(kept)).observed(chosen.reread(design, place))
+    """Return a design without the readings of a position.
+
+    Its pose is held, which nothing depends on any more, so that no direction is undetermined by it.
+    """
+    readings, lengths, priors = design.readings, design.of(Lengths), design.of(Priors)
+    is_kept = readings.position != position
+    place = np.where(is_kept, np.cumsum(is_kept) - 1, -1)
+    held = design.positions.held.copy()
+    held[position] = True
+    fewer = replace(
+        design,
+        readings=readings.select(np.flatnonzero(is_kept)),
+        positions=replace(design.positions, held=held),
+    )
+    return fewer.observed(
+        lengths.select(is_kept[lengths.first]).reread(design, place),
+        priors.select(priors.position != position),
+    )
 
 
 def _mean_squares(at: Linearisation, functions: Sequence[_Function]) -> Array:

@@ -14,6 +14,7 @@ from ballplate.results import Prediction
 from ballplate.simulator.computing import Report, unreported
 from ballplate.simulator.estimation import linearise
 from ballplate.simulator.experiment import Experiment, with_pool
+from ballplate.simulator.inputs import optional_service
 
 from .motions import null_motions, weak_motions
 
@@ -46,6 +47,9 @@ def page_of_design(
             design, sigma_is_estimated=is_estimated, experiment=experiment, report=report
         )
         data["reliability"] = judged_biases.to_dict()
+        information = optional_service("position_information")
+        if information is not None:
+            data["errors"] = information(prediction).to_dict()
     data["sheet"] = sheet_of(experiment).to_dict()
     contents = DesignContents(
         experiment.title,

@@ -12,6 +12,7 @@ from ballplate.simulator.estimation import Linearisation
 from .design_views import ball_views, motion_view, point_view, volume_view
 from .document import Page, PageSection, facts_list, introduction, shipped, written
 from .elements import Html, element, folded, joined, note, sentence, table
+from .information_section import information_section
 from .length_sections import lengths_section
 from .motions import Motion
 from .quoted import QuotedData
@@ -28,8 +29,8 @@ from .uncertainty_sections import (
 FOOT = (
     "Lengths are in micrometres and angles in microradians unless stated otherwise; u are standard"
     " uncertainties, U = k u expanded ones, predicted at zero machine error. Every value is"
-    " that of ballplate run, lengths, reliability, check --suggest or sheet with --json: its"
-    " data-path names the command and the path in the output."
+    " that of ballplate run, lengths, reliability, check --suggest, run --errors or sheet with"
+    " --json: its data-path names the command and the path in the output."
 )
 
 # Directions that are drawn, of each kind; the others are told in words.
@@ -68,6 +69,7 @@ def design_page(contents: DesignContents) -> str:
     sections = [
         PageSection("volume", "The experiment", _experiment(contents)),
         PageSection("rank", "What the readings determine", _rank(run, contents)),
+        *_informing(quoted),
         PageSection("suggestions", "Suggested changes", _suggestions(quoted)),
         PageSection(
             "uncertainties",
@@ -88,6 +90,14 @@ def design_page(contents: DesignContents) -> str:
     verdict = _verdict(run, contents.target, quoted["lengths"])
     top = introduction(verdict, _is_good(run), contents.file)
     return written(Page(contents.title, top, sections, FOOT, shipped("view.js")))
+
+
+def _informing(quoted: Mapping[str, QuotedData]) -> list[PageSection]:
+    """Section on errors and positions, unless the page is without it."""
+    if "errors" not in quoted:
+        return []
+    section = information_section(quoted["errors"])
+    return [PageSection("errors", "Errors and positions", section)]
 
 
 def _experiment(contents: DesignContents) -> Html:

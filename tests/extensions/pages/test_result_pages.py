@@ -129,6 +129,7 @@ def test_every_figure_of_a_designs_page_is_that_of_the_json(variant: str) -> Non
     grid = 7 if variant == "plane" else 5
     data["lengths"] = bp.lengths(experiment, None if has_target else "1 um", grid).to_dict()
     data["sheet"] = bp.sheet(experiment).to_dict()
+    data["errors"] = bp.information(experiment).to_dict()
     assert assert_quoted(page, data) > 100
     assert ('class="verdict bad"' in page) == is_deficient
     assert ("view moving" in page) == is_deficient
