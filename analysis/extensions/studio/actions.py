@@ -256,9 +256,13 @@ def _with_groups(
 
 
 def _set(document: DesignDocument, action: Arguments) -> str:
-    """Set a value at a path, in the form of a file; an absent value removes it."""
+    """Set a value at a path, in the form of a file; an absent value removes it, and one at a last
+    step of + is a further entry of a list.
+    """
     steps = _steps(action["path"])
     text = str(action["value"])
+    if steps[-1] == "+":
+        return _with(document, [TextChange(steps[:-1], value_of(text), "append")])
     if not text.strip():
         return _with(document, [TextChange(steps, kind="remove")])
     return _with(document, [TextChange(steps, value_of(text))])

@@ -28,7 +28,7 @@ pytestmark = [
 
 # Nothing sticks out of the page, other than inside parts that scroll by themselves.
 OUTSIDE = """[...document.querySelectorAll('body *')].filter(one =>
-!one.closest('pre, .balls, dialog, textarea') && one.getClientRects().length &&
+!one.closest('pre, .balls, .scrolled, dialog, textarea') && one.getClientRects().length &&
 one.getBoundingClientRect().right > document.documentElement.clientWidth + 1)
 .map(one => one.outerHTML.slice(0, 90))"""
 

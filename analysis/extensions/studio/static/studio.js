@@ -62,7 +62,7 @@ function draw(design) {
 }
 
 async function set(path, value, input) {
-  if (!(await act({ do: "set", path, value }))) input.classList.add("bad-field");
+  if (!(await act({ do: "set", path, value }))) input?.classList.add("bad-field");
 }
 
 $("undo").onclick = () => act({ do: "undo" });
