@@ -5,16 +5,23 @@ from __future__ import annotations
 import multiprocessing
 import os
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from multiprocessing.connection import Connection
 from multiprocessing.process import BaseProcess
 from typing import Any
 
+from ballplate.results import check
 from ballplate.simulator.computing import begin_worker, interruptions_blocked
 from ballplate.simulator.experiment import Experiment
-from ballplate.simulator.inputs import ExperimentError, Message, refused, to_python
+from ballplate.simulator.inputs import (
+    ExperimentError,
+    Message,
+    optional_service,
+    refused,
+    to_python,
+)
 
 from .answers import answer, later_answer, scene
 from .document import DesignDocument, data_of, experiment_of, variants_of
@@ -108,15 +115,33 @@ def later(document: DesignDocument) -> dict[str, Any]:
     return later_answer(evaluable(experiment_of(document, tolerant=True)))
 
 
+def matrix(document: DesignDocument, added: Sequence[DesignDocument]) -> dict[str, Any]:
+    """Return how much of each error's information goes with each position of a document's design,
+    and with the last position of each one `added`; empty without the extension that computes it.
+
+    :raises ExperimentError: nothing of them can be evaluated.
+    """
+    information = optional_service("position_information")
+    if information is None:
+        return {}
+    experiment, *more = (
+        evaluable(experiment_of(each, tolerant=True)) for each in (document, *added)
+    )
+    candidates = [each for each in more if len(each.positions) > len(experiment.positions)]
+    data: dict[str, Any] = information(check(experiment), candidates).to_dict()
+    return data
+
+
 class Judge:
     """A process that computes one thing of one document at a time: what comes after it stops what
     is under way, so that a result is always of the document that came last.
 
-    It serves one caller at a time.
+    It serves one caller at a time; `asked` counts the requests.
     """
 
     def __init__(self) -> None:
         self.is_busy = False
+        self.asked = 0
         self._process: BaseProcess | None = None
         self._connection: Connection | None = None
 

@@ -75,6 +75,11 @@ def application(session: Session, token: str, port: int) -> Starlette:
             Route("/api/jobs", _answering(lambda request, body: session.jobs())),
             Route("/api/start", _answering(_starting(session)), methods=["POST"]),
             Route("/api/stop", _answering(_stopping(session)), methods=["POST"]),
+            Route(
+                "/api/matrix",
+                _answering(lambda request, body: session.matrix(body.get("settings"))),
+                methods=["POST"],
+            ),
             Route("/api/later", _answering(lambda request, body: session.later())),
             Route("/pages/{number:int}", _made_page(session)),
             Mount("/static", StaticFiles(directory=STATIC)),

@@ -7,6 +7,7 @@ import time
 from collections.abc import Callable, Mapping
 from contextlib import suppress
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from threading import RLock
 from typing import Any
@@ -27,7 +28,7 @@ from .document import (
     variants_of,
 )
 from .jobs import JOBS, MOST_RUNNING, Job, started
-from .judging import POSITION, DesignJudgement, Judge, figures, judgement, later
+from .judging import POSITION, DesignJudgement, Judge, figures, judgement, later, matrix
 from .recovery import give_up, keep, recovered
 
 ENDINGS = (".yaml", ".yml")
@@ -77,7 +78,7 @@ class Session:
         self._kept: dict[str, Any] | None = None
         self._jobs: dict[int, Job] = {}
         self.revision = 0
-        self._judge, self._aside, self._asked = Judge(), Judge(), 0
+        self._judge, self._aside, self._beside = Judge(), Judge(), Judge()
         self._answer: dict[str, Any] | None = None
         self._scene: dict[str, Any] | None = None
         self._burst: tuple[Any, ...] = ()
@@ -170,7 +171,7 @@ class Session:
         with self._lock:
             self._ensure_seen(action)
             document = self._document
-        data: Data = self._computed(figures, done(document, action))
+        data: Data = self._computed(figures, done(document, action), self._aside)
         return data
 
     def later(self) -> dict[str, Any]:
@@ -181,7 +182,21 @@ class Session:
         """
         with self._lock:
             document = self._document
-        return {"fingerprint": document.fingerprint, **self._computed(later, document)}
+        return {"fingerprint": document.fingerprint, **self._computed(later, document, self._aside)}
+
+    def matrix(self, settings: Mapping[str, Any] | None) -> dict[str, Any]:
+        """Return how much of each error's information goes with each position, with the
+        `settings` of a candidate, if any, and the fingerprint of the design.
+
+        :raises ActionError, ExperimentError: the settings, or the text, are invalid.
+        :raises RefusedError: another such request came meanwhile.
+        """
+        with self._lock:
+            document = self._document
+        action = {"do": "add", "settings": settings}
+        added = [] if settings is None else [done(document, action)]
+        found = self._computed(partial(matrix, added=added), document, self._beside)
+        return {"fingerprint": document.fingerprint, **found}
 
     def start(self, name: str, settings: Mapping[str, Any]) -> int:
         """Start a computation, and return its number.
@@ -231,9 +246,9 @@ class Session:
     def close(self) -> None:
         """Stop all computations."""
         with self._lock:
-            self._asked += 1
-            self._judge.stop()
-            self._aside.stop()
+            for judge in (self._judge, self._aside, self._beside):
+                judge.asked += 1
+                judge.stop()
             for number in list(self._jobs):
                 self.stop(number)
 
@@ -298,21 +313,23 @@ class Session:
             self._answer = result.answer or self._answer
             self._scene = result.scene or self._scene
 
-    def _computed(self, work: Callable[[DesignDocument], Any], document: DesignDocument) -> Any:
+    def _computed(
+        self, work: Callable[[DesignDocument], Any], document: DesignDocument, judge: Judge
+    ) -> Any:
         """Return the result for a document that is not evaluated in the view; further such
-        requests stop it.
+        requests to the `judge` stop it.
 
         :raises RefusedError: it was stopped.
         """
         with self._lock:
-            self._asked += 1
-            number = self._asked
-            self._aside.begin(work, document)
+            judge.asked += 1
+            number = judge.asked
+            judge.begin(work, document)
         while True:
             with self._lock:
-                if self._asked != number:
+                if judge.asked != number:
                     raise RefusedError("a later request replaced this one")
-                result = self._aside.look()
+                result = judge.look()
                 if result is not None:
                     return result
             time.sleep(INTERVAL)

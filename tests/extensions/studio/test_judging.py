@@ -117,7 +117,7 @@ def test_a_preview_that_is_overtaken_is_refused_and_ends(session):
     slow = {"do": "text", "text": text.replace(POINTS, SLOW)}
     with ThreadPoolExecutor(1) as pool:
         first = pool.submit(session.preview, slow)
-        while not session._asked:
+        while not session._aside.asked:
             time.sleep(0.01)
         found = session.preview({"do": "set", "path": ["title"], "value": "mine"})
         with pytest.raises(RefusedError, match="later request"):

@@ -5,8 +5,10 @@ import time
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
+import ballplate as bp
 import numpy as np
 import pytest
+import yaml
 from ballplate.designs import shipped
 
 pytest.importorskip("starlette", reason="the studio is an extra")
@@ -54,6 +56,7 @@ REQUESTS = [
     ("GET", "/api/jobs"),
     ("GET", "/api/schema"),
     ("GET", "/api/later"),
+    ("POST", "/api/matrix"),
     ("GET", "/pages/1"),
     ("GET", "/static/studio.js"),
     ("POST", "/api/do"),
@@ -162,6 +165,21 @@ def test_figures_are_those_of_run(client, design):
     assumptions = prediction.assumptions
     assert later["assumptions"]["warning"] == assumptions.warning != ""
     assert later["assumptions"]["assumptions"] == assumptions.to_dict()["assumptions"]
+
+
+def test_errors_by_positions_are_those_of_run(client, design):
+    (experiment,) = load(design)
+    settings = {**yaml.safe_load(design.read_text())["positions"][0], "name": "again"}
+    settings["corner"] = {"x": "100 mm", "y": "200 mm"}
+    found = client.post("/api/matrix", json={}).json()
+    assert found.pop("fingerprint") == client.get("/api/state").json()["fingerprint"]
+    assert found == bp.information(experiment).to_dict()
+    with_candidate = client.post("/api/matrix", json={"settings": settings}).json()
+    assert with_candidate["positions"][-1]["is_added"]
+    assert with_candidate["positions"][-1]["average"] < found["average"]
+    # A candidate that cannot be read is none.
+    without = client.post("/api/matrix", json={"settings": settings | {"level": "2 m"}}).json()
+    assert without["positions"] == found["positions"]
 
 
 def test_a_design_without_lengths_has_no_assumptions(client):
