@@ -72,6 +72,16 @@ def test_an_hour(design: Path) -> None:
         page.click("[data-motion='0']")
         page.wait_for_timeout(300)
         assert len({canvas.screenshot() for _ in range(2)}) == 1
+        # A row of errors by positions that is pointed at swings with what hides it.
+        page.click("#errors summary")
+        page.hover("#matrix tr.hidden-error >> nth=-1")
+        until(page, "window.studio.view.motion !== null")
+        assert page.locator("#matrix thead th button").count() == 2
+        assert "hidden by motions of" in page.locator("#matrix tbody button").first.get_attribute(
+            "aria-label"
+        )
+        page.click("#matrix thead th button >> nth=1")
+        assert page.evaluate("window.studio.view.selected") == "y low"
         # A suggestion is shown where it would stand, and applied.
         page.click("[data-job=suggest]")
         page.wait_for_selector("#suggestions li")

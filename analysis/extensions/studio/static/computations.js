@@ -22,6 +22,14 @@ function current() {
   return suggestions.filter((one) => one.fingerprint === page.state.fingerprint);
 }
 
+// The settings of the next position that lowers U6 most for each reading, if it was asked for.
+export function candidate() {
+  const before = page.state.design?.quantities?.find(({ symbol }) => symbol === "U6")?.average;
+  const gain = ({ average, place }) => (before - (average ?? before)) / place.readings;
+  const added = current().filter((one) => one.settings);
+  return added.sort((one, other) => gain(other) - gain(one) || 0)[0]?.settings;
+}
+
 function suggested() {
   const shown = current();
   $("suggestions").replaceChildren(...shown.map(suggestion));

@@ -1,8 +1,9 @@
 // The page of the studio: it asks, the engine answers, and everything that is shown comes from
 // there.
 import { figures, legend, unfold_text } from "./answers.js";
-import { dialog, drawn, fit, forget_suggestions, poll, start, sweep } from "./computations.js";
+import { candidate, dialog, drawn, fit, forget_suggestions, poll, start, sweep } from "./computations.js";
 import { build, flow } from "./forms.js";
+import { errors } from "./matrix.js";
 import {
   $, act, ask, focus, latency, options, page, preview, refocus, refresh, tell, watch,
 } from "./page.js";
@@ -43,7 +44,20 @@ function show() {
   positions();
   if (page.schema) build($("forms"), state.data, page.schema, state.messages, set);
   drawn();
+  informed();
   refocus(focused);
+}
+
+// Errors by positions; what hides one swings.
+function informed() {
+  errors(candidate(), {
+    onHover: (_, motion) => {
+      if (motion === null || motion === page.motion) return;
+      page.motion = motion;
+      show();
+    },
+    onChoose: ({ name }) => choose(name),
+  });
 }
 
 function draw(design) {
@@ -106,6 +120,7 @@ $("reopen").onclick = () => {
 $("toggle-text").onclick = () => unfold_text($("text-box").hidden);
 $("step").onchange = (event) => { view.step = Number(event.target.value); };
 $("show-map").onchange = show;
+$("errors").ontoggle = informed;
 $("home").onclick = () => view.home();
 $("sweep").onclick = sweep;
 document.querySelectorAll("[data-job]").forEach((button) => {
