@@ -1,6 +1,5 @@
 // The list of positions, and the one that is chosen.
 import { $, act, focus, make, page, refocus } from "./page.js";
-import { colourOf } from "./view.js";
 
 export function choose(name) {
   page.selected = name;
@@ -19,16 +18,13 @@ export function positions() {
   if (place) details(place);
 }
 
-function item(place, index) {
+function item(place) {
   const { name, enabled, problem } = place;
-  const swatch = make("span", { class: "swatch" });
-  swatch.style.background = colourOf(index);
   const look = [name === page.selected && "chosen", !enabled && "off", problem && "wrong"];
   const does = enabled ? "off" : "on";
   return make("li", { class: look.filter(Boolean).join(" "), title: problem ?? undefined },
     make("input", { type: "checkbox", checked: enabled, title: `switch this position ${does}`,
       "aria-label": `read ${name}`, onchange: () => act({ do: does, position: name }) }),
-    swatch,
     make("button", { class: "name", "aria-label": `choose ${name}`, onclick: () => choose(name) },
       name),
     make("small", { title: "readings" }, enabled ? `${place.readings}` : "off"),

@@ -1,365 +1,416 @@
 // The volume, plates and probes in three dimensions; what is undetermined moves.
 import * as THREE from "three";
 import { OrbitControls } from "./three/OrbitControls.js";
+import { Annotations } from "./annotations.js";
+import { Hands } from "./hands.js";
 
-const COLOURS = [0x1565a8, 0xd1495b, 0x2a9d63, 0xc77d0a, 0x7b4fb5, 0x0f8b8d, 0xa8577e, 0x6b7a1e];
+const [TURN, RISE] = [-35, 24]; // degrees: the eye of all drawings of a design
 const SHARE = 0.07; // of the volume's size: the largest displacement that is shown
 const PERIOD = 2400; // milliseconds of one swing
-
-export function colourOf(index) {
-  return `#${COLOURS[index % COLOURS.length].toString(16).padStart(6, "0")}`;
-}
+const MARGIN = 60; // pixels around the volume for its ticks and names
+// Colours by meaning, which are the page's; balls and dashes are as large as a part of the volume.
+const LOOKS = {
+  quiet: { colour: "--quiet", fill: 0.1, ball: 0.0045 },
+  off: { colour: "--line", fill: 0, ball: 0.003 },
+  near: { colour: "--ink", fill: 0.1, ball: 0.0045 },
+  chosen: { colour: "--accent", fill: 0.3, ball: 0.0075 },
+  wrong: { colour: "--bad", fill: 0.2, ball: 0.0075 },
+  ghost: { colour: "--ink", fill: 0.03, ball: 0.0045, dashes: [0.014, 0.009] },
+  rear: { colour: "--quiet", dashes: [0.003, 0.01] },
+  span: { colour: "--ramp-2" },
+};
+const PARTS = ["frame", "sheets", "root", "ghosts", "arrows", "spans"];
+const kept = (geometry) => Object.assign(geometry, { userData: { kept: true } });
+const GLOBE = kept(new THREE.SphereGeometry(1, 16, 12));
+const BAR = kept(new THREE.CylinderGeometry(1, 1, 1, 10));
+const TIP = kept(new THREE.ConeGeometry(1, 1, 12));
+const Vector = THREE.Vector3;
 
 export class View {
-  constructor(canvas, { onSelect, onDrag, onDrop }) {
+  constructor(canvas, handlers) {
     this.canvas = canvas;
-    this.handlers = { onSelect, onDrag, onDrop };
-    this.renderer = new THREE.WebGLRenderer({ canvas, antialias: true, preserveDrawingBuffer: true });
-    this.renderer.setPixelRatio(Math.min(window.devicePixelRatio, 2));
+    this.handlers = handlers; // onSelect, onDrag, onDrop, and onPlace if there is one
+    this.renderer = new THREE.WebGLRenderer(
+      { canvas, antialias: true, preserveDrawingBuffer: true });
+    this.ratio = Math.min(window.devicePixelRatio, 2);
+    this.renderer.setPixelRatio(this.ratio);
     this.scene = new THREE.Scene();
-    this.camera = new THREE.PerspectiveCamera(38, 1, 0.01, 200);
+    this.scene.background = new THREE.Color();
+    this.camera = new THREE.OrthographicCamera();
     this.camera.up.set(0, 0, 1);
+    this.scene.add(new THREE.HemisphereLight(0xffffff, 0x8899aa, 3));
+    for (const name of PARTS) this.scene.add(this[name] = new THREE.Group());
+    this.looks = {};
+    const open = { transparent: true, depthWrite: false };
+    for (const [name, { fill, dashes }] of Object.entries(LOOKS)) {
+      this.looks[name] = {
+        ball: new THREE.MeshLambertMaterial(),
+        unread: new THREE.MeshLambertMaterial({ ...open, opacity: 0.22 }),
+        fill: new THREE.MeshBasicMaterial({ ...open, opacity: fill ?? 1 }),
+        edge: dashes ? new THREE.LineDashedMaterial() : new THREE.LineBasicMaterial(),
+      };
+    }
+    this.lines = new THREE.LineSegments(new THREE.BufferGeometry(), this.looks.wrong.edge);
+    // Its bounds change with every picture.
+    this.lines.frustumCulled = false;
+    this.scene.add(this.lines);
+    this.still = window.matchMedia("(prefers-reduced-motion: reduce)").matches;
+    this.motion = this.near = null; // the direction that swings, the name below the mouse
+    this.step = 0.01;
+    this.empty();
+    this.annotations = new Annotations(this);
+    this.hands = new Hands(this);
     this.controls = new OrbitControls(this.camera, canvas);
     this.controls.addEventListener("change", () => this.draw());
-    this.scene.add(new THREE.HemisphereLight(0xffffff, 0x8899aa, 2.2));
-    const sun = new THREE.DirectionalLight(0xffffff, 1.6);
-    sun.position.set(2, -3, 4);
-    this.scene.add(sun);
-    this.root = new THREE.Group();
-    this.ghosts = new THREE.Group();
-    this.arrows = new THREE.Group();
-    this.scene.add(this.root, this.ghosts, this.arrows);
-    this.plates = [];
-    this.labels = new Map();
-    this.motion = null;
-    this.still = window.matchMedia("(prefers-reduced-motion: reduce)").matches;
-    this.drag = null;
-    this.step = 0.01;
     new ResizeObserver(() => this.resize()).observe(canvas);
-    canvas.addEventListener("pointerdown", (event) => this.press(event));
-    canvas.addEventListener("pointermove", (event) => this.pull(event));
-    canvas.addEventListener("pointerup", (event) => this.release(event));
-    window.matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => this.draw());
-    this.resize();
+    const scheme = window.matchMedia("(prefers-color-scheme: dark)");
+    scheme.addEventListener("change", () => this.recolour());
+    this.recolour();
   }
 
-  vector(place) {
-    return new THREE.Vector3(place[0], place[1], place.length > 2 ? place[2] : 0);
+  colour(name) {
+    return getComputedStyle(this.canvas).getPropertyValue(name).trim();
   }
 
-  show(design, selected, { withMap = true } = {}) {
-    const first = !this.design;
-    const other = this.design && JSON.stringify(this.design.scene.upper) !== JSON.stringify(design.scene.upper);
-    this.design = design;
-    this.selected = selected;
-    this.clear(this.root);
-    this.plates = [];
-    const { lower, upper } = design.scene;
-    this.low = this.vector(lower);
-    this.high = this.vector(upper);
-    this.size = this.high.distanceTo(this.low);
-    this.box();
-    // Many sheets above one another stay transparent.
-    this.thin = Math.min(1, 8 / Math.max(1, design.scene.positions.length));
-    if (withMap) this.map();
-    design.scene.positions.forEach((place, index) => this.plate(place, index));
-    if (first || other) this.home();
-    this.move(this.motion);
+  recolour() {
+    for (const [name, look] of Object.entries(this.looks)) {
+      Object.values(look).forEach((one) => one.color.set(this.colour(LOOKS[name].colour)));
+    }
+    this.scene.background.set(this.colour("--paper"));
+    this.ramp = [0, 1, 2].map((k) => {
+      const hex = parseInt(this.colour(`--ramp-${k}`).slice(1), 16);
+      return [hex >> 16, (hex >> 8) & 255, hex & 255];
+    });
+    if (this.design) this.map();
     this.draw();
   }
 
-  clear(group) {
-    for (const child of [...group.children]) {
-      group.remove(child);
-      child.traverse((one) => {
-        one.geometry?.dispose();
-        if (one.material) [one.material].flat().forEach((m) => { if (!one.isSprite) m.map?.dispose(); m.dispose(); });
-      });
+  vector(place) {
+    return new Vector(place[0], place[1], place[2] ?? 0);
+  }
+
+  show(design, selected, { withMap = true } = {}) {
+    const { dimension, lower, upper, probes, positions } = design.scene;
+    const bounds = JSON.stringify([dimension, lower, upper]);
+    const isAnswer = design !== this.design;
+    const isOther = bounds !== this.bounds;
+    if (isOther) this.empty();
+    Object.assign(this, { design, selected, bounds });
+    if (isOther) this.renew();
+    this.sheets.visible = withMap;
+    if (isAnswer) this.map();
+    // Plates that stay where they were are not built again.
+    const before = new Map(this.plates.map((plate) => [plate.key, plate]));
+    this.plates = positions.map((place, index) => {
+      const { name, balls, rotation, read } = place;
+      const offsets = place.probes.map((probe) => probes[probe]);
+      const key = JSON.stringify([name, balls, rotation, read, offsets]);
+      const plate = before.get(key) ?? this.plate(place, offsets, this.root);
+      before.delete(key);
+      if (isAnswer) plate.group.position.set(0, 0, 0);
+      plate.block.userData.index = index;
+      return Object.assign(plate, { key, place });
+    });
+    before.forEach((plate) => this.remove(plate.group));
+    this.hands.resume();
+    // Many sheets above one another stay transparent.
+    this.looks.quiet.fill.opacity = LOOKS.quiet.fill * Math.min(1, 8 / this.plates.length);
+    if (isOther) this.home();
+    this.dress();
+    this.move(this.motion);
+  }
+
+  // Nothing to show: the text has been wrong since it was opened.
+  empty() {
+    PARTS.forEach((name) => this.clear(this[name]));
+    Object.assign(this, { design: null, bounds: null, mapped: null });
+    Object.assign(this, { plates: [], offered: [], segments: [], amplitude: 0 });
+    this.lines.visible = false;
+    this.draw();
+  }
+
+  // All that depends on the volume's size.
+  renew() {
+    const { dimension, lower, upper } = this.design.scene;
+    this.flat = dimension === 2;
+    this.volume = new THREE.Box3(this.vector(lower), this.vector(upper));
+    this.size = this.volume.min.distanceTo(this.volume.max);
+    for (const [name, { dashes }] of Object.entries(LOOKS)) {
+      const [dashSize, gapSize] = (dashes ?? [0, 0]).map((one) => one * this.size);
+      if (dashes) Object.assign(this.looks[name].edge, { dashSize, gapSize });
     }
+    const ends = this.lattice(null, 2);
+    for (let k = 0; k < ends.length; k += 2) {
+      const edge = new THREE.BufferGeometry().setFromPoints(ends.slice(k, k + 2));
+      this.frame.add(new THREE.Line(edge).computeLineDistances());
+    }
+    this.controls.mouseButtons.LEFT = this.flat ? THREE.MOUSE.PAN : THREE.MOUSE.ROTATE;
+    this.controls.touches.ONE = this.flat ? THREE.TOUCH.PAN : THREE.TOUCH.ROTATE;
+    this.hands.free(true);
   }
 
-  dark() {
-    return window.matchMedia("(prefers-color-scheme: dark)").matches;
+  clear(group) {
+    [...group.children].forEach((child) => this.remove(child));
   }
 
+  remove(child) {
+    child.removeFromParent();
+    child.traverse((one) => {
+      if (one.geometry && !one.geometry.userData.kept) one.geometry.dispose();
+      if (one.isInstancedMesh) one.dispose();
+      if (!one.material?.map) return;
+      one.material.map.dispose();
+      one.material.dispose();
+    });
+  }
+
+  // Lines of a lattice through the volume along every axis, on its faces and through its middle.
   lattice(displacement, nodes) {
-    // Lines of a lattice through the volume along every axis, on its faces and through its middle.
-    const d = this.design.scene.dimension;
-    const { lower, upper } = this.design.scene;
-    const at = (...k) => {
-      const place = k.map((one, axis) => lower[axis] + ((upper[axis] - lower[axis]) * one) / (nodes - 1));
-      const found = this.vector(place);
-      if (displacement) {
-        const row = displacement[k.reduce((sum, one) => sum * nodes + one, 0)];
-        found.addScaledVector(this.vector(row), this.amplitude ?? 0);
-      }
-      return found;
+    const { lower, upper, dimension: d } = this.design.scene;
+    const at = (place) => {
+      const found = this.vector(place.map((k, axis) =>
+        lower[axis] + ((upper[axis] - lower[axis]) * k) / (nodes - 1)));
+      const row = displacement?.[place.reduce((sum, k) => sum * nodes + k, 0)];
+      return row ? found.addScaledVector(this.vector(row), this.amplitude) : found;
     };
     const points = [];
     const some = nodes > 3 ? [0, (nodes - 1) / 2, nodes - 1] : [0, nodes - 1];
     const others = d === 3 ? some.flatMap((i) => some.map((j) => [i, j])) : some.map((i) => [i]);
     for (let axis = 0; axis < d; axis += 1) {
       for (const fixed of others) {
+        const [before, after] = [fixed.slice(0, axis), fixed.slice(axis)];
         for (let k = 0; k + 1 < nodes; k += 1) {
-          const one = [...fixed];
-          const two = [...fixed];
-          one.splice(axis, 0, k);
-          two.splice(axis, 0, k + 1);
-          points.push(at(...one), at(...two));
+          points.push(at([...before, k, ...after]), at([...before, k + 1, ...after]));
         }
       }
     }
     return points;
   }
 
-  box() {
-    const colour = this.dark() ? 0x8796a8 : 0x68778a;
-    const corners = this.lattice(null, 2);
-    const geometry = new THREE.BufferGeometry().setFromPoints(corners);
-    this.root.add(new THREE.LineSegments(geometry, new THREE.LineBasicMaterial({ color: colour })));
-    "xyz".slice(0, this.design.scene.dimension).split("").forEach((name, axis) => {
-      // Beside the middle of edges that are outermost as the volume is seen first.
-      const at = this.low.clone().add(this.high).multiplyScalar(0.5);
-      const away = 0.1 * this.size;
-      if (axis === 0) at.set(at.x, this.low.y - away, this.low.z);
-      if (axis === 1) at.set(this.low.x - away, at.y, this.low.z);
-      if (axis === 2) at.set(this.high.x + 0.7 * away, this.low.y - 0.7 * away, at.z);
-      const metres = this.high.getComponent(axis) - this.low.getComponent(axis);
-      this.root.add(this.label(`${name}  ${Math.round(1e4 * metres) / 10} mm`, at, 0.038 * this.size));
-    });
-  }
-
-  label(text, place, height) {
-    const key = `${text} ${this.dark()}`;
-    if (!this.labels.has(key)) this.labels.set(key, this.written(text));
-    const texture = this.labels.get(key);
-    const sprite = new THREE.Sprite(new THREE.SpriteMaterial({ map: texture, depthTest: false }));
-    sprite.renderOrder = 10;
-    sprite.scale.set((height * texture.image.width) / texture.image.height, height, 1);
-    sprite.position.copy(place);
-    return sprite;
-  }
-
-  written(text) {
-    const canvas = document.createElement("canvas");
-    const context = canvas.getContext("2d");
-    context.font = "48px system-ui, sans-serif";
-    canvas.width = Math.ceil(context.measureText(text).width) + 16;
-    canvas.height = 64;
-    context.font = "48px system-ui, sans-serif";
-    context.fillStyle = this.dark() ? "#d4dde8" : "#2b3642";
-    context.textBaseline = "middle";
-    context.fillText(text, 8, 34);
-    return new THREE.CanvasTexture(canvas);
-  }
-
+  // Uncertainty on levels of the volume, as transparent sheets of colours.
   map() {
-    // Uncertainty of corrected points on levels of the volume, as a transparent sheet of colours.
     const { map } = this.design;
-    if (!map) return;
-    const values = map.slices.flatMap((slice) => slice.values.flat()).filter((v) => v !== null);
+    const range = this.mapRange();
+    const mapped = JSON.stringify([map, this.ramp]);
+    if (mapped === this.mapped) return;
+    this.mapped = mapped;
+    this.clear(this.sheets);
     // Where everything is undetermined there is nothing to compare.
-    if (!values.length || Math.max(...values) === 0) return;
-    const low = Math.min(...values);
-    const high = Math.max(...values);
-    for (const slice of map.slices) {
-      const size = map.x.length;
-      const pixels = new Uint8Array(4 * size * map.y.length);
-      slice.values.flat().forEach((value, k) => {
-        const share = value === null ? null : high > low ? (value - low) / (high - low) : 0;
-        pixels.set(share === null ? [120, 120, 120, 150] : [...ramp(share), 105], 4 * k);
+    if (!range?.high) return;
+    const { x, y } = map;
+    const [width, depth] = [x.at(-1) - x[0], y.at(-1) - y[0]];
+    for (const { level, values } of map.slices) {
+      const pixels = values.flat().flatMap((value) => {
+        const share = (value - range.low) / (range.high - range.low || 1);
+        return value === null ? [120, 120, 120, 90] : [...mixed(this.ramp, share), 140];
       });
-      const texture = new THREE.DataTexture(pixels, size, map.y.length);
-      texture.magFilter = THREE.LinearFilter;
+      const texture = new THREE.DataTexture(Uint8Array.from(pixels), x.length, y.length);
+      Object.assign(texture, { magFilter: THREE.LinearFilter, needsUpdate: true });
       texture.colorSpace = THREE.SRGBColorSpace;
-      texture.needsUpdate = true;
-      const width = map.x.at(-1) - map.x[0];
-      const depth = map.y.at(-1) - map.y[0];
-      const sheet = new THREE.Mesh(
-        new THREE.PlaneGeometry(width, depth),
-        new THREE.MeshBasicMaterial({ map: texture, transparent: true, side: THREE.DoubleSide, depthWrite: false }),
-      );
-      sheet.position.set(map.x[0] + width / 2, map.y[0] + depth / 2, slice.level ?? 0);
+      const sheet = new THREE.Mesh(new THREE.PlaneGeometry(width, depth),
+        new THREE.MeshBasicMaterial(
+          { map: texture, transparent: true, side: THREE.DoubleSide, depthWrite: false }));
+      sheet.position.set(x[0] + width / 2, y[0] + depth / 2, level ?? 0);
       sheet.renderOrder = -1;
-      this.root.add(sheet);
+      this.sheets.add(sheet);
     }
   }
 
   mapRange() {
-    if (!this.design.map) return null;
-    const every = this.design.map.slices.flatMap((slice) => slice.values.flat());
-    const values = every.filter((v) => v !== null);
-    return values.length ? { low: Math.min(...values), high: Math.max(...values), open: values.length < every.length } : null;
+    const { map } = this.design;
+    const every = map?.slices.flatMap((slice) => slice.values.flat()) ?? [];
+    const values = every.filter((value) => value !== null);
+    if (!values.length) return null;
+    const open = values.length < every.length;
+    return { low: Math.min(...values), high: Math.max(...values), ...map.scale, open };
   }
 
-  // Nothing to show: the text has been wrong since it was opened.
-  empty() {
-    this.design = null;
-    this.move(null);
-    this.clear(this.root);
-    this.plates = [];
-    this.draw();
-  }
-
-  plate(place, index, ghost = false) {
+  // A plate with its balls, those that are not read last in `order`, and its styli.
+  plate(place, offsets, parent) {
     const group = new THREE.Group();
-    const chosen = place.name === this.selected && !ghost;
-    const colour = ghost ? 0x2a9d63 : place.problem ? 0xd7301f : place.enabled === false ? 0x888888
-      : COLOURS[index % COLOURS.length];
-    const balls = place.balls.map((ball) => this.vector(ball));
-    const radius = Math.max(0.006 * this.size, 0.002);
-    const sphere = new THREE.SphereGeometry(radius, 12, 8);
-    const material = new THREE.MeshLambertMaterial({ color: colour, transparent: ghost, opacity: ghost ? 0.45 : 1 });
-    const faint = new THREE.MeshLambertMaterial({ color: colour, transparent: true, opacity: 0.22 });
-    const read = balls.filter((_, k) => place.read[k]);
-    const unread = balls.filter((_, k) => !place.read[k]);
-    const meshes = [];
-    for (const [which, look] of [[read, material], [unread, faint]]) {
-      if (!which.length) continue;
-      const mesh = new THREE.InstancedMesh(sphere, look, which.length);
-      which.forEach((ball, k) => mesh.setMatrixAt(k, new THREE.Matrix4().setPosition(ball)));
-      group.add(mesh);
-      meshes.push(mesh);
-    }
-    const sheet = this.sheet(place, balls, colour, chosen, ghost);
-    group.add(...sheet);
-    if (!ghost) {
-      const middle = balls[Math.floor(balls.length / 2)];
-      for (const probe of place.probes) {
-        const offset = this.vector(this.design.scene.probes[probe]);
-        if (offset.length() < 1e-9) continue;
-        const points = [middle, middle.clone().sub(offset)];
-        const line = new THREE.Line(
-          new THREE.BufferGeometry().setFromPoints(points),
-          new THREE.LineBasicMaterial({ color: colour }),
-        );
-        group.add(line);
+    const balls = place.balls.map(this.vector);
+    const order = [...balls.keys()].sort((a, b) => place.read[b] - place.read[a] || a - b);
+    const count = place.read.filter(Boolean).length;
+    const meshes = [count, balls.length - count].map((many) =>
+      Object.assign(new THREE.InstancedMesh(GLOBE, undefined, many), { frustumCulled: false }));
+    const used = order.slice(0, count || order.length).map((k) => balls[k]);
+    const middle = used.reduce((sum, ball) => sum.add(ball), new Vector());
+    middle.divideScalar(used.length);
+    const nearest = used.reduce((best, ball) =>
+      (ball.distanceTo(middle) < best.distanceTo(middle) - 1e-9 ? ball : best));
+    const scales = [];
+    for (const offset of offsets.map(this.vector)) {
+      // Walls are for what the scales read: balls less the probe's offset.
+      scales.push(...used.map((ball) => ball.clone().sub(offset)));
+      const head = nearest.clone().sub(offset);
+      const { ball } = this.looks.near;
+      if (offset.length() > 1e-9) {
+        group.add(this.rod(nearest, head, 0.0018, ball), this.rod(nearest, nearest, 0.004, ball),
+          this.rod(head, head, 0.005, ball));
       }
-      this.plates.push({ place, group, balls, read, mesh: place.read.some(Boolean) ? meshes[0] : null, sheet: sheet[0] });
-      sheet[0].userData.index = this.plates.length - 1;
     }
-    (ghost ? this.ghosts : this.root).add(group);
-    return group;
+    const extent = new THREE.Box3().setFromPoints(scales.length ? scales : used);
+    const body = this.body(place, balls);
+    group.add(...meshes, body.block, body.edges);
+    parent.add(group);
+    return { place, group, balls, order, count, meshes, extent, middle, ...body };
   }
 
-  sheet(place, balls, colour, chosen, ghost) {
-    // The rectangle that the balls lie in, in the plate's own axes.
-    const d = this.design.scene.dimension;
-    const axis = (k) => this.vector(place.rotation.map((row) => row[k]));
-    const u = axis(0);
-    const v = axis(1);
-    const origin = this.vector(place.origin);
-    const along = balls.map((ball) => ball.clone().sub(origin).dot(u));
-    const across = balls.map((ball) => ball.clone().sub(origin).dot(v));
-    const out = d === 3 ? balls.reduce((sum, ball) => sum + ball.clone().sub(origin).dot(axis(2)), 0) / balls.length : 0;
-    const edge = 0.012 * this.size;
-    const [left, right] = [Math.min(...along) - edge, Math.max(...along) + edge];
-    const [bottom, top] = [Math.min(...across) - edge, Math.max(...across) + edge];
-    const corner = (a, b) => {
-      const point = origin.clone().addScaledVector(u, a).addScaledVector(v, b);
-      return d === 3 ? point.addScaledVector(axis(2), out) : point;
-    };
-    const corners = [corner(left, bottom), corner(right, bottom), corner(right, top), corner(left, top)];
-    const geometry = new THREE.BufferGeometry().setFromPoints(corners);
-    geometry.setIndex([0, 1, 2, 0, 2, 3]);
-    const mesh = new THREE.Mesh(geometry, new THREE.MeshBasicMaterial({
-      color: colour, transparent: true, opacity: ghost ? 0.08 : chosen ? 0.3 : 0.13 * this.thin, side: THREE.DoubleSide, depthWrite: false,
-    }));
-    const line = new THREE.LineLoop(new THREE.BufferGeometry().setFromPoints(corners), new THREE.LineBasicMaterial({ color: colour, transparent: ghost, opacity: ghost ? 0.7 : 1 }));
-    return [mesh, line];
+  // A box around the balls in the plate's own axes, some millimetres thick.
+  body(place, balls) {
+    const axes = [0, 1, 2].map((k) => (this.flat && k === 2 ? new Vector(0, 0, 1)
+      : this.vector(place.rotation.map((row) => row[k]))));
+    const pose = new THREE.Matrix4().makeBasis(...axes).setPosition(this.vector(place.origin));
+    const inward = pose.clone().invert();
+    const around = new THREE.Box3().setFromPoints(
+      balls.map((ball) => ball.clone().applyMatrix4(inward)));
+    around.expandByVector(new Vector(0.014, 0.014, 0.004).multiplyScalar(this.size));
+    const corners = cornersOf(around).map((corner) => corner.applyMatrix4(pose));
+    const box = new THREE.BoxGeometry(...around.getSize(new Vector()));
+    box.translate(...around.getCenter(new Vector())).applyMatrix4(pose);
+    const edges = new THREE.LineSegments(new THREE.EdgesGeometry(box)).computeLineDistances();
+    return { block: new THREE.Mesh(box), edges, corners, normal: axes[2].normalize() };
+  }
+
+  // A straight piece, or a globe if both its ends are the same.
+  rod(from, to, share, material, geometry = from === to ? GLOBE : BAR) {
+    const made = new THREE.Mesh(geometry, material);
+    const along = to.clone().sub(from);
+    const radius = share * this.size;
+    made.scale.set(radius, along.length() || radius, radius);
+    made.quaternion.setFromUnitVectors(new Vector(0, 1, 0), along.normalize());
+    made.position.copy(from).add(to).multiplyScalar(0.5);
+    return made;
+  }
+
+  named(name) {
+    return this.plates.find((plate) => plate.place.name === name);
+  }
+
+  dress() {
+    const { drag } = this.hands;
+    for (const plate of this.plates) {
+      const { name, problem, enabled } = plate.place;
+      const isWrong = drag?.far && drag.name === name ? drag.leaves : problem;
+      wear(plate, this.looks, isWrong ? "wrong" : name === this.selected ? "chosen"
+        : enabled === false ? "off" : name === this.near ? "near" : "quiet");
+    }
+    this.swing();
+    this.draw();
   }
 
   ghost(places) {
     this.clear(this.ghosts);
-    (places ?? []).forEach((place, index) => this.plate(place, index, true));
+    this.offered = (this.design && places ? places : []).map((place) => {
+      const plate = this.plate(place, [], this.ghosts);
+      wear(plate, this.looks, "ghost");
+      this.settle(plate);
+      return plate;
+    });
     this.draw();
   }
 
   residuals(found, scale) {
     this.clear(this.arrows);
-    if (found) {
-      found.place.forEach((place, k) => {
-        const value = this.vector(found.value[k]).multiplyScalar(scale);
-        if (value.length() < 1e-6) return;
-        const hot = found.standardised[k] > 3.5;
-        this.arrows.add(new THREE.ArrowHelper(value.clone().normalize(), this.vector(place), value.length(), hot ? 0xd7301f : 0x555555, 0.25 * value.length(), 0.12 * value.length()));
-      });
-    }
+    found?.place.forEach((place, k) => {
+      const from = this.vector(place);
+      const by = this.vector(found.value[k]).multiplyScalar(scale);
+      if (by.length() < 1e-6) return;
+      const { ball } = this.looks[found.standardised[k] > 3.5 ? "wrong" : "quiet"];
+      const [neck, to] = [0.7, 1].map((share) => from.clone().addScaledVector(by, share));
+      this.arrows.add(this.rod(from, neck, 0.0012, ball), this.rod(neck, to, 0.005, ball, TIP));
+    });
     this.draw();
   }
 
+  // Lengths {from, to, label} as bold lines; none with an empty list.
+  lengths(segments) {
+    this.clear(this.spans);
+    const { ball } = this.looks.span;
+    this.segments = segments.map(({ from, to, label }) => {
+      const [start, end] = [from, to].map(this.vector);
+      this.spans.add(this.rod(start, end, 0.0035, ball), this.rod(start, start, 0.008, ball),
+        this.rod(end, end, 0.008, ball));
+      return { label, middle: start.add(end).multiplyScalar(0.5) };
+    });
+    this.draw();
+  }
+
+  // Let a direction swing, or stop.
   move(index) {
-    // Let a direction swing, or stop.
-    this.motion = index;
-    if (this.lines) {
-      this.scene.remove(this.lines);
-      this.lines.geometry.dispose();
-      this.lines = null;
-    }
-    const direction = this.design?.motions?.directions[index ?? -1];
-    if (!direction) {
-      this.motion = null;
-      this.amplitude = 0;
-      this.swing();
-      this.draw();
-      return;
-    }
-    const colour = this.dark() ? 0xff8a80 : 0xb3261e;
-    this.lines = new THREE.LineSegments(new THREE.BufferGeometry(), new THREE.LineBasicMaterial({ color: colour }));
-    // Its bounds change with every picture.
-    this.lines.frustumCulled = false;
-    this.scene.add(this.lines);
+    const isThere = Boolean(this.design?.motions?.directions[index ?? -1]);
+    this.motion = isThere ? index : null;
+    this.lines.visible = isThere;
+    if (!isThere) this.amplitude = 0;
+    this.swing();
+    this.draw();
+    if (!isThere || this.swinging) return;
     const animate = (now) => {
-      if (this.motion !== index || !this.lines) return;
-      this.amplitude = SHARE * this.size * (this.still ? 1 : Math.sin((2 * Math.PI * now) / PERIOD));
+      this.swinging = this.lines.visible && !this.still;
+      if (!this.lines.visible) return;
+      const share = this.still ? 1 : Math.sin((2 * Math.PI * now) / PERIOD);
+      this.amplitude = SHARE * this.size * share;
       this.swing();
       this.draw();
-      if (!this.still) requestAnimationFrame(animate);
+      if (this.swinging) requestAnimationFrame(animate);
     };
+    this.swinging = true;
     requestAnimationFrame(animate);
   }
 
   swing() {
-    if (!this.design) return;
-    const data = this.design.motions ?? { directions: [] };
-    const direction = this.motion === null ? null : data.directions[this.motion];
-    if (direction && this.lines) this.lines.geometry.setFromPoints(this.lattice(direction.nodes, data.nodes));
-    this.plates.forEach((plate, index) => {
-      if (!plate.mesh) return;
-      const by = new Map();
-      if (direction) {
-        data.position.forEach((position, k) => {
-          if (data.names[position] === plate.place.name) by.set(data.ball[k], direction.readings[k]);
-        });
-      }
-      let k = 0;
-      plate.balls.forEach((ball, number) => {
-        if (!plate.place.read[number]) return;
-        const place = ball.clone();
-        if (by.has(number)) place.addScaledVector(this.vector(by.get(number)), this.amplitude);
-        plate.mesh.setMatrixAt(k, new THREE.Matrix4().setPosition(place));
-        k += 1;
-      });
-      plate.mesh.instanceMatrix.needsUpdate = true;
+    const data = this.design?.motions;
+    const direction = data?.directions[this.motion ?? -1];
+    const by = new Map();
+    if (direction) {
+      this.lines.geometry.setFromPoints(this.lattice(direction.nodes, data.nodes));
+      data.position.forEach((position, k) =>
+        by.set(`${data.ball[k]} ${data.names[position]}`, direction.readings[k]));
+    }
+    this.plates.forEach((plate) => this.settle(plate, by));
+  }
+
+  // Put the balls of a plate where they are, and as large as they are to be seen.
+  settle({ look, balls, order, count, meshes, place }, by) {
+    const radius = LOOKS[look].ball * this.size;
+    const matrix = new THREE.Matrix4().makeScale(radius, radius, radius);
+    order.forEach((number, k) => {
+      const moved = by?.get(`${number} ${place.name}`);
+      const at = balls[number].clone();
+      if (moved) at.addScaledVector(this.vector(moved), this.amplitude);
+      meshes[k < count ? 0 : 1].setMatrixAt(k < count ? k : k - count, matrix.setPosition(at));
     });
+    meshes.forEach((mesh) => { mesh.instanceMatrix.needsUpdate = true; });
   }
 
   home() {
     if (!this.design) return;
-    const middle = this.low.clone().add(this.high).multiplyScalar(0.5);
-    const flat = this.design.scene.dimension === 2;
-    const from = flat ? new THREE.Vector3(0, -0.001, 1) : new THREE.Vector3(-0.75, -1.15, 0.72);
-    const narrow = Math.max(1, 1.15 / Math.max(this.camera.aspect, 0.2));
-    this.camera.position.copy(middle).addScaledVector(from.normalize(), 1.62 * this.size * narrow);
-    this.controls.target.copy(middle);
+    const [turn, rise] = [TURN, RISE].map(THREE.MathUtils.degToRad);
+    const from = this.flat ? new Vector(0, -1e-3, 1) : new Vector(
+      -Math.sin(turn) * Math.cos(rise), -Math.cos(turn) * Math.cos(rise), Math.sin(rise));
+    const { camera, size } = this;
+    this.volume.getCenter(this.controls.target);
+    camera.position.copy(this.controls.target).addScaledVector(from.normalize(), 10 * size);
+    Object.assign(camera, { zoom: 1, near: 0, far: 20 * size });
+    camera.lookAt(this.controls.target);
+    camera.updateMatrixWorld();
+    const seen = new THREE.Box3().setFromPoints(cornersOf(this.volume)
+      .map((corner) => corner.applyMatrix4(camera.matrixWorldInverse)));
+    this.seen = seen.getSize(new Vector());
+    this.resize();
     this.controls.update();
   }
 
   resize() {
-    const { clientWidth, clientHeight } = this.canvas;
-    if (!clientWidth || !clientHeight) return;
-    this.renderer.setSize(clientWidth, clientHeight, false);
-    this.camera.aspect = clientWidth / clientHeight;
+    const { clientWidth: width, clientHeight: height } = this.canvas;
+    if (!width || !height) return;
+    this.renderer.setSize(width, height, false);
+    this.annotations.resize(width, height);
+    const { x, y } = this.seen ?? { x: 1, y: 1 };
+    const room = [width, height].map((one) => Math.max(one - 2 * MARGIN, 100));
+    const half = Math.max(x / room[0], y / room[1]) / 2;
+    const [right, top] = [half * width, half * height];
+    Object.assign(this.camera, { right, top, left: -right, bottom: -top });
     this.camera.updateProjectionMatrix();
     this.draw();
   }
@@ -370,91 +421,78 @@ export class View {
     this.drawing = true;
     requestAnimationFrame(() => {
       this.drawing = false;
-      this.scene.background = new THREE.Color(this.dark() ? 0x14181e : 0xfbfcfe);
+      if (this.design) this.rear();
       this.renderer.render(this.scene, this.camera);
+      this.annotations.write();
     });
   }
 
-  ray(event) {
-    const box = this.canvas.getBoundingClientRect();
-    const at = new THREE.Vector2(
-      (2 * (event.clientX - box.left)) / box.width - 1,
-      1 - (2 * (event.clientY - box.top)) / box.height,
-    );
+  // Edges of the volume behind all others are dotted.
+  rear() {
+    const away = this.camera.getWorldDirection(new Vector());
+    const hidden = cornersOf(this.volume).sort((a, b) => b.dot(away) - a.dot(away))[0];
+    for (const edge of this.frame.children) {
+      const ends = edge.geometry.attributes.position;
+      const meets = [0, 1].some((k) =>
+        new Vector().fromBufferAttribute(ends, k).distanceTo(hidden) < 1e-6 * this.size);
+      edge.material = this.looks[meets && !this.flat ? "rear" : "quiet"].edge;
+    }
+  }
+
+  // Pixels of a point from the canvas's corner.
+  pixel(point) {
+    const { x, y } = point.clone().project(this.camera);
+    return [((x + 1) / 2) * this.canvas.clientWidth, ((1 - y) / 2) * this.canvas.clientHeight];
+  }
+
+  // Where a plate, or a point in metres, is on the screen, for whoever drives the page.
+  screen(what) {
+    const point = typeof what === "string" ? this.named(what)?.middle : this.vector(what);
+    if (!point) return null;
+    const { left, top } = this.canvas.getBoundingClientRect();
+    const [x, y] = this.pixel(point);
+    return [left + this.canvas.clientLeft + x, top + this.canvas.clientTop + y];
+  }
+
+  ray({ clientX, clientY }) {
+    const { left, top } = this.canvas.getBoundingClientRect();
+    const { clientLeft, clientTop, clientWidth, clientHeight } = this.canvas;
     const caster = new THREE.Raycaster();
-    caster.setFromCamera(at, this.camera);
+    caster.setFromCamera(new THREE.Vector2((2 * (clientX - left - clientLeft)) / clientWidth - 1,
+      1 - (2 * (clientY - top - clientTop)) / clientHeight), this.camera);
     return caster;
   }
 
-  // Where a plate is on the screen, for tests and for whoever drives the page.
-  screen(name) {
-    const plate = this.plates.find((one) => one.place.name === name);
-    if (!plate) return null;
-    const middle = plate.balls.reduce((sum, ball) => sum.add(ball), new THREE.Vector3()).divideScalar(plate.balls.length);
-    middle.project(this.camera);
-    const box = this.canvas.getBoundingClientRect();
-    return [box.left + ((middle.x + 1) / 2) * box.width, box.top + ((1 - middle.y) / 2) * box.height];
+  // The plate below a pointer, the chosen one before others, and where it is met.
+  under(event) {
+    const hits = this.ray(event).intersectObjects(this.plates.map(({ block }) => block));
+    const met = hits.map(({ object, point }) =>
+      ({ plate: this.plates[object.userData.index], point }));
+    return met.find(({ plate }) => plate.place.name === this.selected) ?? met[0];
   }
 
-  press(event) {
-    if (event.button !== 0) return;
-    const caster = this.ray(event);
-    const hits = caster.intersectObjects(this.plates.map((plate) => plate.sheet));
-    const chosen = hits.find((hit) => this.plates[hit.object.userData.index].place.name === this.selected);
-    const hit = chosen ?? hits[0];
-    if (!hit) return;
-    const plate = this.plates[hit.object.userData.index];
-    this.controls.enabled = false;
-    this.canvas.setPointerCapture(event.pointerId);
-    if (plate.place.name !== this.selected) this.handlers.onSelect(plate.place.name);
-    const normal = this.vector(plate.place.rotation.map((row) => row.at(-1)));
-    if (this.design.scene.dimension === 2) normal.set(0, 0, 1);
-    this.drag = { name: plate.place.name, from: hit.point.clone(), normal: normal.normalize(), by: [0, 0, 0], far: false };
-  }
-
-  pull(event) {
-    if (!this.drag) return;
-    const { from, normal } = this.drag;
-    const ray = this.ray(event).ray;
-    const by = new THREE.Vector3();
-    if (event.shiftKey && this.design.scene.dimension === 3) {
-      // Along the normal: the point of the line through the grip that is nearest to the ray.
-      const across = new THREE.Vector3().crossVectors(normal, ray.direction);
-      const length = across.lengthSq();
-      if (length < 1e-6) return;
-      const amount = new THREE.Vector3().subVectors(ray.origin, from).cross(ray.direction).dot(across) / length;
-      by.copy(normal).multiplyScalar(Math.round(amount / this.step) * this.step);
-    } else {
-      const hit = ray.intersectPlane(new THREE.Plane().setFromNormalAndCoplanarPoint(normal, from), new THREE.Vector3());
-      if (!hit) return;
-      const moved = hit.sub(from);
-      by.set(...moved.toArray().map((one) => Math.round(one / this.step) * this.step));
-      const along = by.dot(normal);
-      by.addScaledVector(normal, -along);
-    }
-    const next = by.toArray().map((one) => Math.round(one * 1e6) / 1e6).slice(0, this.design.scene.dimension);
-    if (JSON.stringify(next) === JSON.stringify(this.drag.by)) return;
-    this.drag.by = next;
-    this.drag.far = true;
-    const plate = this.plates.find((one) => one.place.name === this.drag.name);
-    plate?.group.position.copy(this.vector(next));
-    this.draw();
-    this.handlers.onDrag(this.drag.name, next);
-  }
-
-  release(event) {
-    this.controls.enabled = true;
-    if (!this.drag) return;
-    this.canvas.releasePointerCapture(event.pointerId);
-    const { name, by, far } = this.drag;
-    this.drag = null;
-    if (far) this.handlers.onDrop(name, by);
+  hover(name) {
+    if (name === this.near) return;
+    this.near = name;
+    this.canvas.style.cursor = name === null ? "" : "grab";
+    this.dress();
   }
 }
 
-function ramp(share) {
-  const stops = [[44, 127, 184], [255, 255, 191], [215, 48, 31]];
-  const at = Math.min(share * 2, 1.999999);
-  const k = Math.floor(at);
+export function cornersOf({ min, max }) {
+  return [min.x, max.x].flatMap((x) => [min.y, max.y].flatMap((y) =>
+    [min.z, max.z].map((z) => new Vector(x, y, z))));
+}
+
+function wear(plate, looks, look) {
+  const { ball, unread, fill, edge } = looks[look];
+  plate.look = look;
+  [plate.meshes[0].material, plate.meshes[1].material] = [ball, unread];
+  [plate.block.material, plate.edges.material] = [fill, edge];
+}
+
+function mixed(stops, share) {
+  const at = Math.min(1, Math.max(0, share)) * (stops.length - 1);
+  const k = Math.min(Math.floor(at), stops.length - 2);
   return stops[k].map((one, c) => Math.round(one + (stops[k + 1][c] - one) * (at - k)));
 }

@@ -1,0 +1,230 @@
+"""Mouse and fingers in the view of the studio: what is begun can be left, and a plate stops at the
+volume's walls.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from ballplate.designs import shipped
+
+from tests.extensions.studio.chromium import Studio, chromium, settled, tab, until
+
+pytest.importorskip("starlette", reason="the studio is an extra")
+INSTALL = "python -m pip install 'ballplate[test,browser]', and a Chromium"
+pytest.importorskip("playwright", reason=f"no browser is driven without it: {INSTALL}")
+
+pytestmark = [
+    pytest.mark.browser,
+    pytest.mark.slow,
+    pytest.mark.skipif(chromium() is None, reason=f"no Chromium on this machine: {INSTALL}"),
+]
+
+CALLS = """(() => { const { handlers } = window.studio.view; window.calls = [];
+for (const name of ['onDrag', 'onDrop', 'onPlace']) { const before = handlers[name];
+handlers[name] = (...sent) => { window.calls.push([name, ...sent]); before(...sent); }; } })()"""
+# Where a plate is drawn, and how.
+PLACE = "(() => { const { group, look } = window.studio.view.named('z low');"
+PLACE += " return [group.position.toArray(), look]; })()"
+EYE = "(() => { const { camera } = window.studio.view;"
+EYE += " return [camera.zoom, camera.position.toArray()]; })()"
+
+
+@pytest.fixture
+def page(tmp_path: Path) -> Iterator:
+    """A tab with the quickstart, whose plate `z low` is chosen: 700 mm in a cube of 1000 mm."""
+    path = tmp_path / "plate.yaml"
+    path.write_bytes(Path(shipped("quickstart.yaml")).read_bytes())
+    with Studio(path) as studio, tab() as page:
+        page.goto(studio.address)
+        until(page, "!!window.studio?.state()?.design && !window.studio.state().pending")
+        page.click("#positions button.name >> nth=0")
+        page.evaluate(CALLS)
+        page.wait_for_timeout(200)
+        yield page
+        assert page.errors == []
+
+
+def calls(page, name: str) -> list:
+    return [sent for called, *sent in page.evaluate("window.calls") if called == name]
+
+
+def spot(page, point: list[float] | str) -> tuple[float, float]:
+    x, y = page.evaluate(f"window.studio.view.screen({point!r})")
+    return x, y
+
+
+def middle(page) -> list[float]:
+    found: list[float] = page.evaluate("window.studio.view.named('z low').middle.toArray()")
+    return found
+
+
+def pulled(page, by: tuple[float, float, float]) -> None:
+    """Drag the plate with the mouse, which stays down."""
+    start = middle(page)
+    page.mouse.move(*spot(page, start))
+    page.mouse.down()
+    end = [a + b for a, b in zip(start, by, strict=True)]
+    page.mouse.move(*spot(page, end), steps=6)
+
+
+class Fingers:
+    """Fingers on the screen, each at a point."""
+
+    def __init__(self, page) -> None:
+        self.session = page.context.new_cdp_session(page)
+        self.session.send("Emulation.setTouchEmulationEnabled", {"enabled": True})
+
+    def __call__(self, kind: str, *points: tuple[float, float]) -> None:
+        touches = [{"x": x, "y": y, "id": k} for k, (x, y) in enumerate(points)]
+        self.session.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": touches})
+
+
+def test_escape_takes_a_drag_back(page) -> None:
+    before = page.evaluate("window.studio.state().text")
+    pulled(page, (0.1, 0.05, 0.0))
+    assert page.evaluate(PLACE)[0] != [0, 0, 0]
+    page.keyboard.press("Escape")
+    assert page.evaluate(PLACE) == [[0, 0, 0], "chosen"]
+    # The figures are asked for once more, of the plate as it stands.
+    assert calls(page, "onDrag")[-1] == ["z low", [0, 0, 0]]
+    eye = page.evaluate(EYE)
+    page.mouse.move(300, 400)
+    page.mouse.up()
+    assert calls(page, "onDrop") == [] and page.evaluate(EYE) == eye
+    assert page.evaluate("window.studio.state().text") == before
+
+
+def test_a_drop_without_movement_does_nothing(page) -> None:
+    pulled(page, (0.1, 0.05, 0.0))
+    page.mouse.move(*spot(page, middle(page)))
+    page.mouse.up()
+    pulled(page, (0.002, 0.0, 0.0))
+    page.mouse.up()
+    assert calls(page, "onDrop") == []
+    assert page.evaluate("window.studio.state().revision") == 0
+
+
+def test_a_plate_stops_at_the_wall_and_is_red_beyond_it(page) -> None:
+    # Its balls are from 0 to 700 mm along y and from 0 along x, less the probe's offset.
+    extent = page.evaluate(
+        "(() => { const { min, max } = window.studio.view.named('z low').extent;"
+        " return [min.toArray(), max.toArray()]; })()"
+    )
+    room = round(1.0 - extent[1][0], 6)
+    pulled(page, (room + 0.2, 0.0, 0.0))
+    place, look = page.evaluate(PLACE)
+    assert look == "chosen" and place == pytest.approx([room, 0, 0], abs=1e-6)
+    page.keyboard.down("Alt")
+    page.mouse.move(
+        *spot(page, [a + b for a, b in zip(middle(page), (room + 0.15, 0, 0), strict=True)])
+    )
+    place, look = page.evaluate(PLACE)
+    assert look == "wrong" and place[0] > room + 0.05
+    page.mouse.up()
+    page.keyboard.up("Alt")
+    state = settled(page, 1)
+    assert state["design"]["scene"]["positions"][0]["problem"]
+    until(page, "window.studio.view.named('z low').look === 'wrong'")
+    # What is outside can be dragged back.
+    pulled(page, (-0.3, 0.0, 0.0))
+    assert page.evaluate(PLACE)[1] == "chosen"
+    page.mouse.up()
+    assert settled(page, 2)["design"]["scene"]["positions"][0]["problem"] is None
+    assert [name for name, _ in calls(page, "onDrop")] == ["z low"] * 2
+
+
+def test_near_a_wall_a_plate_goes_to_it(page) -> None:
+    page.evaluate("(() => { window.studio.view.step = 0.001; })()")
+    extent = page.evaluate("window.studio.view.named('z low').extent.max.toArray()")
+    room = round(1.0 - extent[0], 6)
+    pulled(page, (room - 0.002, 0.0, 0.0))
+    assert page.evaluate(PLACE)[0][0] == pytest.approx(room, abs=1e-6)
+    page.mouse.up()
+    assert settled(page, 1)["design"]["scene"]["positions"][0]["problem"] is None
+
+
+def test_one_finger_drags_a_plate_and_a_second_one_leaves_it(page) -> None:
+    fingers = Fingers(page)
+    x, y = spot(page, middle(page))
+    fingers("touchStart", (x, y))
+    fingers("touchMove", (x + 20, y + 8))
+    fingers("touchMove", (x + 40, y + 12))
+    assert page.evaluate(PLACE)[0] != [0, 0, 0]
+    fingers("touchEnd")
+    settled(page, 1)
+    assert [name for name, _ in calls(page, "onDrop")] == ["z low"]
+    eye = page.evaluate(EYE)
+    x, y = spot(page, middle(page))
+    fingers("touchStart", (x, y))
+    fingers("touchMove", (x + 20, y + 8))
+    fingers("touchMove", (x + 40, y + 12))
+    assert page.evaluate(EYE) == eye
+    # Two fingers move apart: the view grows, and the plate is where it was.
+    fingers("touchStart", (x + 40, y + 12), (x + 80, y + 12))
+    assert page.evaluate(PLACE) == [[0, 0, 0], "chosen"]
+    for k in range(1, 6):
+        fingers("touchMove", (x + 40 - 10 * k, y + 12), (x + 80 + 10 * k, y + 12))
+    fingers("touchEnd")
+    assert page.evaluate(EYE)[0] > 1.5 * eye[0]
+    assert len(calls(page, "onDrop")) == 1
+    # One finger beside the plates turns it.
+    page.click("#home")
+    eye = page.evaluate(EYE)
+    x, y = spot(page, [0.95, 0.05, 0.0])
+    fingers("touchStart", (x, y + 20))
+    for k in range(1, 6):
+        fingers("touchMove", (x + 10 * k, y + 20))
+    fingers("touchEnd")
+    assert page.evaluate(EYE)[1] != eye[1]
+
+
+def test_a_cancelled_pointer_leaves_the_plate(page) -> None:
+    fingers = Fingers(page)
+    x, y = spot(page, middle(page))
+    fingers("touchStart", (x, y))
+    fingers("touchMove", (x + 30, y + 8))
+    fingers("touchMove", (x + 40, y + 12))
+    assert page.evaluate(PLACE)[0] != [0, 0, 0]
+    fingers("touchCancel")
+    until(page, "window.studio.view.named('z low').group.position.length() === 0")
+    assert calls(page, "onDrop") == []
+    # And the next one drags as before.
+    fingers("touchStart", (x, y))
+    fingers("touchMove", (x + 30, y + 8))
+    fingers("touchMove", (x + 40, y + 12))
+    fingers("touchEnd")
+    settled(page, 1)
+    assert len(calls(page, "onDrop")) == 1
+
+
+def test_a_place_is_asked_for_on_the_floor(page) -> None:
+    at = [0.95, 0.1, 0.0]
+    page.mouse.dblclick(*spot(page, at))
+    (sent,) = calls(page, "onPlace")[0]
+    assert sent == pytest.approx(at, abs=0.0051)
+    count = len(settled(page, 1)["design"]["scene"]["positions"])
+    assert count == 7
+    # On a plate it chooses that.
+    page.mouse.dblclick(*spot(page, middle(page)))
+    assert len(calls(page, "onPlace")) == 1
+    page.click("#undo")
+    settled(page, 2)
+    fingers = Fingers(page)
+    fingers("touchStart", spot(page, at))
+    page.wait_for_timeout(700)
+    fingers("touchEnd")
+    assert len(calls(page, "onPlace")) == 2
+    settled(page, 3)
+    page.click("#undo")
+    settled(page, 4)
+    # A finger that moves turns the view instead.
+    x, y = spot(page, at)
+    fingers("touchStart", (x, y))
+    fingers("touchMove", (x + 15, y))
+    fingers("touchMove", (x + 30, y))
+    page.wait_for_timeout(700)
+    fingers("touchEnd")
+    assert len(calls(page, "onPlace")) == 2
