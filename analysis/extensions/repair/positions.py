@@ -63,7 +63,7 @@ def with_added(experiment: Experiment, position: Position) -> Experiment:
 
 
 def _free_name(experiment: Experiment, name: str) -> str:
-    names = {place.name for place in experiment.positions}
+    names = {place.name for place in experiment.positions} | {*experiment.switched_off}
     return next(
         candidate_name
         for k in range(len(names) + 1)

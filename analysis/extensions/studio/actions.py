@@ -26,7 +26,8 @@ from ballplate.simulator.geometry import QUARTER_TURNS, Pose, ball_coordinates, 
 from ballplate.simulator.inputs import ExperimentError, Steps, parse_tree, to_python
 from ballplate.simulator.machines import Array
 
-from .document import DesignDocument, changed, experiment_of
+from .document import DesignDocument, changed
+from .drafts import draft_of
 
 Arguments = Mapping[str, Any]
 
@@ -99,7 +100,7 @@ def _stood(document: DesignDocument, action: Arguments) -> str:
 def _posed(
     document: DesignDocument, name: str, pose: Callable[[Experiment, Position], Pose]
 ) -> str:
-    experiment = experiment_of(document, planning=True, tolerant=True)
+    experiment = draft_of(document, planning=True)
     place = _position(experiment, name)
     position_pose = pose(experiment, place)
     origin = np.round(position_pose.origin / STEP) * STEP
@@ -116,7 +117,7 @@ def _about_middle(experiment: Experiment, place: Position, rotation: Array) -> P
 
 def _copied(document: DesignDocument, action: Arguments) -> str:
     """Copy a position at its location."""
-    experiment = experiment_of(document, planning=True, tolerant=True)
+    experiment = draft_of(document, planning=True)
     new = with_added(experiment, _position(experiment, str(action["position"])))
     return with_experiment(document.text, document.path, experiment, new)
 
@@ -130,7 +131,7 @@ def _added(document: DesignDocument, action: Arguments) -> str:
 def _repaired(document: DesignDocument, action: Arguments) -> str:
     """Apply the edits of a suggested repair to the file."""
     text = document.text
-    experiment = experiment_of(document, planning=True, tolerant=True)
+    experiment = draft_of(document, planning=True)
     needed = [
         Edit(_steps(edit["path"]), _plain(edit["value"]), bool(edit["is_new"]))
         for edit in action["edits"]
@@ -164,7 +165,7 @@ def _put(document: DesignDocument, action: Arguments) -> str:
     the last one, or else across z with all balls and probes.
     """
     at = _vector(action["at"])
-    experiment = experiment_of(document, planning=True, tolerant=True)
+    experiment = draft_of(document, planning=True)
     if len(at) != experiment.dimension:
         raise ActionError(f"at has {len(at)} co-ordinates in {experiment.dimension} dimensions")
     name = action.get("like")
@@ -190,7 +191,7 @@ def _whole(experiment: Experiment) -> Position:
 
 def _fitted(document: DesignDocument, action: Arguments) -> str:
     """All positions moved so that they fill the volume as they filled the space that they take."""
-    experiment = experiment_of(document, planning=True, tolerant=True)
+    experiment = draft_of(document, planning=True)
     enabled = [place for place in experiment.positions if place.enabled]
     if not enabled:
         raise ActionError("no position to fit")
@@ -229,7 +230,7 @@ def _read_with(document: DesignDocument, action: Arguments) -> str:
 def _read_balls(document: DesignDocument, action: Arguments) -> str:
     """Other balls of a position read, all with the same probes."""
     names = tuple(str(ball) for ball in action["balls"])
-    experiment = experiment_of(document, planning=True, tolerant=True)
+    experiment = draft_of(document, planning=True)
     place = _position(experiment, str(action["position"]))
     every = experiment.layouts[place.artefact].names
     unknown = [name for name in names if name not in every]
@@ -245,7 +246,7 @@ def _read_balls(document: DesignDocument, action: Arguments) -> str:
 def _with_groups(
     document: DesignDocument, action: Arguments, change: Callable[[ReadingGroup], ReadingGroup]
 ) -> str:
-    experiment = experiment_of(document, planning=True, tolerant=True)
+    experiment = draft_of(document, planning=True)
     place = _position(experiment, str(action["position"]))
     if len(place.readings) > 1:
         text = f'position "{place.name}" has several groups of readings; change them in the text'
@@ -300,7 +301,7 @@ def _position(experiment: Experiment, name: str) -> Position:
 
 def _place_of(document: DesignDocument, name: str) -> tuple[Steps, int]:
     """Return the path of a position, and the number of positions."""
-    tree = to_python(experiment_of(document, planning=True, tolerant=True).tree)
+    tree = to_python(draft_of(document, planning=True).tree)
     entries = tree.get("positions") or ()
     for i, entry in enumerate(entries):
         if isinstance(entry, Mapping) and str(entry.get("name")) == name:

@@ -20,7 +20,8 @@ from ballplate.simulator.computing import ProgressStep, Report, begin_worker, in
 from ballplate.simulator.experiment import lay_out
 from ballplate.simulator.inputs import ExperimentError
 
-from .document import DesignDocument, experiment_of
+from .document import DesignDocument
+from .drafts import evaluable_of
 
 Work = Callable[[DesignDocument, Mapping[str, Any], Report], Any]
 
@@ -50,7 +51,7 @@ def _monte_carlo(document: DesignDocument, settings: Mapping[str, Any], report: 
     from ballplate.montecarlo import trials
     from ballplate.results import predict
 
-    experiment = experiment_of(document)
+    experiment = evaluable_of(document)
     result = trials(experiment, int(settings.get("trials", TRIALS)), report=report)
     return {"lines": replace(predict(experiment), monte_carlo=result).lines()}
 
@@ -58,7 +59,7 @@ def _monte_carlo(document: DesignDocument, settings: Mapping[str, Any], report: 
 def _plan(document: DesignDocument, settings: Mapping[str, Any], report: Report) -> Any:
     from ballplate.planning import Request, campaign
 
-    experiment = experiment_of(document, planning=True)
+    experiment = evaluable_of(document, planning=True)
     return {"lines": campaign(experiment, Request(), report=report).lines()}
 
 
@@ -79,7 +80,7 @@ def _fit(document: DesignDocument, settings: Mapping[str, Any], report: Report) 
     from ballplate.results import fit, reading_residuals
     from ballplate.simulator.readings import read_readings
 
-    experiment = experiment_of(document)
+    experiment = evaluable_of(document)
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / (Path(str(settings["name"])).name or "readings.csv")
         file.write_bytes(base64.b64decode(str(settings["content"])))

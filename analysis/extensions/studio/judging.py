@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import multiprocessing
 import os
-import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from multiprocessing.connection import Connection
@@ -14,7 +13,6 @@ from typing import Any
 
 from ballplate.results import check
 from ballplate.simulator.computing import begin_worker, interruptions_blocked
-from ballplate.simulator.experiment import Experiment
 from ballplate.simulator.inputs import (
     ExperimentError,
     Message,
@@ -24,10 +22,8 @@ from ballplate.simulator.inputs import (
 )
 
 from .answers import answer, later_answer, scene
-from .document import DesignDocument, data_of, experiment_of, variants_of
-
-# A position in the path of a message, by its number.
-POSITION = re.compile(r"positions\[(\d+)\]")
+from .document import DesignDocument, data_of, variants_of
+from .drafts import draft_of, evaluable, evaluable_of, problems
 
 
 @dataclass(frozen=True)
@@ -47,7 +43,7 @@ def judgement(document: DesignDocument) -> DesignJudgement:
     """Return the view of a document, and faults of its text."""
     variants = variants_of(document) if document.variant else ()
     try:
-        draft = experiment_of(document, tolerant=True)
+        draft = draft_of(document)
     except ExperimentError as error:
         return DesignJudgement(None, None, error.messages, data_of(document), variants)
     messages, data = draft.faults or (), to_python(draft.tree)
@@ -56,44 +52,8 @@ def judgement(document: DesignDocument) -> DesignJudgement:
         found = answer(evaluable(draft))
     except ExperimentError as error:
         messages = tuple(dict.fromkeys((*messages, *error.messages)))
-    seen = scene(draft, _problems(draft))
+    seen = scene(draft, problems(draft))
     return DesignJudgement(seen, found, messages, data, variants)
-
-
-def evaluable(draft: Experiment) -> Experiment:
-    """Return the experiment without the positions that have faults.
-
-    :raises ExperimentError: something else is wrong too, or nothing is left.
-    """
-    entries = to_python(draft.tree).get("positions") or ()
-    drawn = {place.name for place in draft.positions}
-    changes: dict[str, Any] = {}
-    # From the last on: what is taken out changes the numbers of those after it.
-    for i in sorted(_faulty(draft), reverse=True):
-        name = entries[i].get("name") if isinstance(entries[i], Mapping) else None
-        if str(name) in drawn:
-            changes[f"positions[{i}].enabled"] = False
-        else:
-            changes[f"positions[{i}]"] = None
-    return draft.with_(changes)
-
-
-def _faulty(draft: Experiment) -> dict[int, str]:
-    """Return the first fault of each position that has any, by its number."""
-    faults: dict[int, str] = {}
-    for message in draft.faults or ():
-        if found := POSITION.match(message.path):
-            faults.setdefault(int(found[1]), message.text)
-    return faults
-
-
-def _problems(draft: Experiment) -> dict[str, str]:
-    entries = to_python(draft.tree).get("positions") or ()
-    return {
-        str(entries[i].get("name")): text
-        for i, text in _faulty(draft).items()
-        if isinstance(entries[i], Mapping)
-    }
 
 
 def figures(document: DesignDocument) -> dict[str, Any]:
@@ -112,7 +72,7 @@ def later(document: DesignDocument) -> dict[str, Any]:
 
     :raises ExperimentError: nothing of it can be evaluated.
     """
-    return later_answer(evaluable(experiment_of(document, tolerant=True)))
+    return later_answer(evaluable_of(document))
 
 
 def matrix(document: DesignDocument, added: Sequence[DesignDocument]) -> dict[str, Any]:
@@ -124,9 +84,7 @@ def matrix(document: DesignDocument, added: Sequence[DesignDocument]) -> dict[st
     information = optional_service("position_information")
     if information is None:
         return {}
-    experiment, *more = (
-        evaluable(experiment_of(each, tolerant=True)) for each in (document, *added)
-    )
+    experiment, *more = (evaluable_of(each) for each in (document, *added))
     candidates = [each for each in more if len(each.positions) > len(experiment.positions)]
     data: dict[str, Any] = information(check(experiment), candidates).to_dict()
     return data

@@ -27,8 +27,9 @@ from .document import (
     undone,
     variants_of,
 )
+from .drafts import POSITION
 from .jobs import JOBS, MOST_RUNNING, Job, started
-from .judging import POSITION, DesignJudgement, Judge, figures, judgement, later, matrix
+from .judging import DesignJudgement, Judge, figures, judgement, later, matrix
 from .recovery import give_up, keep, recovered
 
 ENDINGS = (".yaml", ".yml")

@@ -19,7 +19,8 @@ from ballplate.simulator.experiment import Experiment, Position
 from ballplate.simulator.inputs import ExperimentError
 
 from .answers import place_data
-from .document import DesignDocument, experiment_of
+from .document import DesignDocument
+from .drafts import evaluable_of
 
 # Positions more that are told.
 MOST_TOLD = 5
@@ -32,7 +33,7 @@ def suggested_repairs(
 
     :raises ExperimentError: the text is invalid.
     """
-    experiment = experiment_of(document, planning=True)
+    experiment = evaluable_of(document, planning=True)
     repairs_found = repairs(experiment, report=report)
     complete = () if repairs_found is None else repairs_found.complete
     return [_repair_data(experiment, repair) for repair in complete]
@@ -72,7 +73,7 @@ def next_positions(document: DesignDocument, report: Report = unreported) -> lis
 
     :raises ExperimentError: the text is invalid.
     """
-    experiment = experiment_of(document, planning=True)
+    experiment = evaluable_of(document, planning=True)
     changes = [
         candidate
         for kind in (ChangeKind.POOL, ChangeKind.ADD_POSITION)

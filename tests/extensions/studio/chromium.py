@@ -69,15 +69,17 @@ def chromium() -> str | None:
 
 
 @contextmanager
-def tab(width: int = 1400, height: int = 900) -> Iterator:
-    """A tab of a browser, with `errors`, what went wrong in it, and `asked`, all requests."""
+def tab(width: int = 1400, height: int = 900, touches: bool = False) -> Iterator:
+    """A tab of a browser, on a touch screen or not, with `errors`, what went wrong in it, and
+    `asked`, all requests.
+    """
     from playwright.sync_api import sync_playwright
 
     path = chromium()
     with sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path=path, args=list(FLAGS))
         size = {"width": width, "height": height}
-        page = browser.new_context(viewport=size).new_page()
+        page = browser.new_context(viewport=size, has_touch=touches).new_page()
         page.errors, page.asked = [], []
         page.on("pageerror", lambda error: page.errors.append(str(error)))
         page.on(

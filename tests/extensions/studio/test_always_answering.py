@@ -163,3 +163,31 @@ def test_messages_name_the_position(document):
         assert message["what"] == 'position "z high"'
     finally:
         session.close()
+
+
+def test_suggestions_are_for_what_can_be_read(document):
+    """A plate outside is no reason not to look for further positions."""
+    from ballplate.extensions.studio.suggestions import next_positions
+
+    outside = done(document, {"do": "move", "position": "z high", "by": [0, 0, 2]})
+    expected = done(document, {"do": "off", "position": "z high"})
+    found, others = next_positions(outside), next_positions(expected)
+    assert [(one["words"], one["average"]) for one in found] == [
+        (one["words"], one["average"]) for one in others
+    ]
+    added = done(outside, {"do": "add", "settings": found[0]["settings"]})
+    assert len(scene_of(added)["positions"]) == len(NAMES) + 1
+
+
+def test_a_further_position_has_a_name_of_its_own_beside_one_that_is_off(document):
+    """Both for what is added by hand and for what a repair adds."""
+    copied = done(document, {"do": "copy", "position": "z low"})
+    off = done(copied, {"do": "off", "position": "z low 2"})
+    again = done(off, {"do": "copy", "position": "z low"})
+    assert [place["name"] for place in scene_of(again)["positions"]][-2:] == ["z low 2", "z low 3"]
+    assert judgement(again).messages == ()
+    strict = experiment_of(off)
+    from ballplate.extensions.repair.positions import with_added
+
+    added = with_added(strict, strict.positions[0])
+    assert added.positions[-1].name == "z low 3"

@@ -160,9 +160,10 @@ def test_what_an_action_lacks_is_told(design, action, words):
     assert words in str(told.value)
 
 
-def test_a_move_out_of_the_volume_is_refused_with_how_far(design):
+def test_a_move_out_of_the_volume_is_written_and_no_experiment(design):
+    moved = done(opened(design), {"do": "move", "position": "z low", "by": [0.0, 0.0, -0.4]})
     with pytest.raises(ExperimentError, match=wording.BELOW_THE_MEASURING_VOLUME):
-        done(opened(design), {"do": "move", "position": "z low", "by": [0.0, 0.0, -0.4]})
+        experiment_of(moved)
 
 
 def test_a_text_that_is_wrong_is_kept_and_told_with_its_line(design):

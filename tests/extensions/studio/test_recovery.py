@@ -307,7 +307,6 @@ def test_no_change_brings_a_model_in_python_into_a_file_that_was_not_named(desig
         {"do": "set", "path": ["error_model", "kind"], "value": "python"},
         {"do": "set", "path": ["true_machine"], "value": SETTINGS},
         {"do": "repair", "edits": [{"path": ["true_machine"], "value": settings, "is_new": False}]},
-        {"do": "add", "settings": settings},
     ):
         session.act(action)
         assert session.state()["messages"]
@@ -320,6 +319,11 @@ def test_no_change_brings_a_model_in_python_into_a_file_that_was_not_named(desig
                 session.preview({"do": name, "position": "z low", "across": "x"})
         session.act({"do": "undo"})
         assert session.state()["messages"] == [] and not ran.exists()
+    # A position that says so is no position: what else there is, is evaluated.
+    session.act({"do": "add", "settings": settings})
+    session.preview({"do": "turn", "position": "z low"})
+    state = session.state()
+    assert state["messages"] and not state["stale"] and not ran.exists()
 
 
 def test_no_sweep_brings_a_model_in_python_into_a_file_that_was_not_named(design, ran):
