@@ -37,6 +37,7 @@ BUILDS_ON = {
     ("pages", "maps"): "the page of a design has its map of lengths",
     ("pages", "reliability"): "pages show how gross errors would act",
     ("reliability", "laboratory"): "offsets that are stated wrong are searched as in readings",
+    ("studio", "maps"): "the studio shows the map of lengths in the volume",
     ("studio", "pages"): "the studio moves designs as pages do",
     ("sweeps", "pages"): "the page of a sweep is a page",
     ("studio", "repair"): "the studio writes changes into the file as repairs are written",

@@ -245,8 +245,13 @@ def _weak_roots(at: Linearisation, target: Target | None) -> tuple[Array, Array]
     """Return weak directions (s, k), one standard deviation long, weakest first, and their effects
     on corrected points.
     """
+    limit = weak_limit(at.design, target)
+    change = relative_changes(at.design, at.layout, at.shared)
+    # All directions together have less effect than that: none is weak.
+    if 2.0 * (change**2).sum() <= 0.5 * limit**2 * change[:, :, :1].size:
+        return np.zeros((len(at.layout), 0)), np.zeros(0)
     root, effect = _principal(at)
-    columns = np.flatnonzero(above(effect, weak_limit(at.design, target)))[::-1]
+    columns = np.flatnonzero(above(effect, limit))[::-1]
     return root[:, columns], effect[columns]
 
 

@@ -40,7 +40,7 @@ class Quantity:
     `largest`, the name of the maximum, is empty. `within_target` is the share of distances whose
     uncertainty, `coverage_factor` times the standard one, is within the target uncertainty
     (undetermined ones are not); None without target. `places` locate the evaluation points of
-    `largest`. `named` are distances with names, `parameters` names of parameters with their
+    `largest`, and `pair` are their indices if it is a distance. `named` are distances with names, `parameters` names of parameters with their
     uncertainties, NaN if undetermined.
     """
 
@@ -54,6 +54,7 @@ class Quantity:
     within_target: float | None = None
     coverage_factor: float = 1.0
     places: tuple[str, ...] = ()
+    pair: tuple[int, int] | None = None
     named: tuple[TaskUncertainty, ...] = field(default=(), repr=False)
     parameters: tuple[tuple[str, float], ...] = field(default=(), repr=False)
 
@@ -196,9 +197,8 @@ def _of_pairs(
         average = sigma * pairs.total / determined
         quantity = replace(quantity, maximum=sigma * pairs.maximum, average=average, largest=where)
         if isinstance(places, MeasuredPoints):
-            quantity = replace(
-                quantity, places=tuple(_point(places, label) for label in pairs.where)
-            )
+            ends = tuple(_point(places, label) for label in pairs.where)
+            quantity = replace(quantity, places=ends, pair=pairs.where)
     if target is None:
         return quantity
     return replace(

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cache
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -157,11 +159,17 @@ def plane_of(rotation: Array) -> tuple[Any, int] | None:
     >>> plane_of(np.eye(3)), plane_of(-np.eye(2)), plane_of(np.diag([1.0, -1.0, -1.0]))
     (('z', 0), ('z', 2), None)
     """
-    for plane in ("x", "y", "z") if len(rotation) == 3 else ("z",):
-        for turns in range(4):
-            if np.abs(rotation - plane_rotation(plane, turns, len(rotation))).max() < 1e-12:
-                return plane, turns
+    for plane_axis, in_plane in _plane_rotations(len(rotation)):
+        if np.abs(rotation - in_plane).max() < 1e-12:
+            return plane_axis
     return None
+
+
+@cache
+def _plane_rotations(dimension: int) -> list[tuple[tuple[str, int], Array]]:
+    """Return all planes with their quarter-turns, and their rotations (d, d)."""
+    every = product("xyz" if dimension == 3 else "z", range(4))
+    return [((plane, turns), plane_rotation(plane, turns, dimension)) for plane, turns in every]
 
 
 def _angles(rotation: Array) -> Any:

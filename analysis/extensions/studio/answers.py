@@ -1,5 +1,5 @@
-"""The studio's view of a design: its objects, its uncertainties, and motions of undetermined
-directions.
+"""The studio's view of a design: its objects, its uncertainties, maps of them, and motions of
+undetermined directions.
 """
 
 from __future__ import annotations
@@ -9,23 +9,22 @@ from time import perf_counter
 from typing import Any
 
 import numpy as np
+from ballplate.extensions.maps.length_map import length_map, length_settings
 from ballplate.extensions.pages.motions import (
     moved_balls,
     moved_points,
     null_motions,
     weak_motions,
 )
+from ballplate.extensions.pages.page_facts import target_in_words
 from ballplate.extensions.repair.written import plane_of
-from ballplate.extensions.sweeps.error_map_uncertainty import point_map
-from ballplate.presentation import Data, finite, picked
+from ballplate.extensions.sweeps.error_map_uncertainty import LEVELS, ErrorMap, Slice, point_map
+from ballplate.presentation import Data, finite, percent, picked, uncertainty_words
 from ballplate.rank import Verdict, verdict
 from ballplate.results import (
-    length_headline,
     predict,
-    rank_words,
     scale_lines,
     scale_warnings,
-    target_lines,
 )
 from ballplate.simulator.computing import single_threaded
 from ballplate.simulator.design import locations
@@ -38,39 +37,60 @@ from ballplate.uncertainty import Quantity, uncertainties
 # Nodes of the lattice along each axis: edges of it that bend are drawn as curves.
 NODES = 9
 
-# Nodes of the map along each axis: few enough to answer while a plate is dragged.
-MAP_NODES = 11
+# Nodes of the map of points along each axis, and of that of lengths, which has all lengths between.
+MAP_NODES, LENGTH_NODES = 11, 9
+
+# What lengths are compared with where the file states no target; the map shows them in metres.
+NO_TARGET = "1 um"
 
 
 @single_threaded
-def answer(experiment: Experiment) -> dict[str, Any]:
+def answer(experiment: Experiment, moving: bool = False) -> dict[str, Any]:
     """Return the immediate view of a design, as plain data in metres, with the seconds of
     computation.
+
+    While something is `moving`, undetermined directions are counted, but not described.
     """
     start = perf_counter()
     design, target = lay_out(experiment), experiment.target_uncertainty
     linearisation = linearise(design)
-    judged = verdict(linearisation, experiment.expected_rank_deficiency, target)
-    quantities = uncertainties(linearisation, target=target)
-    found_map = _map(linearisation)
-    engine = perf_counter() - start
-    lengths = quantities.get("U6")
+    quantities = uncertainties(linearisation, target=target, symbols=("U6", "tasks"))
+    expected, lengths = experiment.expected_rank_deficiency, quantities.get("U6")
+    judged = None if moving else verdict(linearisation, expected, target)
     return {
         **picked(experiment, "title", "label"),
         "rank": {
-            "words": rank_words(judged),
-            **picked(judged, "deficiency", "expected", "parameters", "observations"),
-            "reasons": list(judged.reasons),
+            "deficiency": linearisation.deficiency,
+            "expected": expected,
+            "parameters": design.parameter_count,
+            "observations": design.observation_count,
+            "reasons": [] if judged is None else list(judged.reasons),
+            "directions": [] if judged is None else _directions(judged),
         },
         "quantities": [_row(quantity) for quantity in quantities.values()],
-        "headline": length_headline(quantities),
-        "target": [] if target is None else target_lines(lengths),
-        "within": None if lengths is None else lengths.within_target,
-        "motions": _motions(linearisation, judged, target),
-        "map": found_map,
+        "target": target_in_words(experiment),
+        "by": "" if target is None else uncertainty_words(target.coverage_factor),
+        "within": lengths and lengths.within_target,
+        "share": "" if target is None or lengths is None else percent(lengths.within_target or 0.0),
+        "worst": None if lengths is None else _worst(linearisation, lengths),
         "doubts": list(experiment.doubts),
-        "engine": engine,
         "seconds": perf_counter() - start,
+    }
+
+
+@single_threaded
+def drawn_answer(experiment: Experiment, kind: str, motion: int | None) -> dict[str, Any]:
+    """Return what is drawn when nothing moves: the map of a `kind`, "lengths", "points" or None
+    for another, the motion of an undetermined direction by its index, and all quantities.
+    """
+    linearisation = linearise(lay_out(experiment))
+    target = experiment.target_uncertainty
+    quantities = uncertainties(linearisation, target=target)
+    maps = {"lengths": lambda: _length_map(experiment), "points": lambda: _map(linearisation)}
+    return {
+        "quantities": [_row(quantity) for quantity in quantities.values()],
+        "map": maps[kind]() if kind in maps else None,
+        "motions": None if motion is None else _motions(linearisation, target, motion),
     }
 
 
@@ -85,6 +105,19 @@ def later_answer(experiment: Experiment) -> dict[str, Any]:
         "lines": [*scale_lines(scale), *scale_warnings(scale)],
         "assumptions": assumptions and {**assumptions.to_dict(), "warning": assumptions.warning},
     }
+
+
+def _directions(judged: Verdict) -> list[Data]:
+    undetermined = [{"words": str(direction), "weak": False} for direction in judged.null]
+    return undetermined + [{"words": str(direction), "weak": True} for direction in judged.weak]
+
+
+def _worst(linearisation: Linearisation, lengths: Quantity) -> Data | None:
+    """Return the ends of the length with the largest standard uncertainty, at scale readings."""
+    if lengths.pair is None:
+        return None
+    first, second = linearisation.design.evaluation.points[list(lengths.pair)].tolist()
+    return {"from": first, "to": second, "uncertainty": lengths.maximum}
 
 
 def _row(quantity: Quantity) -> Data:
@@ -134,46 +167,30 @@ def place_data(experiment: Experiment, place: Position) -> Data:
     }
 
 
-def _motions(
-    linearisation: Linearisation, judged: Verdict, target: Target | None
-) -> dict[str, Any]:
+def _motions(linearisation: Linearisation, target: Target | None, index: int) -> Data | None:
     """Return the motion of a lattice through the volume (x running slowest) and of the balls read
-    along each undetermined and each weak direction, per unit of the largest displacement.
+    along an undetermined or a weak direction, per unit of the largest displacement; None if there
+    is no direction of that index.
 
     Their common rigid motion, which no distance shows, is removed.
     """
     design = linearisation.design
-    volume, readings, offsets = (
-        design.machine.volume,
-        design.readings,
-        design.probes.offsets,
-    )
+    found = (*null_motions(linearisation), *weak_motions(linearisation, target))
+    if not 0 <= index < len(found):
+        return None
+    volume, readings = design.machine.volume, design.readings
     nodes = even_grid(volume.lower, volume.upper, [NODES] * len(volume.lower))
     of_nodes = np.full(len(nodes), design.evaluation.probe)
     of_plates = readings.select(design.plate_readings)
-    places = np.concatenate(
-        [nodes + offsets[of_nodes], locations(design, linearisation.state, of_plates)]
-    )
-    directions = (*judged.null, *judged.weak)
-    motions = []
-    for k, motion in enumerate(
-        (*null_motions(linearisation), *weak_motions(linearisation, target))
-    ):
-        by = [
-            moved_points(linearisation, motion, nodes, of_nodes),
-            moved_balls(linearisation, motion, of_plates),
-        ]
-        moved = without_rigid_motion(places, np.concatenate(by)[:, :, None])[:, :, 0]
-        largest = float(np.linalg.norm(moved, axis=1).max())
-        rounded = np.round(moved / (largest or 1.0), 4).tolist()
-        motions.append(
-            {
-                "words": str(directions[k]),
-                "weak": k >= len(judged.null),
-                "nodes": rounded[: len(nodes)],
-                "readings": rounded[len(nodes) :],
-            }
-        )
+    balls = locations(design, linearisation.state, of_plates)
+    places = np.concatenate([nodes + design.probes.offsets[of_nodes], balls])
+    by = [
+        moved_points(linearisation, found[index], nodes, of_nodes),
+        moved_balls(linearisation, found[index], of_plates),
+    ]
+    moved = without_rigid_motion(places, np.concatenate(by)[:, :, None])[:, :, 0]
+    largest = float(np.linalg.norm(moved, axis=1).max())
+    rounded = np.round(moved / (largest or 1.0), 4).tolist()
     first = np.array([design.balls.of(int(artefact)).min() for artefact in design.balls.artefact])
     numbers = np.arange(len(first)) - first
     return {
@@ -181,22 +198,51 @@ def _motions(
         "names": list(design.positions.names),
         "position": of_plates.position.tolist(),
         "ball": numbers[of_plates.ball].tolist(),
-        "directions": motions,
+        "direction": {"nodes": rounded[: len(nodes)], "readings": rounded[len(nodes) :]},
     }
 
 
-def _map(linearisation: Linearisation) -> dict[str, Any]:
+def _length_map(experiment: Experiment) -> Data:
+    """Return the largest uncertainty of the lengths from each point of a grid, as a ratio to the
+    target, or in metres without one; None if one of them is undetermined.
+    """
+    counts = (LENGTH_NODES, LENGTH_NODES, len(LEVELS))[: experiment.dimension]
+    target = target_in_words(experiment)
+    lengths = length_map(experiment, length_settings(experiment, target or NO_TARGET, counts))
+    groups = lengths.by_point
+    values = lengths.settings.target_factor * groups.maximum_ratio if target else groups.maximum
+    values = np.where(groups.undetermined > 0, np.nan, values)
+    axes = [np.unique(points) for points in lengths.points.T]
+    heights: list[float | None] = axes[2].tolist() if len(axes) == 3 else [None]
+    of_levels = values.reshape(len(axes[0]), len(axes[1]), -1).transpose(2, 1, 0)
+    slices = [
+        Slice(name, height, level)
+        for name, height, level in zip(LEVELS, heights, of_levels, strict=False)
+    ]
+    largest = float(np.nanmax(values, initial=0.0))
+    high, unit = (max(1.0, largest), "target") if target else (largest, "m")
+    scale = {"low": 0.0, "high": high, "largest": largest, "unit": unit}
+    return _map_data(ErrorMap(axes[0], axes[1], tuple(slices), None)) | {"scale": scale}
+
+
+def _map(linearisation: Linearisation) -> Data:
     """Return standard uncertainties of corrected points through the volume, None if
     undetermined.
     """
-    mapped = point_map(linearisation, MAP_NODES)
+    return _map_data(point_map(linearisation, MAP_NODES))
+
+
+def _map_data(mapped: ErrorMap) -> Data:
+    def written(value: float) -> float | None:
+        return finite(float(f"{value:.4g}"))
+
     return {
         "x": mapped.x.tolist(),
         "y": mapped.y.tolist(),
         "slices": [
             {
                 **picked(map_slice, "name", "level"),
-                "values": [[finite(v) for v in row] for row in map_slice.values.tolist()],
+                "values": [[written(v) for v in row] for row in map_slice.values.tolist()],
             }
             for map_slice in mapped.slices
         ],

@@ -38,6 +38,8 @@ def evaluable(draft: Experiment) -> Experiment:
 
     :raises ExperimentError: something else is wrong too, or nothing is left.
     """
+    if not draft.faults and all(place.enabled for place in draft.positions):
+        return draft
     entries = to_python(draft.tree).get("positions") or ()
     drawn = {place.name for place in draft.positions}
     changes: dict[str, Any] = {}

@@ -21,7 +21,7 @@ from ballplate.simulator.inputs import (
     to_python,
 )
 
-from .answers import answer, later_answer, scene
+from .answers import answer, drawn_answer, later_answer, scene
 from .document import DesignDocument, data_of, variants_of
 from .drafts import draft_of, evaluable, evaluable_of, problems
 
@@ -39,8 +39,8 @@ class DesignJudgement:
     variants: tuple[str, ...]
 
 
-def judgement(document: DesignDocument) -> DesignJudgement:
-    """Return the view of a document, and faults of its text."""
+def judgement(document: DesignDocument, moving: bool = False) -> DesignJudgement:
+    """Return the view of a document, and faults of its text; `moving`: see `answer`."""
     variants = variants_of(document) if document.variant else ()
     try:
         draft = draft_of(document)
@@ -49,7 +49,7 @@ def judgement(document: DesignDocument) -> DesignJudgement:
     messages, data = draft.faults or (), to_python(draft.tree)
     found = None
     try:
-        found = answer(evaluable(draft))
+        found = answer(evaluable(draft), moving)
     except ExperimentError as error:
         messages = tuple(dict.fromkeys((*messages, *error.messages)))
     seen = scene(draft, problems(draft))
@@ -57,14 +57,25 @@ def judgement(document: DesignDocument) -> DesignJudgement:
 
 
 def figures(document: DesignDocument) -> dict[str, Any]:
-    """Return the scene of a document and the answer to what of it can be evaluated.
+    """Return the answer to what of a document can be evaluated while it is moved, and what is
+    wrong with its positions.
 
     :raises ExperimentError: nothing can.
     """
-    judged = judgement(document)
-    if judged.answer is None:
+    judged = judgement(document, moving=True)
+    if judged.answer is None or judged.scene is None:
         raise ExperimentError(judged.messages)
-    return {**judged.answer, "scene": judged.scene}
+    places = judged.scene["positions"]
+    wrong = [{"name": place["name"], "problem": place["problem"]} for place in places]
+    return {**judged.answer, "scene": {"positions": wrong}}
+
+
+def drawn(document: DesignDocument, kind: str, motion: int | None) -> dict[str, Any]:
+    """Return the map of a document's design, a motion and all quantities; see `drawn_answer`.
+
+    :raises ExperimentError: nothing of it can be evaluated.
+    """
+    return drawn_answer(evaluable_of(document), kind, motion)
 
 
 def later(document: DesignDocument) -> dict[str, Any]:

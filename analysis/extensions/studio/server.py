@@ -80,6 +80,7 @@ def application(session: Session, token: str, port: int) -> Starlette:
                 _answering(lambda request, body: session.matrix(body.get("settings"))),
                 methods=["POST"],
             ),
+            Route("/api/drawn", _answering(_drawing(session)), methods=["POST"]),
             Route("/api/later", _answering(lambda request, body: session.later())),
             Route("/pages/{number:int}", _made_page(session)),
             Mount("/static", StaticFiles(directory=STATIC)),
@@ -249,6 +250,14 @@ def _stopping(session: Session) -> Work:
         return session.jobs()
 
     return stop
+
+
+def _drawing(session: Session) -> Work:
+    def draw(request: Request, body: dict[str, Any]) -> Any:
+        motion = body.get("motion")
+        return session.drawn(str(body.get("map")), motion if isinstance(motion, int) else None)
+
+    return draw
 
 
 def _schema() -> Any:

@@ -29,7 +29,7 @@ from .document import (
 )
 from .drafts import POSITION
 from .jobs import JOBS, MOST_RUNNING, Job, started
-from .judging import DesignJudgement, Judge, figures, judgement, later, matrix
+from .judging import DesignJudgement, Judge, drawn, figures, judgement, later, matrix
 from .recovery import give_up, keep, recovered
 
 ENDINGS = (".yaml", ".yml")
@@ -199,6 +199,18 @@ class Session:
         found = self._computed(partial(matrix, added=added), document, self._beside)
         return {"fingerprint": document.fingerprint, **found}
 
+    def drawn(self, kind: str, motion: int | None) -> dict[str, Any]:
+        """Return the map of a `kind`, the motion of a direction by its index, all quantities of
+        the design, and its fingerprint.
+
+        :raises ExperimentError: the text is invalid.
+        :raises RefusedError: another request came meanwhile.
+        """
+        with self._lock:
+            document = self._document
+        work = partial(drawn, kind=kind, motion=motion)
+        return {"fingerprint": document.fingerprint, **self._computed(work, document, self._aside)}
+
     def start(self, name: str, settings: Mapping[str, Any]) -> int:
         """Start a computation, and return its number.
 
@@ -347,7 +359,9 @@ class Session:
             raise RefusedError("the results are being computed; wait for them")
         if self._judgement.answer is None:
             raise RefusedError("there are no figures of this design; correct it before keeping it")
-        self._kept = None if action.get("off") else self._answer
+        self._kept = None if action.get("off") else self._computed(
+            _quantities, self._document, self._aside
+        )
         self.revision += 1
 
     def _save(self, action: Mapping[str, Any]) -> None:
@@ -405,6 +419,10 @@ class Session:
         except OSError:
             # The folder is gone, or may not be read any more.
             return []
+
+
+def _quantities(document: DesignDocument) -> dict[str, Any]:
+    return drawn(document, "none", None)
 
 
 def _with_first_variant(document: DesignDocument) -> DesignDocument:
