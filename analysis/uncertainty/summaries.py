@@ -40,8 +40,8 @@ class Quantity:
     `largest`, the name of the maximum, is empty. `within_target` is the share of distances whose
     uncertainty, `coverage_factor` times the standard one, is within the target uncertainty
     (undetermined ones are not); None without target. `places` locate the evaluation points of
-    `largest`, and `pair` are their indices if it is a distance. `named` are distances with names, `parameters` names of parameters with their
-    uncertainties, NaN if undetermined.
+    `largest`, and `pair` are their indices if it is a distance. `named` are distances with names,
+    `parameters` names of parameters with their uncertainties, NaN if undetermined.
     """
 
     symbol: str

@@ -13,6 +13,7 @@ from ballplate.designs import shipped
 
 pytest.importorskip("starlette", reason="the studio is an extra")
 
+from ballplate.extensions.maps.length_map import length_map, length_settings
 from ballplate.extensions.studio.server import application
 from ballplate.extensions.studio.session import RefusedError, Session
 from ballplate.results.checked_designs import predict
@@ -57,6 +58,7 @@ REQUESTS = [
     ("GET", "/api/schema"),
     ("GET", "/api/later"),
     ("POST", "/api/matrix"),
+    ("POST", "/api/drawn"),
     ("GET", "/pages/1"),
     ("GET", "/static/studio.js"),
     ("POST", "/api/do"),
@@ -154,10 +156,18 @@ def test_figures_are_those_of_run(client, design):
     found = answer.json()["design"]
     client.post("/api/do", json={"do": "save"})
     (experiment,) = load(design)
-    for row in found["quantities"]:
-        expected = predict(experiment).quantities[row["symbol"]]
-        assert row["average"] == expected.average and row["maximum"] == expected.maximum
-    assert found["rank"]["deficiency"] == 0 and found["within"] == expected.within_target
+    drawn = client.post("/api/drawn", json={"map": "lengths"}).json()
+    expected = predict(experiment).quantities
+    assert [row["symbol"] for row in drawn["quantities"]] == list(expected)
+    for row in (*found["quantities"], *drawn["quantities"]):
+        quantity = expected[row["symbol"]]
+        assert row["average"] == quantity.average and row["maximum"] == quantity.maximum
+    lengths = expected["U6"]
+    assert found["rank"]["deficiency"] == 0 and found["within"] == lengths.within_target
+    # The worst length is the one that is named.
+    for end, place in zip(("from", "to"), lengths.places, strict=True):
+        shown = ", ".join(f"{round(1e3 * value, 1) + 0.0:.9g}" for value in found["worst"][end])
+        assert f"({shown}) mm" in place
     later = client.get("/api/later").json()
     prediction = predict(experiment, with_scale=True)
     assert later["fingerprint"] == answer.json()["fingerprint"]
@@ -369,6 +379,57 @@ def test_what_is_no_action_is_answered_with_an_error(client, body):
     assert answer.status_code in (200, 400) and answer.json()["error"]
 
 
+def test_the_map_of_lengths_is_that_of_run(client, design):
+    found = client.post("/api/drawn", json={"map": "lengths", "motion": 0}).json()
+    assert found["motions"] is None
+    (experiment,) = load(design)
+    lengths = length_map(experiment, length_settings(experiment, grid=(9, 9, 3)))
+    drawn = found["map"]
+    assert drawn["scale"]["unit"] == "target" and drawn["scale"]["high"] == 1.0
+    ratios = {
+        tuple(point): ratio
+        for point, ratio in zip(
+            lengths.points.round(9).tolist(), lengths.by_point.maximum_ratio, strict=True
+        )
+    }
+    for level in drawn["slices"]:
+        for y, row in zip(drawn["y"], level["values"], strict=True):
+            for x, value in zip(drawn["x"], row, strict=True):
+                place = round(x, 9), round(y, 9), round(level["level"], 9)
+                assert value == pytest.approx(ratios[place], rel=1e-3)
+    # Without a target it is in metres; where some lengths are undetermined, nothing is shown.
+    text = client.get("/api/state").json()["text"].replace("target_uncertainty:", "# target:")
+    client.post("/api/do", json={"do": "text", "text": text})
+    found = client.post("/api/drawn", json={"map": "lengths"}).json()["map"]
+    assert found["scale"]["unit"] == "m" and 1e-8 < found["scale"]["high"] < 1e-5
+    for name in ("x low", "x high", "y low", "y high"):
+        client.post("/api/do", json={"do": "off", "position": name})
+    found = client.post("/api/drawn", json={"map": "lengths", "motion": 0}).json()
+    assert {v for level in found["map"]["slices"] for row in level["values"] for v in row} == {None}
+    assert client.post("/api/drawn", json={"map": ""}).json()["map"] is None
+
+
+def test_a_preview_is_small(tmp_path):
+    """Twenty positions that leave much undetermined: twenty kilobytes at most."""
+    lines = Path(shipped("quickstart.yaml")).read_text().splitlines(keepends=True)
+    names = ("z high", "x low", "x high", "y low", "y high")
+    kept = [line for line in lines if not any(f"name: {name}," in line for name in names)]
+    (at,) = (k for k, line in enumerate(kept) if "name: z low" in line)
+    kept[at:at] = [
+        kept[at].replace("z low", f"z {k}").replace("250 mm", f"{250 + 20 * k} mm")
+        for k in range(1, 20)
+    ]
+    path = tmp_path / "twenty.yaml"
+    path.write_text("".join(kept))
+    session = Session(path)
+    try:
+        found = session.preview({"do": "move", "position": "z low", "by": [0.01, 0.0, 0.0]})
+        assert found["rank"]["deficiency"] > 10 and len(found["scene"]["positions"]) == 20
+        assert len(json.dumps(found)) <= 20_000
+    finally:
+        session.close()
+
+
 @pytest.mark.parametrize(
     "file, variant",
     [
@@ -383,10 +444,12 @@ def test_what_is_undetermined_moves_a_plate_in_the_same_way_wherever_it_stands(f
     """
     session = Session(Path(shipped(file)), variant)
     design = session.state()["design"]
-    motions, positions = design["motions"], design["scene"]["positions"]
-    found = [one for one in motions["directions"] if not one["weak"]]
+    positions, directions = design["scene"]["positions"], design["rank"]["directions"]
+    found = [k for k, one in enumerate(directions) if not one["weak"]]
     assert len(found) == design["rank"]["deficiency"] > 0
-    for direction in found:
+    for k in found:
+        motions = session.drawn("", k)["motions"]
+        direction = motions["direction"]
         assert np.linalg.norm(direction["nodes"] + direction["readings"], axis=1).max() <= 1.0002
         seen = {}
         for position, ball, by in zip(

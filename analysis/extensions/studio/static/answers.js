@@ -1,56 +1,115 @@
 // The verdict, its figures, what is assumed and what is undetermined.
 import { $, act, ask, make, micro, page, refocus } from "./page.js";
 
+// How far colours of the map go, in words.
 export function legend() {
-  const range = page.view.mapRange();
+  const kind = $("map").value;
+  const { map } = page.state.design ?? {};
+  const values = map?.slices.flatMap((slice) => slice.values.flat()) ?? [];
+  const known = values.filter((value) => value !== null);
   $("legend").replaceChildren();
-  if (!$("show-map").checked) return;
-  if (!range || !range.high) {
+  if (!kind || !map) return;
+  if (!known.length) {
     $("legend").append("Map: everything is undetermined, so that there is nothing to colour.");
     return;
   }
-  $("legend").append("Map: standard uncertainty of a corrected co-ordinate, ",
-    make("span", { class: "nowrap" },
-      `${micro(range.low)} µm `, make("span", { class: "ramp" }), ` ${micro(range.high)} µm`),
-    range.open ? "; grey: undetermined" : "");
+  const to_target = map.scale?.unit === "target";
+  const words = (value) => (to_target ? `${Number(value.toPrecision(2))}` : `${micro(value)} µm`);
+  const [least, most] = [Math.min(...known), Math.max(...known)];
+  const high = map.scale?.high ?? most;
+  $("legend").append(
+    to_target ? "Largest uncertainty of the lengths from each point, as a ratio to the target: "
+      : kind === "lengths" ? "Largest standard uncertainty of the lengths from each point: "
+        : "Standard uncertainty of a corrected co-ordinate, which depends on the origin: ",
+    make("span", { class: "nowrap" }, words(map.scale?.low ?? least), " ",
+      make("span", { class: "ramp" }), ` ${words(high)}`,
+      to_target && high === 1 ? " = target" : ""),
+    map.scale ? `; here ${words(least)} to ${words(most)}` : "",
+    to_target && high > 1 ? " (1 = target)" : "",
+    known.length < values.length ? "; grey: undetermined" : "");
 }
 
+const counted = (number) => number.toLocaleString("en");
+const figure = (text, words, ...more) => make("div", { class: "figure" },
+  make("span", { class: "big" }, text), make("span", {}, words, ...more));
+
+// Figures of U6, or that it is undetermined, and the share of lengths within the target.
+function answered({ rank, quantities, target, by, share, within }) {
+  const lengths = quantities.find((row) => row.symbol === "U6");
+  if (!lengths) return [figure("–", "no evaluation points: no lengths are judged")];
+  const { average, maximum, count, undetermined } = lengths;
+  const was = (key) => {
+    const row = page.state.kept?.quantities.find((one) => one.symbol === "U6");
+    return row ? ` (was ${micro(row[key])})` : "";
+  };
+  const is_all = undetermined === count;
+  const open = undetermined ? [figure("Undetermined", is_all ? "All distances are undetermined."
+    : `${counted(undetermined)} of ${counted(count)} distances are undetermined.`)] : [];
+  open.forEach((one) => one.classList.add("bad"));
+  const others = undetermined ? " of the others" : "";
+  const amounts = is_all ? [] : [
+    figure(`${micro(average)} µm`, `U6${others} on average${was("average")}`),
+    figure(`${micro(maximum)} µm`, `U6${others} at most${was("maximum")}`)];
+  const compared = !target ? figure("No target", "target_uncertainty is not stated")
+    : figure(share, `of ${counted(count)} distances are within the target ${target} (${by})`,
+      make("progress", { value: within, "aria-label": "share within the target" }));
+  if (target && within < 1) compared.classList.add(rank.deficiency ? "bad" : "warn");
+  if (target && within === 1) compared.classList.add("good");
+  return [...open, ...amounts, ...(is_all ? [] : [compared])];
+}
+
+const rank_words = ({ deficiency, expected, directions }) => {
+  const weak = directions.filter((one) => one.weak).length;
+  return [deficiency ? `Rank deficiency ${deficiency}` : "Full rank",
+    deficiency === (expected ?? 0) ? "" : ` (the file expects ${expected ?? 0})`,
+    weak ? `; ${weak} weakly determined` : ""].join("");
+};
+
 export function figures(design, messages, pending = false) {
-  const box = $("verdict");
   const rank = design?.rank;
-  const wrong = page.state.stale || pending;
-  box.classList.toggle("bad", wrong || rank.deficiency > 0);
+  const moving = design !== page.state.design;
+  const wrong = !moving && (page.state.stale || pending);
   const left_out = design?.scene.positions.filter((place) => place.problem) ?? [];
-  const is_missed = design?.within !== null && design?.within < 1;
-  box.classList.toggle("warn", !wrong && !rank.deficiency && is_missed);
+  const is_missed = rank && design.within !== null && design.within < 1;
   const reason = pending ? "Computing"
     : messages[0]?.line ? "The text is invalid" : "The text cannot be evaluated";
-  const expected = rank?.expected ?? 0;
-  const head = wrong ? [make("strong", {}, rank
-    ? `${reason}; these are the figures before it.` : `${reason}; there are no figures yet.`)]
-    : [make("strong", {}, rank.words),
-      rank.deficiency === expected ? "" : ` (the file expects ${expected})`];
-  const figured = rank ? [
-    ...(left_out.length && !wrong ? [`of the positions without ${left_out.map((one) => one.name)
-      .join(", ")}, which cannot be read there`] : []),
-    `${rank.parameters} parameters, ${rank.observations} observations`,
-    // The target's words have U6 in them.
-    ...(design.target.length ? design.target : design.headline),
-    ...rank.reasons,
-  ] : [];
-  box.replaceChildren(make("p", {}, ...head), ...figured.map((text) => make("p", {}, text)),
-    left_out.length ? make("p", {}, make("button", { id: "fit", onclick: () => act({ do: "fit" }) },
-      "Fit all positions to the volume")) : "");
+  const notes = [
+    wrong ? `${reason}; ${rank ? "these are the figures before it." : "there are no figures yet."}`
+      : rank ? rank_words(rank) : "",
+    left_out.length && !wrong ? `of the positions without ${left_out.map((one) => one.name)
+      .join(", ")}, which cannot be read there` : ""].filter(Boolean);
+  const box = $("verdict");
+  box.classList.toggle("bad", wrong || rank?.deficiency > 0);
+  box.classList.toggle("old", wrong);
+  box.classList.toggle("warn", !wrong && !rank?.deficiency && is_missed);
+  const fit = make("button", { id: "fit", onclick: () => act({ do: "fit" }) },
+    "Fit all positions to the volume");
+  box.replaceChildren(...(rank ? answered(design) : []),
+    make("div", { class: "notes" }, ...notes.map((text) => make("p", {}, text)),
+      left_out.length ? fit : null));
+  const next = rank?.deficiency ? "suggest" : is_missed ? "next" : "";
+  $("next").querySelectorAll("button").forEach((button) =>
+    button.classList.toggle("primary", button.dataset.job === next));
+  page.view.lengths?.(rank && design.worst ? [{ ...design.worst,
+    label: `${micro(design.worst.uncertainty)} µm` }] : []);
+  if (moving) return;
   $("messages").replaceChildren(...messages.map(message),
     ...(design?.doubts ?? []).map((text) => make("li", {}, text)));
-  if (rank) quantities(design);
-  else $("quantities").replaceChildren();
+  const figured = [...box.querySelectorAll(".figure")].map((one) =>
+    [...one.children].map((part) => part.textContent).join(" "));
+  const said = [...(wrong ? [] : figured), ...notes].join("; ");
+  if (!pending && $("said").textContent !== said) $("said").textContent = said;
+  $("counts").replaceChildren(...(rank ? [
+    `${rank.parameters} parameters from ${rank.observations} observations`, ...rank.reasons,
+  ].map((text) => make("p", {}, text)) : []));
+  quantities(rank && !wrong ? page.drawn?.quantities ?? [] : []);
+  directions(rank?.directions ?? []);
   if (rank && !wrong) ask_later();
   else {
+    clearTimeout(waiting);
     $("scale").replaceChildren();
     assumed(null);
   }
-  directions(design, messages, pending);
 }
 
 function message({ line, path, what, text }) {
@@ -75,17 +134,18 @@ export function unfold_text(open) {
   $("toggle-text").setAttribute("aria-expanded", String(open));
 }
 
-const MOST_DIRECTIONS = 4; // that are told before a person asks for the others
-function directions(design, messages, pending) {
+const MOST_DIRECTIONS = 3; // that are shown before a person asks for the others
+function directions(found) {
   const unfolded = $("motions").querySelector("details")?.open;
   $("motions").replaceChildren();
-  const found = design?.motions?.directions ?? [];
   if (!found.length) return;
   const swing = (index) => {
     page.motion = index === page.motion ? null : index;
+    dress(page.state.design);
     page.view.move(page.motion);
-    figures(design, messages, pending);
+    directions(found);
     refocus(`#motions [data-motion="${index}"]`);
+    ask_drawn().catch(() => {});
   };
   const items = found.map((direction, index) => {
     const moving = index === page.motion;
@@ -96,7 +156,7 @@ function directions(design, messages, pending) {
     );
   });
   const rest = items.slice(MOST_DIRECTIONS);
-  $("motions").append(make("h2", {}, "What the readings do not tell"),
+  $("motions").append(make("h2", {}, "What the readings leave undetermined"),
     make("ol", {}, ...items.slice(0, MOST_DIRECTIONS)));
   if (!rest.length) return;
   const more = make("details", {}, make("summary", {}, `${rest.length} more`),
@@ -105,25 +165,54 @@ function directions(design, messages, pending) {
   $("motions").append(more);
 }
 
-let scaling = null;
-// Scale and assumptions take longer than all the rest: they are asked for once nothing moves.
-function ask_later() {
-  clearTimeout(scaling);
-  const stale = (is) =>
-    ["scale", "assumptions"].forEach((name) => $(name).classList.toggle("stale", is));
+// The map and the motion that were drawn last stay until those of the design have come.
+export function dress(design) {
+  const { drawn } = page;
+  if (!drawn || drawn.dimension !== design.scene.dimension) return;
+  design.map = $("map").value ? drawn.map : null;
+  const swings = drawn.motions && drawn.motion === page.motion;
+  design.motions = swings ? { ...drawn.motions, directions: [] } : null;
+  if (swings) design.motions.directions[drawn.motion] = drawn.motions.direction;
+}
+
+async function ask_drawn() {
+  const { design } = page.state;
+  const { motion } = page;
+  const wanted = { map: $("map").value, motion };
+  const found = await ask("/api/drawn", wanted);
+  if (found.fingerprint !== page.state.fingerprint || motion !== page.motion) return;
+  page.drawn = { ...found, motion, dimension: design.scene.dimension };
+  dress(page.state.design);
+  page.view.motion = page.motion;
+  page.view.show(page.state.design, page.selected);
+  legend();
+  quantities(found.quantities);
+}
+
+let waiting = null;
+// The map and what swings come once nothing moves; scale and assumptions, which take longer than
+// all the rest, after them.
+export function ask_later(after = 100) {
+  clearTimeout(waiting);
+  const slow = ["scale", "assumptions", "rests", "quantities", "legend"];
+  const stale = (is) => slow.forEach((name) => $(name).classList.toggle("stale", is));
   stale(true);
-  scaling = setTimeout(async () => {
+  waiting = setTimeout(async () => {
+    const { fingerprint } = page.state;
     try {
-      const found = await ask("/api/later");
-      if (found.fingerprint !== page.state.fingerprint) return;
+      await ask_drawn();
+      const is_known = page.later?.fingerprint === fingerprint;
+      const found = is_known ? page.later : await ask("/api/later");
+      if (fingerprint !== page.state.fingerprint) return;
+      page.later = found;
       $("scale").replaceChildren(...found.lines.map((line) => make("p", {}, line)));
       assumed(found.assumptions);
       stale(false);
     } catch {
-      $("scale").textContent = "";
-      assumed(null);
+      // A later request has replaced this one, or the design has no such figures.
+      if (fingerprint === page.state.fingerprint) $("scale").textContent = "";
     }
-  }, 400);
+  }, after);
 }
 
 const FEW_ASSUMED = 3; // rows that are shown before a person asks for all
@@ -131,9 +220,9 @@ let all_assumed = false;
 function assumed(found) {
   const rows = found?.assumptions ?? [];
   $("assumptions").hidden = !rows.length;
+  $("rests").hidden = !found?.warning;
+  $("rests").textContent = found?.warning ?? "";
   if (!rows.length) return;
-  $("assumptions").classList.toggle("warn", Boolean(found.warning));
-  $("assumptions").querySelector("summary").textContent = found.warning || "What is assumed";
   const times = (ratio) => (Number.isFinite(ratio) ? `${Number(ratio.toPrecision(3))}` : "");
   const row = (words, title, { average, maximum, ratio }) => make("tr", {},
     make("td", { title }, ...words), make("td", {}, micro(average)),
@@ -158,7 +247,7 @@ function assumed(found) {
 }
 
 const SHOWN_UNITS = { m: "µm", rad: "µrad", 1: "ppm" };
-function quantities(design) {
+function quantities(found) {
   const { kept } = page.state;
   const before = new Map((kept?.quantities ?? []).map((row) => [row.symbol, row]));
   const units = (row) => row.unit.split(", ").map((unit) => SHOWN_UNITS[unit] ?? unit).join(", ");
@@ -167,7 +256,7 @@ function quantities(design) {
     return make("td", {}, micro(row[key]),
       was !== undefined && kept ? make("span", { class: "was" }, `was ${micro(was)}`) : null);
   };
-  const rows = design.quantities.map((row) => {
+  const rows = found.map((row) => {
     const some = row.undetermined && row.undetermined < row.count;
     return make("tr", {},
       make("td", { title: row.largest ? `largest at ${row.largest}` : undefined },

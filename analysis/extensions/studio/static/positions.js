@@ -4,7 +4,7 @@ import { $, act, focus, make, page, refocus } from "./page.js";
 export function choose(name) {
   page.selected = name;
   const focused = focus();
-  page.view.show(page.state.design, name, { withMap: $("show-map").checked });
+  page.view.show(page.state.design, name);
   positions();
   refocus(focused);
 }
@@ -44,7 +44,7 @@ function details(place) {
       title: ball, "aria-label": ball, "aria-pressed": String(place.read[k]), disabled: many,
       onclick: () => act({ do: "balls", position: name, balls: read(k) }),
     })));
-  grid.style.gridTemplateColumns = `repeat(${across}, 1.05rem)`;
+  grid.style.gridTemplateColumns = `repeat(${across}, 24px)`;
   const probes = Object.keys(scene.probes);
   const with_probe = (probe, isRead) =>
     probes.filter((other) => (other === probe ? isRead : place.probes.includes(other)));

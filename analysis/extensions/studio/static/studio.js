@@ -1,7 +1,9 @@
 // The page of the studio: it asks, the engine answers, and everything that is shown comes from
 // there.
-import { figures, legend, unfold_text } from "./answers.js";
-import { candidate, dialog, drawn, fit, forget_suggestions, poll, start, sweep } from "./computations.js";
+import { ask_later, dress, figures, legend, unfold_text } from "./answers.js";
+import {
+  candidate, dialog, drawn, fit, forget_suggestions, poll, start, sweep,
+} from "./computations.js";
 import { build, flow } from "./forms.js";
 import { errors } from "./matrix.js";
 import {
@@ -61,14 +63,15 @@ function informed() {
 }
 
 function draw(design) {
-  const directions = design.motions?.directions ?? [];
+  const directions = design.rank?.directions ?? [];
   const { selected, motion } = page;
   if (!design.scene.positions.some((place) => place.name === selected)) page.selected = null;
   if (motion !== null && motion >= directions.length) page.motion = null;
   if (page.motion === null && design.rank?.deficiency) page.motion = 0;
   if (page.motion !== null && !directions.length) page.motion = null;
+  dress(design);
   view.motion = page.motion;
-  view.show(design, page.selected, { withMap: $("show-map").checked });
+  view.show(design, page.selected);
   const along = design.scene.dimension === 3 ? ", with Shift along its normal" : "";
   $("hint").textContent =
     `Drag a plate along its plane${along}. Drag elsewhere to turn the view.`;
@@ -119,8 +122,11 @@ $("reopen").onclick = () => {
 };
 $("toggle-text").onclick = () => unfold_text($("text-box").hidden);
 $("step").onchange = (event) => { view.step = Number(event.target.value); };
-$("show-map").onchange = show;
 $("errors").ontoggle = informed;
+$("map").onchange = () => {
+  show();
+  ask_later(0);
+};
 $("home").onclick = () => view.home();
 $("sweep").onclick = sweep;
 document.querySelectorAll("[data-job]").forEach((button) => {
