@@ -359,8 +359,8 @@ class Session:
             raise RefusedError("the results are being computed; wait for them")
         if self._judgement.answer is None:
             raise RefusedError("there are no figures of this design; correct it before keeping it")
-        self._kept = None if action.get("off") else self._computed(
-            _quantities, self._document, self._aside
+        self._kept = (
+            None if action.get("off") else self._computed(_quantities, self._document, self._aside)
         )
         self.revision += 1
 

@@ -63,6 +63,7 @@ def test_an_hour(design: Path) -> None:
         assert "All distances are undetermined." in page.inner_text("#verdict")
         # What is undetermined moves: the picture changes by itself.
         page.wait_for_selector("[data-motion='0'][aria-pressed='true']")
+        until(page, "!!window.studio.state().design.motions")
         canvas = page.locator("#view")
         pictures = set()
         for _ in range(3):
