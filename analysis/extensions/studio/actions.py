@@ -128,6 +128,11 @@ def _added(document: DesignDocument, action: Arguments) -> str:
     return _with(document, [TextChange(("positions",), settings, "append")])
 
 
+def _planned(document: DesignDocument, action: Arguments) -> str:
+    """The positions of a plan in place of the present ones; the pool stays."""
+    return _with(document, [TextChange(("positions",), _plain(action["positions"]))])
+
+
 def _repaired(document: DesignDocument, action: Arguments) -> str:
     """Apply the edits of a suggested repair to the file."""
     text = document.text
@@ -339,6 +344,7 @@ ACTIONS: Mapping[str, Callable[[DesignDocument, Arguments], str]] = {
     "copy": _copied,
     "add": _added,
     "repair": _repaired,
+    "plan": _planned,
     "remove": _removed,
     "off": _switched_off,
     "on": _switched_on,

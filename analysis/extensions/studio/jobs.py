@@ -15,11 +15,13 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from ballplate.presentation import Data, picked
+from ballplate.extensions.repair.written import position_settings
+from ballplate.presentation import Data, finite, picked
 from ballplate.simulator.computing import ProgressStep, Report, begin_worker, interruptions_blocked
 from ballplate.simulator.experiment import lay_out
-from ballplate.simulator.inputs import ExperimentError
+from ballplate.simulator.inputs import ExperimentError, number_of
 
+from .answers import place_data
 from .document import DesignDocument
 from .drafts import evaluable_of
 
@@ -59,8 +61,17 @@ def _monte_carlo(document: DesignDocument, settings: Mapping[str, Any], report: 
 def _plan(document: DesignDocument, settings: Mapping[str, Any], report: Report) -> Any:
     from ballplate.planning import Request, campaign
 
-    experiment = evaluable_of(document, planning=True)
-    return {"lines": campaign(experiment, Request(), report=report).lines()}
+    found = campaign(evaluable_of(document, planning=True), Request(), report=report)
+    chosen, lengths = found.chosen_experiment, found.prediction.quantities.get("U6")
+    return {
+        "lines": found.lines(),
+        "words": f"the plan: {number_of(len(chosen.positions), 'position')}, {found.budget}",
+        "average": None if lengths is None else finite(lengths.average),
+        "maximum": None if lengths is None else finite(lengths.maximum),
+        "deficiency": found.prediction.verdict.deficiency,
+        "places": [place_data(chosen, place) for place in chosen.positions],
+        "plan": [position_settings(chosen, place) for place in chosen.positions],
+    }
 
 
 def _sweep(document: DesignDocument, settings: Mapping[str, Any], report: Report) -> Any:

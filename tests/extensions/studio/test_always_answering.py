@@ -191,3 +191,27 @@ def test_a_further_position_has_a_name_of_its_own_beside_one_that_is_off(documen
 
     added = with_added(strict, strict.positions[0])
     assert added.positions[-1].name == "z low 3"
+
+
+def test_a_plan_is_applied_in_one_step_as_the_command_would_plan(tmp_path):
+    """The positions of the plan stand in place of the others, and have its figures."""
+    from ballplate.extensions.studio.jobs import JOBS
+
+    path = tmp_path / "pool.yaml"
+    pool = """
+pool:
+  candidates:
+    - {planes: [z, x, y], levels: [250 mm, 750 mm], corners: {x: 0 mm, y: 0 mm, z: 0 mm},
+       quarter_turns: [0, 1], probes: {z: [down], x: [right, left], y: [back, front]}}
+"""
+    path.write_text(TEXT + pool, encoding="utf-8")
+    document = opened(path)
+    found = JOBS["plan"](document, {}, lambda step: None)
+    after = done(document, {"do": "plan", "positions": found["plan"]})
+    planned = bp.plan(path)
+    assert [place["name"] for place in found["places"]] == [
+        place.name for place in planned.chosen_experiment.positions
+    ]
+    assert u6(judgement(after).answer) == pytest.approx(found["average"], rel=1e-9)
+    assert found["average"] == planned.prediction.quantities["U6"].average
+    assert undone(after).text == document.text and pool in after.text

@@ -62,6 +62,7 @@ function suggestion(one, k) {
 function apply(one) {
   suggestions = suggestions.filter((other) => other !== one);
   if (one.settings) act({ do: "add", settings: one.settings }, "position added");
+  else if (one.plan) act({ do: "plan", positions: one.plan }, "planned; undo leads back");
   else act({ do: "repair", edits: one.edits }, "applied");
 }
 
@@ -107,6 +108,10 @@ function take({ job, result, fingerprint }) {
       ? "nothing is undetermined or weak, or nothing was found that helps"
       : "no further position fits";
     tell(suggestions.length ? "" : none);
+    page.show();
+  }
+  if (job === "plan") {
+    suggestions = [{ ...result, fingerprint, shown: true }];
     page.show();
   }
   if (job === "fit" && result.residuals) {
