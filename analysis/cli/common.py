@@ -22,12 +22,14 @@ if TYPE_CHECKING:
     from ..presentation.result import Result
 
 
-def add_file(parser: ArgumentParser, several: bool = False) -> None:
-    """Add the experiment file or files, and the choice of a variant."""
+def add_file(parser: ArgumentParser, several: bool = False, needed: bool = True) -> None:
+    """Add the experiment file or files, one that is not needed as a single path or None, and the
+    choice of a variant.
+    """
     parser.add_argument(
         "files",
         metavar="FILE",
-        nargs="+" if several else 1,
+        nargs="+" if several else 1 if needed else "?",
         type=Path,
         help="experiment file (YAML)",
     )

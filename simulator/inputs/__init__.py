@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     )
     from .days import stated_day
     from .decoding import LINE_END, decoded, refuse_controls, text_and_encoding
-    from .extensions import optional_service
+    from .extensions import optional_service, service
     from .messages import (
         MORE_ERRORS,
         MOST_MESSAGES,

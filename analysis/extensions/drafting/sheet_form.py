@@ -27,7 +27,9 @@ def sheet_questions() -> list[dict[str, Any]]:
     for name in (*table("kinds"), *ARRANGEMENTS):
         chain = arrangement_of(name, (1.0, 1.0, 1.0))
         shapes = on_paper(machine_shapes(name)) if name in table("kinds") else []
-        machines.append({"value": name, "words": chain_words(chain), "shapes": shapes})
+        machines.append(
+            {"value": name, "words": f"{chain}: {chain_words(chain)}", "shapes": shapes}
+        )
     questions = [{"name": name, **table("entries")[name]} for name in READERS]
     questions[0]["fields"] = [questions[0]["fields"][0] | {"choices": machines}]
     return questions

@@ -161,9 +161,7 @@ def _throughout(run: QuotedData, lengths: QuotedData) -> list[str | Html]:
     whole = lengths.at("all")
     if not judged or share is None or whole.data[share] is None:
         return []
-    undetermined = run.data["quantities"]["U6"]["undetermined"]
-    are = "determined, and within the target" if undetermined else "within it"
-    return [" Of the lengths throughout the volume, ", whole.share(share), f" are {are}."]
+    return [" Of the lengths throughout the volume, ", whole.share(share), " are within it."]
 
 
 def _rank(run: QuotedData, contents: DesignContents) -> Html:

@@ -58,6 +58,11 @@ class DesignDocument:
         return self.content is not None and self.content == encoded(self)
 
     @property
+    def is_untouched(self) -> bool:
+        """True for a new file with the text that it has begun with."""
+        return self.content is None and not self.back
+
+    @property
     def has_changes(self) -> bool:
         """True if something was done to the text that the file does not hold."""
         return bool(self.back) and not self.is_saved

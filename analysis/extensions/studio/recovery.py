@@ -27,6 +27,15 @@ def kept_in(path: Path, owner: str = "") -> Path:
     return path.with_name(f".{path.name}.unsaved{f'-{owner}' if owner else ''}")
 
 
+def name_of_kept(path: Path) -> str:
+    """Return the name of the file whose unsaved text a path has; empty for another path.
+
+    >>> name_of_kept(Path("designs/.plate.yaml.unsaved"))
+    'plate.yaml'
+    """
+    return path.stem[1:] if path.match(".*.unsaved") else ""
+
+
 def keep(document: DesignDocument, owner: str) -> Path | None:
     """Keep the text if it is unsaved, with the file's content at its reading; return the path, if
     one was written.

@@ -15,7 +15,7 @@ from collections.abc import Awaitable, Callable
 from pathlib import Path
 from typing import Any
 
-from ballplate.simulator.inputs import ExperimentError
+from ballplate.simulator.inputs import ExperimentError, UnusableError, service
 from starlette.applications import Starlette
 from starlette.concurrency import run_in_threadpool
 from starlette.requests import Request
@@ -72,6 +72,12 @@ def application(session: Session, token: str, port: int) -> Starlette:
                 methods=["POST"],
             ),
             Route("/api/schema", _answering(lambda request, body: _schema())),
+            Route("/api/questions", _answering(lambda request, body: _questions())),
+            Route(
+                "/api/draft",
+                _answering(lambda request, body: session.draft(body)),
+                methods=["POST"],
+            ),
             Route("/api/jobs", _answering(lambda request, body: session.jobs())),
             Route("/api/start", _answering(_starting(session)), methods=["POST"]),
             Route("/api/stop", _answering(_stopping(session)), methods=["POST"]),
@@ -258,6 +264,14 @@ def _drawing(session: Session) -> Work:
         return session.drawn(str(body.get("map")), motion if isinstance(motion, int) else None)
 
     return draw
+
+
+def _questions() -> Any:
+    """Return the questions of a data sheet, or none with the reason."""
+    try:
+        return {"questions": service("sheet_questions")(), "missing": ""}
+    except UnusableError as error:
+        return {"questions": [], "missing": str(error)}
 
 
 def _schema() -> Any:

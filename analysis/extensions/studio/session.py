@@ -13,12 +13,21 @@ from threading import RLock
 from typing import Any
 
 from ballplate.presentation import Data, picked
-from ballplate.simulator.inputs import OPENED, UNKNOWN, ExperimentError, Message, refused
+from ballplate.simulator.inputs import (
+    OPENED,
+    UNKNOWN,
+    ExperimentError,
+    Message,
+    Trust,
+    refused,
+    service,
+)
 
 from .actions import ActionError, done
 from .document import (
     ChangedOnDiskError,
     DesignDocument,
+    changed,
     data_of,
     opened,
     redone,
@@ -30,7 +39,7 @@ from .document import (
 from .drafts import POSITION
 from .jobs import JOBS, MOST_RUNNING, Job, started
 from .judging import DesignJudgement, Judge, drawn, figures, judgement, later, matrix
-from .recovery import give_up, keep, recovered
+from .recovery import give_up, keep, kept_in, name_of_kept, recovered
 
 ENDINGS = (".yaml", ".yml")
 
@@ -66,13 +75,11 @@ class Session:
         self._first = path.resolve()
         if not self._first.parent.is_dir():
             raise refused(path, "there is no such folder; make it, or name another")
-        is_new = bool(beginning) and not path.exists()
-        document = (
-            DesignDocument(path, variant, beginning, None) if is_new else opened(path, variant)
-        )
+        self._example = beginning
+        document = self._found(path, variant) if beginning else opened(path, variant)
         self.name = secrets.token_hex(4)
         document, self.note = recovered(document, self.name)
-        if is_new and not self.note:
+        if document.is_untouched and not self.note:
             self.note = f"{path.name} is new, and begins with an example; Save writes it"
         if variant is None:
             document = _with_first_variant(document)
@@ -106,6 +113,7 @@ class Session:
                 "text": document.text,
                 "data": data_of(document) if pending else judged.data,
                 "saved": document.is_saved,
+                "untouched": document.is_untouched,
                 "back": len(document.back),
                 "forward": len(document.forward),
                 "messages": []
@@ -115,7 +123,7 @@ class Session:
                 "design": self._scene and {**(answer or {}), "scene": self._scene},
                 "stale": judged.answer is None,
                 "kept": self._kept,
-                "files": [file.name for file in self._files()],
+                "files": self._files(),
                 "jobs": list(JOBS),
                 "recoverable": self.is_recoverable,
                 "note": self.note,
@@ -174,6 +182,19 @@ class Session:
             document = self._document
         data: Data = self._computed(figures, done(document, action), self._aside)
         return data
+
+    def draft(self, answers: Mapping[str, Any]) -> dict[str, Any]:
+        """Return the draft of answers to the questions of a data sheet, with a message for the
+        `name` of the file that cannot be begun.
+
+        :raises UnusableError: the extension that drafts is not installed.
+        """
+        try:
+            path, message = Path(self._free(answers).name), {}
+        except RefusedError as error:
+            path, message = Path("design.yaml"), {"name": str(error)}
+        draft: dict[str, Any] = service("sheet_draft")(path, answers)
+        return draft | {"messages": draft["messages"] | message}
 
     def later(self) -> dict[str, Any]:
         """Return the source of scale of the design, its assumptions, and its fingerprint.
@@ -274,6 +295,7 @@ class Session:
             "keep": self._keep,
             "save": self._save,
             "open": self._open,
+            "begin": self._begin_new,
             "reopen": lambda action: self._become(reopened(self._document)),
         }
 
@@ -383,16 +405,56 @@ class Session:
 
     def _open(self, action: Mapping[str, Any]) -> None:
         path, before = self._inside(str(action.get("name", ""))), self._document
-        if not before.is_saved and not action.get("discard"):
-            raise RefusedError(f"{before.path.name} has changes that are not saved")
-        document = opened(path, None, OPENED if path.resolve() == self._first else UNKNOWN)
+        self._ensure_left(action)
+        document = self._found(path) if kept_in(path).exists() else opened(path)
+        document = replace(document, trust=self._trust(path))
         # What is left on purpose is not taken up again.
         is_left = document.path.name == before.path.name
         document, note = (document, "") if is_left else recovered(document, self.name)
-        self._become(_with_first_variant(document))
+        self._leave_for(_with_first_variant(document), note)
+
+    def _begin_new(self, action: Mapping[str, Any]) -> None:
+        """Begin a file that does not exist with a text, a step after the example."""
+        path, document = self._free(action), self._document
+        if path.name == document.path.name:
+            self._become(changed(document, str(action["text"])))
+            return
+        self._ensure_left(action)
+        document = DesignDocument(path, None, self._example, None, self._trust(path))
+        self._leave_for(changed(document, str(action["text"])))
+
+    def _ensure_left(self, action: Mapping[str, Any]) -> None:
+        """Ensure that changes are discarded only on request."""
+        if self._document.has_changes and not action.get("discard"):
+            raise RefusedError(f"{self._document.path.name} has changes that are not saved")
+
+    def _leave_for(self, document: DesignDocument, note: str = "") -> None:
+        before = self._document
+        self._become(document)
         self._kept, self.note = None, note
-        if not is_left:
+        if document.path.name != before.path.name:
             give_up(before, self.name)
+
+    def _found(self, path: Path, variant: str | None = None) -> DesignDocument:
+        """Return the document of a file, or of a new one that begins with the example."""
+        if path.exists():
+            return opened(path, variant)
+        return DesignDocument(path, variant, self._example, None)
+
+    def _trust(self, path: Path) -> Trust:
+        return OPENED if path.resolve() == self._first else UNKNOWN
+
+    def _free(self, action: Mapping[str, Any]) -> Path:
+        """Return the path of a design that may be begun.
+
+        :raises RefusedError: as for `_inside`, or there is one already, saved or not.
+        """
+        path = self._inside(str(action.get("name", "")))
+        if path.exists():
+            raise RefusedError(f"{path.name} is there already; choose another name")
+        if kept_in(path).exists() and path.name != self._document.path.name:
+            raise RefusedError(f"{path.name} has changes that are not saved; open it")
+        return path
 
     def _inside(self, name: str) -> Path:
         """Return the path of a design in the folder.
@@ -407,18 +469,17 @@ class Session:
             raise RefusedError(f'"{name}" is not the name of a design in the folder {folder.name}')
         return path
 
-    def _files(self) -> list[Path]:
+    def _files(self) -> list[str]:
+        """Return the names of designs in the folder, those of unsaved new ones too."""
         try:
-            return sorted(
-                file
-                for file in self._first.parent.iterdir()
-                if file.suffix.lower() in ENDINGS
-                and not file.name.startswith(".")
-                and file.is_file()
-            )
+            files = [file for file in self._first.parent.iterdir() if file.is_file()]
         except OSError:
             # The folder is gone, or may not be read any more.
             return []
+        names = {name_of_kept(file) or file.name for file in files}
+        return sorted(
+            name for name in names if name.lower().endswith(ENDINGS) and not name.startswith(".")
+        )
 
 
 def _quantities(document: DesignDocument) -> dict[str, Any]:

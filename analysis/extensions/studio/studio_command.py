@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from argparse import ArgumentParser, ArgumentTypeError, Namespace
 from importlib.resources import files
+from itertools import count
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ballplate.cli import Needed, UsageError, add_file, note, whole
@@ -16,13 +18,13 @@ STUDIO = Needed("the studio needs", ("starlette", "uvicorn"), "studio")
 DESCRIPTION = (
     "Serve a page, to this machine only, on which the positions of a design are dragged, turned,"
     " added and switched off, and its settings changed, with rank, uncertainties and map after"
-    " every move. A file that is not there yet begins as init writes it. The page is served until"
-    " Ctrl-C; the file is written when Save is pressed."
+    " every move. Without FILE, or if it does not exist, the page asks the questions of init. The"
+    " page is served until Ctrl-C; the file is written when Save is pressed."
 )
 
 
 def add_options(parser: ArgumentParser) -> None:
-    add_file(parser)
+    add_file(parser, needed=False)
     parser.add_argument(
         "--port", metavar="N", type=_port, default=0, help="port; default: any that is free"
     )
@@ -36,6 +38,15 @@ def _port(text: str) -> int:
     if not port < 2**16:
         raise ArgumentTypeError(f"a port is at most 65535, not {port}")
     return port
+
+
+def named_file(path: Path) -> Path:
+    """Return the path of a design: itself, or that of a new file in a folder."""
+    if not path.is_dir():
+        return path
+    numbers = (f"-{number}" if number > 1 else "" for number in count(1))
+    names = (path / f"design{number}.yaml" for number in numbers)
+    return next(name for name in names if not name.exists())
 
 
 def unsaved(session: Session) -> str:
@@ -66,11 +77,11 @@ def run(options: Namespace) -> int:
     from .serving import serve
     from .session import Session
 
-    (path,) = options.files
+    path = named_file(options.files or Path())
     template = files("ballplate.cli").joinpath("template.yaml").read_text(encoding="utf-8")
     session = Session(path, options.variant[0] if options.variant else None, template)
     if not path.exists():
-        note(options, f"{path} is new: it begins as ballplate init writes it")
+        note(options, f"{path} is new: the page asks for the machine, or opens another file")
 
     def tell(address: str) -> None:
         print(address, flush=True)

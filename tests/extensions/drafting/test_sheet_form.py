@@ -41,7 +41,10 @@ def test_questions_are_those_of_init() -> None:
 
 def test_machines_are_choices_with_their_chain_of_axes_and_a_picture() -> None:
     choices = QUESTIONS["machine_type"]["fields"][0]["choices"]
-    assert choices[0]["value"] == "moving bridge" and choices[0]["words"] == chain_words("MB1")
+    assert (
+        choices[0]["value"] == "moving bridge"
+        and choices[0]["words"] == f"MB1: {chain_words('MB1')}"
+    )
     drawn = {choice["value"] for choice in choices if choice["shapes"]}
     assert drawn == {*table("kinds")}
     for choice in choices:

@@ -20,6 +20,10 @@ QUALITY = 82
 
 def main(folder: Path) -> None:
     with tempfile.TemporaryDirectory() as temporary:
+        with Studio(Path(temporary)) as studio, tab(1240, 800) as page:
+            page.goto(studio.address)
+            page.wait_for_selector("#draft dl")
+            small(page.screenshot(), folder / "studio-begin.webp")
         design = Path(temporary) / "plate.yaml"
         design.write_bytes(Path(shipped("quickstart.yaml")).read_bytes())
         with Studio(design) as studio, tab(1240, 800) as page:
@@ -42,8 +46,7 @@ def tour(page, folder: Path, design: Path) -> None:
     picture("verdict", "#answers")
     for name in ("z high", "x low", "x high", "y high"):
         page.click(f"[aria-label='read {name}']")
-        place = f"window.studio.state().design.scene.positions.find((one) => one.name === {name!r})"
-        until(page, f"!{place}.enabled")
+        until(page, f"window.studio.state().text.includes('{name}, enabled: false')")
     picture("undetermined")
     page.click("[data-job=suggest]")
     page.wait_for_selector("#suggestions li")

@@ -311,6 +311,7 @@ def test_a_machine_of_its_own_from_an_empty_folder(tmp_path: Path) -> None:
     actions = 0
     with Studio(design) as studio, tab() as page:
         page.goto(studio.address)
+        page.click("#begin-example")
         until(page, "!!window.studio?.state()?.design")
 
         def fill(path: str, value: str) -> None:
@@ -352,6 +353,78 @@ def test_a_machine_of_its_own_from_an_empty_folder(tmp_path: Path) -> None:
     volume = prediction.design.machine.volume
     assert (volume.upper - volume.lower).tolist() == [1.2, 0.9, 0.7]
     print(f"{actions} actions")
+
+
+def test_a_design_begins_with_the_questions_of_init(tmp_path: Path) -> None:
+    """From an empty folder, with the keyboard alone: wrong answers, the draft, and Save."""
+    with Studio(tmp_path) as studio, tab(1240, 900) as page:
+        page.goto(studio.address)
+        page.wait_for_selector("#draft dl")
+        at = "document.activeElement.value || document.activeElement.id"
+        assert page.evaluate(at) == "moving bridge"
+        page.keyboard.press("ArrowDown")
+        page.keyboard.press("ArrowDown")
+        page.keyboard.press("ArrowDown")
+        assert page.evaluate(at) == "cantilever"
+
+        def answer(question: str, *values: str) -> None:
+            for k, value in enumerate(values):
+                for _ in range(60):
+                    if page.evaluate("document.activeElement.id") == f"answer-{question}-{k}":
+                        break
+                    page.keyboard.press("Tab")
+                page.keyboard.press("Control+a")
+                page.keyboard.type(value)
+
+        answer("volume", "500", "4oo", "300")
+        assert page.inner_text("#error-volume") == ""
+        answer("plate", "4", "4", "420")
+        page.wait_for_selector("#error-volume:not(:empty)")
+        assert page.get_attribute("#answer-volume-1", "aria-invalid") == "true"
+        page.keyboard.press("Enter")
+        # What cannot be used is read out, and the first of it has the focus.
+        until(page, "document.activeElement.id === 'answer-volume-0'")
+        assert "Measuring volume" in page.inner_text("#begin-status")
+        answer("volume", "500", "400", "300")
+        page.wait_for_selector("#error-plate:not(:empty)")
+        answer("plate", "4", "4", "200")
+        answer("temperature", "0.1")
+        answer("hours", "4")
+        page.wait_for_selector("#draft dd >> text=0.1 K")
+        until(page, "document.querySelector('#begin-status').textContent === ''")
+        assert page.evaluate(OUTSIDE) == [] and not list(tmp_path.iterdir())
+        page.keyboard.press("Enter")
+        page.wait_for_selector("#begin", state="hidden")
+        state = settled(page, 1)
+        assert not state["saved"] and wording.A_DRAFT_NOT_SAVED in page.inner_text("#notice")
+        assert "full rank" in page.inner_text("#verdict")
+        page.keyboard.press("Control+s")
+        until(page, "window.studio.state().saved")
+        # Later, another design begins beside it.
+        page.click("#new")
+        page.wait_for_selector("#begin")
+        assert page.input_value("#begin-name") == "design-2.yaml"
+        page.click("#begin-back")
+        page.wait_for_selector("#begin", state="hidden")
+        assert page.errors == []
+    stated = {"machine-type": "cantilever", "volume": "500 400 300 mm", "hours": "4"}
+    stated |= {"mpe": "0.9 um + L/400", "certificate": "0.4 um + 0.5 um/m, k=2", "tips": "star"}
+    stated |= {"plate": "4 x 4, 200 mm", "temperature": "0.1 K"}
+    written = (tmp_path / "design.yaml").read_bytes()
+    command = [sys.executable, "-m", "ballplate", "init", "design.yaml", "--force"]
+    command += [word for name, text in stated.items() for word in (f"--{name}", text)]
+    subprocess.run(command, cwd=tmp_path, check=True, capture_output=True)
+    assert (tmp_path / "design.yaml").read_bytes() == written
+
+
+@pytest.mark.parametrize("width", [390, 1024, 1440])
+def test_the_first_page_fits_small_screens(tmp_path: Path, width: int) -> None:
+    (tmp_path / "a file of a rather long name for a button of the first page.yaml").touch()
+    with Studio(tmp_path / "new.yaml") as studio, tab(width) as page:
+        page.goto(studio.address)
+        page.wait_for_selector("#draft dl")
+        page.click("#questions summary")
+        assert page.evaluate(OUTSIDE) == [] and page.errors == []
 
 
 @pytest.mark.parametrize("width", [400, 900, 1400])

@@ -56,6 +56,8 @@ REQUESTS = [
     ("GET", "/api/state"),
     ("GET", "/api/jobs"),
     ("GET", "/api/schema"),
+    ("GET", "/api/questions"),
+    ("POST", "/api/draft"),
     ("GET", "/api/later"),
     ("POST", "/api/matrix"),
     ("POST", "/api/drawn"),

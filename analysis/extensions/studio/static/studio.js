@@ -1,6 +1,7 @@
 // The page of the studio: it asks, the engine answers, and everything that is shown comes from
 // there.
 import { ask_later, dress, figures, legend, unfold_text } from "./answers.js";
+import { begin, begins } from "./begin.js";
 import {
   candidate, dialog, drawn, fit, forget_suggestions, poll, start, sweep,
 } from "./computations.js";
@@ -27,7 +28,8 @@ function show() {
   const { design } = state;
   const focused = focus();
   const title = `${state.file}${state.saved ? "" : " (not saved)"}`;
-  $("title").textContent = `${title}${design ? ` — ${design.title}` : ""}`;
+  const heading = `${title}${design ? ` — ${design.title}` : ""}`;
+  $("title").textContent = begins() ? "ballplate studio" : heading;
   document.title = `${state.saved ? "" : "• "}${state.file} – ballplate studio`;
   const is_listed = state.files.includes(state.file);
   options($("files"), is_listed ? state.files : [state.file, ...state.files], state.file);
@@ -149,7 +151,7 @@ document.addEventListener("drop", (event) => {
   if (event.dataTransfer.files[0]) fit(event.dataTransfer.files[0]);
 });
 document.addEventListener("keydown", (event) => {
-  if (!(event.ctrlKey || event.metaKey) || event.target === $("text")) return;
+  if (!(event.ctrlKey || event.metaKey) || event.target === $("text") || begins()) return;
   const key = event.key.toLowerCase();
   const does = { z: event.shiftKey ? "redo" : "undo", y: "redo", s: "save" }[key];
   if (!does) return;
@@ -187,6 +189,7 @@ try {
   page.motion = page.state.design?.rank?.deficiency ? 0 : null;
   show();
   if (page.state.note) tell(page.state.note);
+  if (page.state.untouched) await begin();
   poll();
 } catch (error) {
   tell(error.message, true);
