@@ -13,11 +13,9 @@ from ballplate.simulator.machines.protocol import Array
 
 from .scenes import Box, DrawnPosition, Scene, scene
 from .svg import (
-    DASHES,
     INK,
     MUTED,
     PAPER,
-    SERIES,
     blank_axes,
     drawing,
     save,
@@ -86,6 +84,8 @@ def _write_axis(
     along = (ends[1] - ends[0]) / length
     out = np.array([along[1], -along[0]])
     out = out if out @ (centre - middle) > 0 else -out
+    arrow = {"head_width": 0.015 * size, "overhang": 0.5, "linewidth": 0.8}
+    axes.arrow(*ends[1], *0.03 * size * along, color=MUTED, **arrow)
     # Ends move inwards to separate those of two axes, except at a short edge.
     off, inward = (0.06, 0.05) if length > SHORT * size else (0.14, 0.0)
     written = []
@@ -105,18 +105,14 @@ def _millimetres(value: float) -> str:
 
 
 def _place(axes: Axes, position: DrawnPosition) -> None:
-    colour = SERIES[(position.number - 1) % len(SERIES)]
-    dash = DASHES[(position.number - 1) % len(DASHES)]
     if len(position.outline) > 2:
-        axes.fill(*position.outline.T, facecolor=colour, alpha=0.10, linewidth=0)
-        closed = np.concatenate([position.outline, position.outline[:1]])
-        axes.plot(*closed.T, color=colour, linestyle=dash, linewidth=1.3)
-    else:
-        axes.plot(*position.outline.T, color=colour, linestyle=dash, linewidth=1.3)
+        axes.fill(*position.outline.T, facecolor=MUTED, alpha=0.12, linewidth=0)
+    closed = np.concatenate([position.outline, position.outline[:1]])
+    axes.plot(*closed.T, color=MUTED, linewidth=1.3)
     size = 3.0 if len(position.balls) <= 50 else 2.0
     axes.plot(
         *position.balls.T,
-        color=colour,
+        color=MUTED,
         linestyle="none",
         marker="o",
         markersize=size,
@@ -134,10 +130,8 @@ def _name(
     """Write a position's name at the corner of its outline that is furthest from other labels."""
     centre = position.outline.mean(axis=0)
     corners = position.outline if len(position.outline) > 1 else np.array([centre])
-    between = 0.5 * (corners + np.roll(corners, 1, axis=0))
     text = str(position.number) if by_number else position.name
-    candidates = np.concatenate([corners, between])
-    candidates = candidates + 0.05 * size * _unit(candidates - centre)
+    candidates = corners + 0.05 * size * _unit(corners - centre)
     # Names are wide and low: a difference in height counts for more.
     distances = [
         min(
@@ -148,7 +142,7 @@ def _name(
     ]
     point = candidates[int(np.argmax(distances))]
     label_points.append(point)
-    edge = SERIES[(position.number - 1) % len(SERIES)] if by_number else "none"
+    edge = MUTED if by_number else "none"
     box = {"facecolor": PAPER, "alpha": 0.8, "edgecolor": edge, "boxstyle": "square,pad=0.12"}
     axes.text(point[0], point[1], text, ha="center", va="center", bbox=box)
 

@@ -358,7 +358,7 @@ def _shown(place: int | None) -> str:
 
 
 def _colour(place: int | None) -> str:
-    return MUTED if place is None else SERIES[(place - 1) % len(SERIES)]
+    return MUTED if place is None else SERIES[0]
 
 
 def _bars(axes: Axes, rows: Sequence[_Row]) -> None:

@@ -7,7 +7,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 import numpy as np
-from ballplate.presentation import SERIES, Box, DrawnPosition, escaped, on_paper, pitch, scene
+from ballplate.presentation import Box, DrawnPosition, escaped, on_paper, pitch, scene
 from ballplate.simulator.design import Design
 from ballplate.simulator.geometry import BallLayout
 from ballplate.simulator.machines import Array
@@ -19,9 +19,6 @@ PLATE, VOLUME, MARGIN = 340.0, 660.0, 34.0
 
 # Room for a ball with its name, in an artefact no larger than this.
 ROOM, LARGEST = 42.0, 620.0
-
-# Lines of positions, so that nothing depends on colour.
-PATTERNS = ("", "7 3", "2 3", "7 3 2 3", "12 3", "4 2 1 2")
 
 INK, GREY = "#222", "#777"
 
@@ -108,28 +105,21 @@ def volume_drawing(design: Design, names: Mapping[str, str]) -> str:
     first_balls = [to_page(place.balls[:1])[0] for place in drawn.places]
     for place in sorted(drawn.places, key=lambda place: place.number):
         outline = to_page(place.outline)
-        parts.append(_label(names[place.name], outline, first_balls, _colour(place)))
+        parts.append(_label(names[place.name], outline, first_balls))
     return "".join([*parts, "</svg>"])
 
 
 def _position(place: DrawnPosition, outline: Array, first: Array) -> str:
     """The outline of a position, with a dot where its first ball is."""
-    colour = _colour(place)
-    pattern = PATTERNS[(place.number - 1) // len(SERIES) % len(PATTERNS)]
-    dashes = f' stroke-dasharray="{pattern}"' if pattern else ""
     points = " ".join(f"{x:.1f},{y:.1f}" for x, y in outline)
     return (
-        f'<polygon points="{points}" fill="{colour}" fill-opacity="0.12" stroke="{colour}"'
-        f' stroke-width="1.6"{dashes}/>'
-        f'<circle cx="{first[0]:.1f}" cy="{first[1]:.1f}" r="4" fill="{colour}"/>'
+        f'<polygon points="{points}" fill="{GREY}" fill-opacity="0.14" stroke="{GREY}"'
+        ' stroke-width="1.6"/>'
+        f'<circle cx="{first[0]:.1f}" cy="{first[1]:.1f}" r="4" fill="{INK}"/>'
     )
 
 
-def _colour(place: DrawnPosition) -> str:
-    return SERIES[(place.number - 1) % len(SERIES)]
-
-
-def _label(name: str, outline: Array, points: list[Array], colour: str) -> str:
+def _label(name: str, outline: Array, points: list[Array]) -> str:
     """A position's name at the corner, or middle of a side, that is furthest from other names."""
     centre = outline.mean(axis=0)
     places = np.concatenate([outline, 0.5 * (outline + np.roll(outline, 1, axis=0))])
@@ -149,7 +139,7 @@ def _label(name: str, outline: Array, points: list[Array], colour: str) -> str:
     width = 7.4 * len(name) + 8.0
     return (
         f'<rect x="{x - width / 2:.1f}" y="{y - 9:.1f}" width="{width:.1f}" height="18" rx="3"'
-        f' fill="white" fill-opacity="0.9" stroke="{colour}"/>'
+        f' fill="white" fill-opacity="0.9" stroke="{GREY}"/>'
         + _text(x, y + 4.3, name, 12.0, INK, ' font-weight="bold"')
     )
 
@@ -165,6 +155,9 @@ def _axes(box: Box, to_page: object) -> list[str]:
         away = np.array([-along[1], along[0]])
         if away @ (0.5 * (start + end) - middle) < 0.0:
             away = -away
+        tip = end + 14.0 * along
+        wings = [np.stack([tip, tip - 6.0 * along + way * away]) for way in (-3.0, 3.0)]
+        parts += [_line(line, GREY) for line in (np.stack([end, tip]), *wings)]
         for share, text in (
             (0.04, f"{1e3 * low:.5g}"),
             (0.5, f"{name}, mm"),

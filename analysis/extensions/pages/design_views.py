@@ -22,41 +22,67 @@ LONGEST_AXIS, LARGEST_MOTION = 0.05, 0.09
 NO_MOTION = 1e-12
 # Balls in moving pictures, of all positions together, and points along a line of the grid.
 MOST_MOVING, ALONG = 600, 9
-STYLES = 6
+# Ways out of the volume from its axes, at right angles to them on paper.
+OUT = np.array([[0.0, -0.5, -0.85], [0.7, 0.0, -0.7], [-0.9, -0.9, 0.0]])
+# Of a drawn plate, as a part of the volume's size.
+THICKNESS = 0.014
 
 
 def volume_layers(design: Design) -> list[Layer]:
-    """The volume with the names and ends of its axes."""
+    """The volume with the names of its axes, ticks in millimetres, and the origin."""
     lower, upper = design.machine.volume.lower, design.machine.volume.upper
     d = len(lower)
     _, away = projection(d)
     edges, hidden = box_edges(lower, upper, away)
-    ends, names = [], []
-    off = 0.14 * float((upper - lower).max())
+    size = float((upper - lower).max())
+    strokes, places, names = [], [], []
     for k in range(d):
-        # Outside the edges that the eye of still pictures sees in front, and at the left.
-        start = lower.copy()
+        # The edges that the eye of still pictures sees in front and at the left.
+        start, along = lower.copy(), size * np.eye(d)[k]
+        out = size * OUT[k] if d == 3 else along - size
         if k == 1 and d == 3:
-            start[0] = upper[0] + off
-        else:
-            start[1 if k == 0 else 0] -= off
-        for share, text in ((0.0, lower[k]), (0.5, None), (1.0, upper[k])):
-            place = start.copy()
-            place[k] = lower[k] + share * (upper[k] - lower[k])
-            ends.append(place)
-            names.append(f"{'xyz'[k]}, mm" if text is None else f"{1e3 * text + 0.0:.6g}")
+            start[0] = upper[0]
+        for value in _ticks(float(lower[k]), float(upper[k])):
+            start[k] = value
+            strokes += [start.copy(), start + 0.025 * out]
+            # The zeros at one corner are one, and that of y is where the name of x is.
+            if start.any() and (k != 1 or value != 0.0):
+                places.append(start + 0.09 * out)
+                names.append(f"{1e3 * value + 0.0:.6g}")
+        start[k] = upper[k]
+        tip = start + 0.12 * along
+        strokes += [start, tip]
+        for side in (-0.012, 0.012):
+            strokes += [tip, tip - 0.03 * along + side * out]
+        places.append(tip + (0.17 if d == 3 else 0.08) * along)
+        names.append(f"{'xyz'[k]}, mm")
+    origin = np.zeros((int((lower <= 0.0).all() and (upper >= 0.0).all()), d))
+    places += list(origin - 0.04 * size)
+    names += ["0"] * len(origin)
     visible, unseen = edges[~hidden].reshape(-1, d), edges[hidden].reshape(-1, d)
     return [
         Layer("lines", "faint thin dotted", unseen, (2,) * int(hidden.sum())),
         Layer("lines", "faint thin", visible, (2,) * int((~hidden).sum())),
-        Layer("labels", "axes", np.array(ends), names=tuple(names)),
+        Layer("lines", "faint thin", np.array(strokes), (2,) * (len(strokes) // 2)),
+        Layer("dots", "ink", origin),
+        Layer("labels", "axes", np.array(places), names=tuple(names)),
     ]
+
+
+def _ticks(low: float, high: float) -> list[float]:
+    """Return both ends, and between them round numbers that are not too near to an end."""
+    step = round_number(0.4 * (high - low))
+    between = step * np.arange(np.ceil(low / step), np.ceil(high / step))
+    is_apart = (between - low > 0.6 * step) & (high - between > 0.6 * step)
+    return [low, *between[is_apart].tolist(), high]
 
 
 def volume_view(design: Design, most: int = MOST_BALLS) -> SpatialPicture:
     """Positions in the volume, the balls that are read, `most` of each position, and styli."""
     where = locations(design, nominal_state(design), design.readings)
     layers = volume_layers(design)
+    (_, up), _ = projection(design.dimension)
+    thickness = THICKNESS * float(design.machine.volume.size.max())
     labels, names, styli = [], [], []
     positions_read = [
         k for k in range(len(design.positions.names)) if (design.readings.position == k).any()
@@ -67,20 +93,16 @@ def volume_view(design: Design, most: int = MOST_BALLS) -> SpatialPicture:
         mine = np.flatnonzero(design.readings.position == k)
         balls = where[mine]
         outline = _outline(balls)
-        style = f"s{number % STYLES}"
         if len(outline) > 2:
-            layers.append(Layer("areas", style, outline, (len(outline),)))
-        closed = np.concatenate([outline, outline[:1]])
-        dash = " dashed" if number // STYLES % 2 else ""
-        layers.append(Layer("lines", style + dash, closed, (len(closed),)))
-        layers.append(Layer("dots", style, balls[_some(design.readings.ball[mine], most)]))
+            layers.append(Layer("areas", "plate", outline, (len(outline),)))
+        layers.append(_edges(outline, thickness))
+        layers.append(Layer("dots", "plate", balls[_some(design.readings.ball[mine], most)]))
         middle = balls[np.linalg.norm(balls - balls.mean(axis=0), axis=1).argmin()]
         offsets = design.probes.offsets[np.unique(design.readings.probe[mine])]
         styli += [np.stack([middle, middle - offset]) for offset in offsets if offset.any()]
         # Plates in a plane do not hide one another's middle.
-        centre = outline.mean(axis=0)
-        is_flat = design.dimension == 2
-        labels.append(centre if is_flat else outline[0] + 0.12 * (outline[0] - centre))
+        centre, top = outline.mean(axis=0), outline[(outline @ up).argmax()]
+        labels.append(centre if design.dimension == 2 else top + 0.12 * (top - centre))
         names.append(position_names[number] if is_named else str(number + 1))
     if styli:
         layers.append(Layer("lines", "ink fine", np.concatenate(styli), (2,) * len(styli)))
@@ -97,6 +119,20 @@ def volume_view(design: Design, most: int = MOST_BALLS) -> SpatialPicture:
         caption += " Only some of the balls are drawn."
     whole = joined([caption, turning_words(design)])
     return SpatialPicture(layers, "volume-view", "positions", words, whole)
+
+
+def _edges(outline: Array, thickness: float) -> Layer:
+    """The edges of a plate around an outline (k, d); in a plane, or of a bar, the outline."""
+    closed = np.concatenate([outline, outline[:1]])
+    if closed.shape[1] == 2 or len(outline) < 3:
+        return Layer("lines", "plate thin", closed, (len(closed),))
+    normal = np.cross(outline[1] - outline[0], outline[2] - outline[0])
+    half = 0.5 * thickness * normal / np.linalg.norm(normal)
+    across = np.stack([outline - half, outline + half], axis=1).reshape(-1, 3)
+    sizes = (len(closed), len(closed), *(2,) * len(outline))
+    return Layer(
+        "lines", "plate thin", np.concatenate([closed - half, closed + half, across]), sizes
+    )
 
 
 def turning_words(design: Design) -> Html:
@@ -184,7 +220,7 @@ def _ellipsoids(
     times = round_number(LONGEST_AXIS * size / longest) if longest > 0.0 else 1.0
     layers = [
         *layers,
-        Layer("ellipsoids", "s0", points, shapes=times * axes * half[:, None, :]),
+        Layer("ellipsoids", "uncertain", points, shapes=times * axes * half[:, None, :]),
         Layer("dots", "alert", undetermined),
     ]
     caption = (
@@ -234,15 +270,15 @@ def motion_view(
     layers = [
         Layer("lines", "faint thin dotted", grid, sizes),
         *volume_layers(design)[2:],
-        Layer("lines", "s0", grid, sizes, times * of_grid),
-        Layer("dots", "s0 fine", grid, (), times * of_grid),
+        Layer("lines", "alert", grid, sizes, times * of_grid),
+        Layer("dots", "alert fine", grid, (), times * of_grid),
         Layer("dots", "faint", balls),
-        Layer("lines", "s1 thin", trails, (2,) * len(balls), times * ends),
-        Layer("dots", "s1", balls, (), times * of_balls),
+        Layer("lines", "ink thin", trails, (2,) * len(balls), times * ends),
+        Layer("dots", "ink", balls, (), times * of_balls),
     ]
-    subject = f"the grid of corrected points with the probe {design.probes.names[probe]} (blue)"
+    subject = f"the grid of corrected points with the probe {design.probes.names[probe]} (red)"
     if len(balls):
-        subject = f"{subject} and the balls (orange)"
+        subject = f"{subject} and the balls (dots)"
     explanation = (
         f". Enlarged {times:,.0f} times: {subject}, compared with the nominal geometry (grey)."
     )

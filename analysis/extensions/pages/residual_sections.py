@@ -92,8 +92,8 @@ def residual_view(places: Array, residuals: Array, edges: Array) -> SpatialPictu
     ends = np.stack([places, places + times * residuals], axis=1).reshape(-1, places.shape[1])
     layers = [
         Layer("lines", "faint thin", edges.reshape(-1, edges.shape[2]), (2,) * len(edges)),
-        Layer("lines", "s1", ends, (2,) * len(places)),
-        Layer("dots", "s0", places),
+        Layer("lines", "ink", ends, (2,) * len(places)),
+        Layer("dots", "faint", places),
     ]
     caption = f"Residuals as vectors from where the balls were read, enlarged {times:,.0f} times."
     words = "Residuals as vectors in the volume"

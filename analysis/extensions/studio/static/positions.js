@@ -52,7 +52,7 @@ function details(place) {
     make("button", { ...attributes, onclick: () => act({ ...action, position: name }) }, words);
   $("position").replaceChildren(
     make("strong", {}, name), make("div", {}, `${place.artefact}; ${place.readings} readings`),
-    place.problem ? make("div", { class: "field-error" }, place.problem) : null,
+    place.problem ? make("div", { class: "field-error" }, place.problem) : "",
     make("div", { class: "bar" },
       button("Turn", { do: "turn" }, { id: "turn" }),
       ...axes.map((axis) => button(`⟂ ${axis}`, { do: "stand", across: axis },

@@ -7,7 +7,7 @@ import { Hands } from "./hands.js";
 const [TURN, RISE] = [-35, 24]; // degrees: the eye of all drawings of a design
 const SHARE = 0.07; // of the volume's size: the largest displacement that is shown
 const PERIOD = 2400; // milliseconds of one swing
-const MARGIN = 60; // pixels around the volume for its ticks and names
+const [MARGIN, LOWER] = [66, 20]; // pixels around the volume, and more of them above
 // Colours by meaning, which are the page's; balls and dashes are as large as a part of the volume.
 const LOOKS = {
   quiet: { colour: "--quiet", fill: 0.1, ball: 0.0045 },
@@ -16,6 +16,7 @@ const LOOKS = {
   chosen: { colour: "--accent", fill: 0.3, ball: 0.0075 },
   wrong: { colour: "--bad", fill: 0.2, ball: 0.0075 },
   ghost: { colour: "--ink", fill: 0.03, ball: 0.0045, dashes: [0.014, 0.009] },
+  front: { colour: "--quiet" },
   rear: { colour: "--quiet", dashes: [0.003, 0.01] },
   span: { colour: "--ramp-2" },
 };
@@ -24,6 +25,7 @@ const kept = (geometry) => Object.assign(geometry, { userData: { kept: true } })
 const GLOBE = kept(new THREE.SphereGeometry(1, 16, 12));
 const BAR = kept(new THREE.CylinderGeometry(1, 1, 1, 10));
 const TIP = kept(new THREE.ConeGeometry(1, 1, 12));
+const OPEN = { transparent: true, depthWrite: false };
 const Vector = THREE.Vector3;
 
 export class View {
@@ -38,23 +40,22 @@ export class View {
     this.scene.background = new THREE.Color();
     this.camera = new THREE.OrthographicCamera();
     this.camera.up.set(0, 0, 1);
-    this.scene.add(new THREE.HemisphereLight(0xffffff, 0x8899aa, 3));
+    const light = new THREE.HemisphereLight(0xffffff, 0x8899aa, 3);
+    light.position.set(0.3, -0.5, 1);
+    this.scene.add(light);
     for (const name of PARTS) this.scene.add(this[name] = new THREE.Group());
     this.looks = {};
-    const open = { transparent: true, depthWrite: false };
-    for (const [name, { fill, dashes }] of Object.entries(LOOKS)) {
-      this.looks[name] = {
-        ball: new THREE.MeshLambertMaterial(),
-        unread: new THREE.MeshLambertMaterial({ ...open, opacity: 0.22 }),
-        fill: new THREE.MeshBasicMaterial({ ...open, opacity: fill ?? 1 }),
-        edge: dashes ? new THREE.LineDashedMaterial() : new THREE.LineBasicMaterial(),
-      };
-    }
+    for (const [name, { fill = 1, dashes }] of Object.entries(LOOKS)) this.looks[name] = {
+      ball: new THREE.MeshLambertMaterial(),
+      unread: new THREE.MeshLambertMaterial({ ...OPEN, opacity: 0.22 }),
+      fill: new THREE.MeshBasicMaterial({ ...OPEN, opacity: fill }),
+      edge: new THREE[dashes ? "LineDashedMaterial" : "LineBasicMaterial"]({ transparent: true }),
+    };
     this.lines = new THREE.LineSegments(new THREE.BufferGeometry(), this.looks.wrong.edge);
     // Its bounds change with every picture.
     this.lines.frustumCulled = false;
     this.scene.add(this.lines);
-    this.still = window.matchMedia("(prefers-reduced-motion: reduce)").matches;
+    this.still = matchMedia("(prefers-reduced-motion: reduce)").matches;
     this.motion = this.near = null; // the direction that swings, the name below the mouse
     this.step = 0.01;
     this.empty();
@@ -63,8 +64,7 @@ export class View {
     this.controls = new OrbitControls(this.camera, canvas);
     this.controls.addEventListener("change", () => this.draw());
     new ResizeObserver(() => this.resize()).observe(canvas);
-    const scheme = window.matchMedia("(prefers-color-scheme: dark)");
-    scheme.addEventListener("change", () => this.recolour());
+    matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => this.recolour());
     this.recolour();
   }
 
@@ -113,8 +113,10 @@ export class View {
     });
     before.forEach((plate) => this.remove(plate.group));
     this.hands.resume();
-    // Many sheets above one another stay transparent.
-    this.looks.quiet.fill.opacity = LOOKS.quiet.fill * Math.min(1, 8 / this.plates.length);
+    // Many plates above one another stay transparent, and are drawn without their styli.
+    this.thin = Math.min(1, 8 / this.plates.length);
+    this.looks.quiet.fill.opacity = LOOKS.quiet.fill * this.thin;
+    this.looks.quiet.edge.opacity = 0.4 + 0.3 * this.thin;
     if (isOther) this.home();
     this.dress();
     this.move(this.motion);
@@ -124,7 +126,7 @@ export class View {
   empty() {
     PARTS.forEach((name) => this.clear(this[name]));
     Object.assign(this, { design: null, bounds: null, mapped: null });
-    Object.assign(this, { plates: [], offered: [], segments: [], amplitude: 0 });
+    Object.assign(this, { plates: [], offered: [], segments: [], amplitude: 0, thin: 1 });
     this.lines.visible = false;
     this.draw();
   }
@@ -135,9 +137,9 @@ export class View {
     this.flat = dimension === 2;
     this.volume = new THREE.Box3(this.vector(lower), this.vector(upper));
     this.size = this.volume.min.distanceTo(this.volume.max);
-    for (const [name, { dashes }] of Object.entries(LOOKS)) {
-      const [dashSize, gapSize] = (dashes ?? [0, 0]).map((one) => one * this.size);
-      if (dashes) Object.assign(this.looks[name].edge, { dashSize, gapSize });
+    for (const [name, { dashes = [0, 0] }] of Object.entries(LOOKS)) {
+      const [dashSize, gapSize] = dashes.map((one) => one * this.size);
+      Object.assign(this.looks[name].edge, { dashSize, gapSize });
     }
     const ends = this.lattice(null, 2);
     for (let k = 0; k < ends.length; k += 2) {
@@ -168,10 +170,9 @@ export class View {
   lattice(displacement, nodes) {
     const { lower, upper, dimension: d } = this.design.scene;
     const at = (place) => {
-      const found = this.vector(place.map((k, axis) =>
-        lower[axis] + ((upper[axis] - lower[axis]) * k) / (nodes - 1)));
-      const row = displacement?.[place.reduce((sum, k) => sum * nodes + k, 0)];
-      return row ? found.addScaledVector(this.vector(row), this.amplitude) : found;
+      const row = displacement?.[place.reduce((sum, k) => sum * nodes + k, 0)] ?? [0, 0, 0];
+      return this.vector(place.map((k, axis) => lower[axis] + row[axis] * this.amplitude
+        + ((upper[axis] - lower[axis]) * k) / (nodes - 1)));
     };
     const points = [];
     const some = nodes > 3 ? [0, (nodes - 1) / 2, nodes - 1] : [0, nodes - 1];
@@ -204,12 +205,11 @@ export class View {
         const share = (value - range.low) / (range.high - range.low || 1);
         return value === null ? [120, 120, 120, 90] : [...mixed(this.ramp, share), 140];
       });
-      const texture = new THREE.DataTexture(Uint8Array.from(pixels), x.length, y.length);
-      Object.assign(texture, { magFilter: THREE.LinearFilter, needsUpdate: true });
-      texture.colorSpace = THREE.SRGBColorSpace;
+      const map = new THREE.DataTexture(Uint8Array.from(pixels), x.length, y.length);
+      Object.assign(map, { magFilter: THREE.LinearFilter, colorSpace: THREE.SRGBColorSpace,
+        needsUpdate: true });
       const sheet = new THREE.Mesh(new THREE.PlaneGeometry(width, depth),
-        new THREE.MeshBasicMaterial(
-          { map: texture, transparent: true, side: THREE.DoubleSide, depthWrite: false }));
+        new THREE.MeshBasicMaterial({ ...OPEN, map, side: THREE.DoubleSide }));
       sheet.position.set(x[0] + width / 2, y[0] + depth / 2, level ?? 0);
       sheet.renderOrder = -1;
       this.sheets.add(sheet);
@@ -236,24 +236,22 @@ export class View {
     const used = order.slice(0, count || order.length).map((k) => balls[k]);
     const middle = used.reduce((sum, ball) => sum.add(ball), new Vector());
     middle.divideScalar(used.length);
-    const nearest = used.reduce((best, ball) =>
-      (ball.distanceTo(middle) < best.distanceTo(middle) - 1e-9 ? ball : best));
+    const off = (ball) => ball.distanceTo(middle);
+    const nearest = used.reduce((best, ball) => (off(ball) < off(best) - 1e-9 ? ball : best));
     const scales = [];
+    const styli = new THREE.Group();
     for (const offset of offsets.map(this.vector)) {
       // Walls are for what the scales read: balls less the probe's offset.
       scales.push(...used.map((ball) => ball.clone().sub(offset)));
       const head = nearest.clone().sub(offset);
-      const { ball } = this.looks.near;
-      if (offset.length() > 1e-9) {
-        group.add(this.rod(nearest, head, 0.0018, ball), this.rod(nearest, nearest, 0.004, ball),
-          this.rod(head, head, 0.005, ball));
-      }
+      const radii = [0.0018, 0.004, 0.005];
+      if (offset.length() > 1e-9) styli.add(...this.piece(nearest, head, radii, "near"));
     }
     const extent = new THREE.Box3().setFromPoints(scales.length ? scales : used);
     const body = this.body(place, balls);
-    group.add(...meshes, body.block, body.edges);
+    group.add(...meshes, body.block, body.edges, styli);
     parent.add(group);
-    return { place, group, balls, order, count, meshes, extent, middle, ...body };
+    return { place, group, balls, order, count, meshes, extent, middle, styli, ...body };
   }
 
   // A box around the balls in the plate's own axes, some millimetres thick.
@@ -281,6 +279,13 @@ export class View {
     made.quaternion.setFromUnitVectors(new Vector(0, 1, 0), along.normalize());
     made.position.copy(from).add(to).multiplyScalar(0.5);
     return made;
+  }
+
+  // A straight piece with a globe at each end; radii as parts of the volume's size.
+  piece(from, to, [thin, ...ends], look) {
+    const { ball } = this.looks[look];
+    return [this.rod(from, to, thin, ball), this.rod(from, from, ends[0], ball),
+      this.rod(to, to, ends[1], ball)];
   }
 
   named(name) {
@@ -326,11 +331,9 @@ export class View {
   // Lengths {from, to, label} as bold lines; none with an empty list.
   lengths(segments) {
     this.clear(this.spans);
-    const { ball } = this.looks.span;
     this.segments = segments.map(({ from, to, label }) => {
       const [start, end] = [from, to].map(this.vector);
-      this.spans.add(this.rod(start, end, 0.0035, ball), this.rod(start, start, 0.008, ball),
-        this.rod(end, end, 0.008, ball));
+      this.spans.add(...this.piece(start, end, [0.0035, 0.008, 0.008], "span"));
       return { label, middle: start.add(end).multiplyScalar(0.5) };
     });
     this.draw();
@@ -371,8 +374,10 @@ export class View {
   }
 
   // Put the balls of a plate where they are, and as large as they are to be seen.
-  settle({ look, balls, order, count, meshes, place }, by) {
-    const radius = LOOKS[look].ball * this.size;
+  settle({ look, balls, order, count, meshes, styli, place }, by) {
+    const isThin = look === "quiet" && this.thin < 1;
+    const radius = LOOKS[look].ball * this.size * (isThin ? 0.6 : 1);
+    styli.visible = look !== "off" && !isThin;
     const matrix = new THREE.Matrix4().makeScale(radius, radius, radius);
     order.forEach((number, k) => {
       const moved = by?.get(`${number} ${place.name}`);
@@ -394,9 +399,7 @@ export class View {
     Object.assign(camera, { zoom: 1, near: 0, far: 20 * size });
     camera.lookAt(this.controls.target);
     camera.updateMatrixWorld();
-    const seen = new THREE.Box3().setFromPoints(cornersOf(this.volume)
-      .map((corner) => corner.applyMatrix4(camera.matrixWorldInverse)));
-    this.seen = seen.getSize(new Vector());
+    this.seen = this.volume.clone().applyMatrix4(camera.matrixWorldInverse).getSize(new Vector());
     this.resize();
     this.controls.update();
   }
@@ -410,7 +413,8 @@ export class View {
     const room = [width, height].map((one) => Math.max(one - 2 * MARGIN, 100));
     const half = Math.max(x / room[0], y / room[1]) / 2;
     const [right, top] = [half * width, half * height];
-    Object.assign(this.camera, { right, top, left: -right, bottom: -top });
+    const off = 2 * half * LOWER;
+    Object.assign(this.camera, { right, left: -right, top: top + off, bottom: off - top });
     this.camera.updateProjectionMatrix();
     this.draw();
   }
@@ -435,7 +439,7 @@ export class View {
       const ends = edge.geometry.attributes.position;
       const meets = [0, 1].some((k) =>
         new Vector().fromBufferAttribute(ends, k).distanceTo(hidden) < 1e-6 * this.size);
-      edge.material = this.looks[meets && !this.flat ? "rear" : "quiet"].edge;
+      edge.material = this.looks[meets && !this.flat ? "rear" : "front"].edge;
     }
   }
 
@@ -448,18 +452,21 @@ export class View {
   // Where a plate, or a point in metres, is on the screen, for whoever drives the page.
   screen(what) {
     const point = typeof what === "string" ? this.named(what)?.middle : this.vector(what);
-    if (!point) return null;
+    const corner = this.corner();
+    return point ? this.pixel(point).map((one, k) => one + corner[k]) : null;
+  }
+
+  corner() {
     const { left, top } = this.canvas.getBoundingClientRect();
-    const [x, y] = this.pixel(point);
-    return [left + this.canvas.clientLeft + x, top + this.canvas.clientTop + y];
+    return [left + this.canvas.clientLeft, top + this.canvas.clientTop];
   }
 
   ray({ clientX, clientY }) {
-    const { left, top } = this.canvas.getBoundingClientRect();
-    const { clientLeft, clientTop, clientWidth, clientHeight } = this.canvas;
+    const { clientWidth, clientHeight } = this.canvas;
+    const [left, top] = this.corner();
     const caster = new THREE.Raycaster();
-    caster.setFromCamera(new THREE.Vector2((2 * (clientX - left - clientLeft)) / clientWidth - 1,
-      1 - (2 * (clientY - top - clientTop)) / clientHeight), this.camera);
+    caster.setFromCamera(new THREE.Vector2((2 * (clientX - left)) / clientWidth - 1,
+      1 - (2 * (clientY - top)) / clientHeight), this.camera);
     return caster;
   }
 
