@@ -43,6 +43,9 @@ MOST_CANDIDATES = 20_000
 
 TOLERANCE = 1e-9
 
+# Why a candidate is dropped that enters a forbidden box.
+FORBIDDEN = "in a forbidden box"
+
 
 @dataclass(frozen=True, eq=False)
 class Bounds:
@@ -50,13 +53,14 @@ class Bounds:
 
     The scale readings of balls (ball less probe offset) must be in `volume`, the balls themselves
     in the lower and upper ends (2, d) of `reach`, by probe. `edge` is the margin of a plate around
-    its balls.
+    its balls. No artefact may enter one of the `forbidden` boxes, lower and upper ends (n, 2, d).
     """
 
     volume: Volume
     probes: Mapping[str, Probe]
     reach: Mapping[str, Array]
     edge: float | None
+    forbidden: Array
 
 
 @dataclass(frozen=True, eq=False)
@@ -165,6 +169,23 @@ def is_within(indices: Array, lower: Array, upper: Array) -> Any:
     )
 
 
+def entered(around: Array, boxes: Array) -> Array:
+    """Return which of boxes (n, 2, d) each artefact enters (…, n), by its ends `around` (…, 2, d);
+    what touches a box does not enter it.
+    """
+    low, high = around[..., None, 0, :], around[..., None, 1, :]
+    is_beyond = (low >= boxes[:, 1] - TOLERANCE) | (high <= boxes[:, 0] + TOLERANCE)
+    return ~is_beyond.any(axis=-1)
+
+
+def occupied(pose: Pose, layout: BallLayout, edge: float | None) -> Array:
+    """Return the lowest and the highest co-ordinates (2, d) of an artefact's balls, and with an
+    `edge` of the plate.
+    """
+    balls = extent(ball_coordinates(pose, layout))
+    return balls if edge is None else extent(np.vstack([balls, outline(pose, layout, edge)]))
+
+
 def _reasons(
     group: _Group, plane: Axis, turn: int, balls: _Balls, bounds: Bounds, references: References
 ) -> dict[tuple[str, ...], list[str]]:
@@ -183,10 +204,13 @@ def _reasons(
         shifts[:, AXIS_INDEX[plane]] = [level for level, _ in pairs]
     extents = extent(ball_coordinates(at_zero, group.layout)[balls.indices]) + shifts[:, None, :]
     reasons = np.full(len(shifts), "", dtype=object)
-    if bounds.edge is not None and references.artefacts[group.artefact].role == "plate":
-        around = outline(at_zero, group.layout, bounds.edge) + shifts[:, None, :]
+    edge = bounds.edge if references.artefacts[group.artefact].role == "plate" else None
+    if edge is not None:
+        around = outline(at_zero, group.layout, edge) + shifts[:, None, :]
         beyond = ~is_within(around, bounds.volume.lower, bounds.volume.upper)
         reasons[beyond] = "edge outside the volume"
+    around = occupied(at_zero, group.layout, edge) + shifts[:, None, :]
+    reasons[entered(around, bounds.forbidden).any(axis=-1)] = FORBIDDEN
     by_probes = {}
     for probes in group.probes[plane]:
         of_probe = reasons.copy()

@@ -272,7 +272,7 @@ Ends = tuple[Length, Length]
 
 
 class RegionSettings(Settings):
-    """Where the tip of a probe can be; axes that are left out are not limited."""
+    """A region by its ends along the axes; axes that are left out are not limited."""
 
     x: Ends | None = Field(None, description="lower and upper end along x")
     y: Ends | None = Field(None, description="lower and upper end along y")
@@ -297,6 +297,13 @@ class LimitsSettings(Settings):
     reach: dict[Name, RegionSettings] = Field(
         default_factory=dict,
         description="name of a probe → region in which it can read balls, {x: [200 mm, 1 m]}",
+    )
+    forbidden: tuple[RegionSettings, ...] = Field(
+        (),
+        description=(
+            "boxes, {x: [0 mm, 200 mm], y: [0 mm, 200 mm]}, that no artefact may enter: the box"
+            " around all its balls, with the edge of a plate, has to stay outside"
+        ),
     )
     edge: Length | None = Field(
         None,

@@ -29,12 +29,22 @@ from .calibrations import resolve_calibration
 from .checks import TOLERANCE, check_inside, check_lengths
 from .model import AtMost, Candidate, ChangeTimes, Pool, Position, Probe
 from .placements import resolve_position
-from .pool_groups import Bounds, extent, generate, is_within, outline
+from .pool_groups import (
+    FORBIDDEN,
+    Bounds,
+    entered,
+    extent,
+    generate,
+    is_within,
+    occupied,
+    outline,
+)
 from .pool_sections import (
     LimitsSettings,
     ListedSettings,
     OwnTimesSettings,
     PoolSettings,
+    RegionSettings,
     SelectorSettings,
     TimesSettings,
     is_group,
@@ -110,9 +120,10 @@ def resolve_candidates(
     times: TimesSettings = sections.get("pool", "times")
     limits: LimitsSettings = sections.get("pool", "limits")
     reach = _reach(limits, references)
+    forbidden = _forbidden(limits, references)
     bounds = None
     if machine is not None and machine.dimension == references.dimension:
-        bounds = Bounds(machine.volume, probes, reach, limits.edge)
+        bounds = Bounds(machine.volume, probes, reach, limits.edge, forbidden)
     all_drawn = len(positions) == written_count(root, "positions")
     result.complete = is_known and is_list and names_differ and all_drawn
     for i, position in positions.items():
@@ -129,6 +140,9 @@ def resolve_candidates(
         references.count_readings(result.found[-1].readings, ("positions", i))
         if bounds is not None:
             _check_bounds(position, ("positions", i), bounds, references)
+            if (box := _entered(position, bounds, references)) is not None:
+                text = f"is in pool.limits.forbidden[{box}]; move it, or correct the box"
+                problems.add(("positions", i), text)
     position_names = {position.name for position in positions.values()}
     for name in (times.positions or {}) if all_drawn else ():
         references.is_position(name, position_names, ("pool", "times", "positions", name))
@@ -150,6 +164,9 @@ def resolve_candidates(
                 result.drop("switched off")
                 continue
             if bounds is not None:
+                if _entered(listed, bounds, references) is not None:
+                    result.drop(FORBIDDEN)
+                    continue
                 before = len(problems.messages)
                 check_inside(listed, steps, bounds.volume, probes, references)
                 if len(problems.messages) == before:
@@ -354,16 +371,45 @@ def _reach(limits: LimitsSettings, references: References) -> dict[str, Array]:
                 steps, f'unknown probe "{name}"; {hint(name, references.probes)}', of_key=True
             )
             continue
-        ends = np.array([[-np.inf] * 3, [np.inf] * 3])
-        for axis, axis_lengths in region.stated.items():
-            k = AXIS_INDEX[axis]
-            if axis_lengths[0] >= axis_lengths[1]:
-                problems.add((*steps, axis), "the lower end must be below the upper; correct them")
-            if k >= (references.dimension or 3):
-                references.refuse_in_plane(*steps, axis)
-            ends[:, k] = axis_lengths
-        reach[name] = frozen(ends[:, : references.dimension or 3])
+        reach[name] = _ends(region, steps, references)
     return reach
+
+
+def _forbidden(limits: LimitsSettings, references: References) -> Array:
+    """Lower and upper ends (n, 2, d) of the boxes that no artefact may enter."""
+    d, boxes = references.dimension or 3, []
+    for k, region in enumerate(limits.forbidden):
+        steps, before = ("pool", "limits", "forbidden", k), len(references.problems.messages)
+        ends = _ends(region, steps, references)
+        text = "has no limits; give the ends of the box along at least one axis"
+        references.require(bool(region.stated), steps, text)
+        is_faulty = len(references.problems.messages) > before
+        # Nothing enters a box that begins at infinity.
+        boxes.append(np.full((2, d), np.inf) if is_faulty else ends)
+    return np.reshape(boxes, (len(boxes), 2, d))
+
+
+def _ends(region: RegionSettings, steps: Steps, references: References) -> Array:
+    """Lower and upper ends (2, d) of a region, infinite where it is not limited."""
+    ends = np.array([[-np.inf] * 3, [np.inf] * 3])
+    for axis, axis_lengths in region.stated.items():
+        k = AXIS_INDEX[axis]
+        if axis_lengths[0] >= axis_lengths[1]:
+            text = "the lower end must be below the upper; correct them"
+            references.problems.add((*steps, axis), text)
+        if k >= (references.dimension or 3):
+            references.refuse_in_plane(*steps, axis)
+        ends[:, k] = axis_lengths
+    return frozen(ends[:, : references.dimension or 3])
+
+
+def _entered(position: Position, bounds: Bounds, references: References) -> int | None:
+    """The first forbidden box that a position's artefact enters, if any."""
+    is_plate = references.artefacts[position.artefact].role == "plate"
+    layout = references.layouts[position.artefact]
+    around = occupied(position.pose, layout, bounds.edge if is_plate else None)
+    boxes = np.flatnonzero(entered(around, bounds.forbidden))
+    return int(boxes[0]) if len(boxes) else None
 
 
 def _check_bounds(position: Position, steps: Steps, bounds: Bounds, references: References) -> None:

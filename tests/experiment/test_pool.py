@@ -261,6 +261,28 @@ def test_out_of_volume_and_reach_and_edge_are_counted(tmp_path: Path) -> None:
     assert pool.dropped["edge outside the volume"] == 4 + 2 * 2
 
 
+@pytest.mark.parametrize("edge", ["", "edge: 30 mm, "])
+def test_candidates_in_forbidden_boxes_are_dropped(edge: str, tmp_path: Path) -> None:
+    """Of groups and by themselves; a plate may touch a box, which its edge then enters."""
+    text = replaced("corner: {x: 0 mm, y: 0 mm}", "corner: {x: 30 mm, y: 30 mm}")
+    text = replaced("level: 0 mm", "level: 30 mm", text)
+    text = replaced(
+        "corners: {x: 0 mm, y: [0 mm, 400 mm]", "corners: {x: 30 mm, y: [30 mm, 400 mm]", text
+    )
+    copy = "\n    - {name: bar 2, artefact: bar, pose: {origin: [100 mm, 100 mm, 400 mm]}, probes: [down]}\n"
+    text = replaced("    - {name: gauge,", f"{copy[1:]}    - {{name: gauge,", text)
+    # Plates across z end at 430 and at 800 mm along y, and the box is 200 mm wide in their midst.
+    boxes = "[{x: [200 mm, 400 mm], y: [430 mm, 2 m], z: [550 mm, 650 mm]}, {z: [90 mm, 110 mm]}]"
+    pool = pool_of(tmp_path, replaced(LIMITS, f"  limits: {{{edge}forbidden: {boxes}}}\n", text))
+    names = [one.name for one in pool.candidates if isinstance(one.item, Position)]
+    assert "bar" not in names and "bar 2" in names and "gauge" in names
+    high = [name for name in names if "some z 600 mm" in name]
+    assert high == ([] if edge else ["some z 600 mm at 30, 30 mm"])
+    # Besides the bar these: across x all are at 100 mm along z, which is in the second box.
+    dropped = {"in a forbidden box": 1 + (2 if edge else 1) + 4}
+    assert {key: n for key, n in pool.dropped.items() if "box" in key} == dropped
+
+
 def test_a_group_keeps_what_every_probe_can_read_from_inside_the_volume(tmp_path: Path) -> None:
     """By the positions of a file, one by one: a candidate is left just where the same position is
     accepted.
@@ -469,6 +491,10 @@ MISTAKES = [
     ("reach: {right: {x: [0 mm, 1 m]}}", "edge: 10 mm", [
         "10:5: positions[0]: with its edge of 10 mm the plate is 10 mm outside the volume; move it, or correct "
         "pool.limits.edge"]),
+    ("reach: {right: {x: [0 mm, 1 m]}}", "forbidden: [{x: [9 mm, 0 mm]}, {}, {x: [0 mm, 9 mm], z: [-1 mm, 1 mm]}]", [
+        "10:5: positions[0]: is in pool.limits.forbidden[2]; move it, or correct the box",
+        "30:21: pool.limits.forbidden[0].x: the lower end must be below the upper; correct them",
+        "30:36: pool.limits.forbidden[1]: has no limits; give the ends of the box along at least one axis"]),
     ("  candidates:\n", "  candidate:\n", ['15:3: pool.candidate: unknown key; did you mean "candidates"?']),
 ]  # fmt: skip
 

@@ -25,6 +25,8 @@ from ballplate.simulator.inputs import (
 LINE_END = re.compile("\r\n|[\n\r\x85\u2028\u2029]")
 # Anchors and tags before a value.
 PROPERTIES = re.compile(r"(?:[&!]\S*\s+)*")
+# Columns of a new mapping in one line.
+MOST_COLUMNS = 120
 
 
 @dataclass(frozen=True)
@@ -279,10 +281,18 @@ def _with_entry(text: _Text, into: _Span, value: Any, key: str | None = None) ->
         else:
             written = flow(value)
         return f"{whole[:end]}{new_line}- {written}{whole[end:]}"
-    written = f"{_key(key)}: {flow(value)}"
+    return f"{whole[:end]}{new_line}{_of_key(key, value, new_line)}{whole[end:]}"
+
+
+def _of_key(key: str, value: Any, new_line: str) -> str:
+    """A key with its value in one line, or what would be too long for one in several."""
+    written, below = f"{_key(key)}: {flow(value)}", f"{new_line}  "
     if isinstance(value, list | tuple) and len(value) > 1 and isinstance(value[0], dict):
-        written = f"{_key(key)}:" + "".join(f"{new_line}  - {flow(item)}" for item in value)
-    return f"{whole[:end]}{new_line}{written}{whole[end:]}"
+        return f"{_key(key)}:" + "".join(f"{below}- {flow(item)}" for item in value)
+    if isinstance(value, dict) and len(written) > MOST_COLUMNS:
+        lines = [below + _of_key(name, entry, below) for name, entry in value.items()]
+        return f"{_key(key)}:" + "".join(lines)
+    return written
 
 
 def _without(text: _Text, above: _Span, span: _Span, change: TextChange) -> str:
