@@ -17,15 +17,20 @@ export function legend() {
   const words = (value) => (to_target ? `${Number(value.toPrecision(2))}` : `${micro(value)} µm`);
   const [least, most] = [Math.min(...known), Math.max(...known)];
   const high = map.scale?.high ?? most;
+  const ramp = make("span", { class: "ramp" });
+  if (to_target && high > 1) {
+    const mark = make("i");
+    mark.style.left = `${100 / high}%`;
+    ramp.append(mark);
+  }
   $("legend").append(
     to_target ? "Largest uncertainty of the lengths from each point, as a ratio to the target: "
       : kind === "lengths" ? "Largest standard uncertainty of the lengths from each point: "
         : "Standard uncertainty of a corrected co-ordinate, which depends on the origin: ",
     make("span", { class: "nowrap" }, words(map.scale?.low ?? least), " ",
-      make("span", { class: "ramp" }), ` ${words(high)}`,
-      to_target && high === 1 ? " = target" : ""),
+      ramp, ` ${words(high)}`, to_target && high === 1 ? " = target" : ""),
     map.scale ? `; here ${words(least)} to ${words(most)}` : "",
-    to_target && high > 1 ? " (1 = target)" : "",
+    to_target && high > 1 ? " (the mark is at 1 = target)" : "",
     known.length < values.length ? "; grey: undetermined" : "");
 }
 
@@ -183,8 +188,8 @@ async function ask_drawn() {
   if (found.fingerprint !== page.state.fingerprint || motion !== page.motion) return;
   page.drawn = { ...found, motion, dimension: design.scene.dimension };
   dress(page.state.design);
-  page.view.motion = page.motion;
-  page.view.show(page.state.design, page.selected);
+  page.view.map();
+  page.view.move(motion);
   legend();
   quantities(found.quantities);
 }

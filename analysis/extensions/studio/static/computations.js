@@ -109,6 +109,7 @@ function take({ job, result, fingerprint }) {
       : "no further position fits";
     tell(suggestions.length ? "" : none);
     page.show();
+    $("suggested").scrollIntoView({ block: "nearest" });
   }
   if (job === "plan") {
     suggestions = [{ ...result, fingerprint, shown: true }];

@@ -1,0 +1,153 @@
+"""The page of the studio for everybody: sizes of what is pressed, contrast, what is read aloud.
+
+With `BALLPLATE_AXE`, the path of axe-core's `axe.min.js`, its rules are applied, too.
+"""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import pytest
+from ballplate.designs import shipped
+
+from tests.extensions.studio.chromium import Studio, chromium, settled, tab, until
+
+pytest.importorskip("starlette", reason="the studio is an extra")
+INSTALL = "python -m pip install 'ballplate[test,browser]', and a Chromium"
+pytest.importorskip("playwright", reason=f"no browser is driven without it: {INSTALL}")
+
+pytestmark = [
+    pytest.mark.browser,
+    pytest.mark.slow,
+    pytest.mark.skipif(chromium() is None, reason=f"no Chromium on this machine: {INSTALL}"),
+]
+
+# What can be pressed and is smaller than 24 pixels, other than links within sentences.
+SMALL = """() => [...document.querySelectorAll('button, select, input, summary, a')].filter(one =>
+one.checkVisibility({ visibilityProperty: true }) && !one.matches('.skip') &&
+Math.min(one.getBoundingClientRect().width, one.getBoundingClientRect().height) < 23.9)
+.map(one => one.outerHTML.slice(0, 90))"""
+
+# Texts with less contrast than 4.5 with the colour behind them.
+FAINT = """() => {
+  const canvas = Object.assign(document.createElement('canvas'), { width: 1, height: 1 });
+  const context = canvas.getContext('2d', { willReadFrequently: true });
+  const over = (colours) => {
+    context.clearRect(0, 0, 1, 1);
+    colours.forEach((colour) => { context.fillStyle = colour; context.fillRect(0, 0, 1, 1); });
+    return [...context.getImageData(0, 0, 1, 1).data];
+  };
+  const light = (rgb) => rgb.slice(0, 3).map((one) => one / 255)
+    .map((one) => (one <= 0.04045 ? one / 12.92 : ((one + 0.055) / 1.055) ** 2.4))
+    .reduce((sum, one, k) => sum + one * [0.2126, 0.7152, 0.0722][k], 0);
+  return [...document.querySelectorAll('body *')].filter((one) => {
+    const hasText = [...one.childNodes].some((node) => node.nodeType === 3 && node.data.trim());
+    if (!hasText || !one.checkVisibility({ opacityProperty: true })) return false;
+    if (one.matches(':disabled, option, .skip, .unseen, script')) return false;
+    const above = [];
+    for (let node = one; node; node = node.parentElement) above.unshift(node);
+    const paper = above.map((node) => getComputedStyle(node).backgroundColor);
+    const [ink, behind] = [over([...paper, getComputedStyle(one).color]), over(paper)].map(light);
+    const ratio = (Math.max(ink, behind) + 0.05) / (Math.min(ink, behind) + 0.05);
+    return ratio < 4.5 || above.some((node) => Number(getComputedStyle(node).opacity) < 1);
+  }).map((one) => one.outerHTML.slice(0, 90));
+}"""
+
+SERIOUS = """async () => (await axe.run(document)).violations
+.filter((one) => ['serious', 'critical'].includes(one.impact))
+.map((one) => [one.id, one.nodes.map((node) => node.html.slice(0, 90))])"""
+
+
+@pytest.fixture
+def design(tmp_path: Path) -> Path:
+    path = tmp_path / "plate.yaml"
+    path.write_bytes(Path(shipped("quickstart.yaml")).read_bytes())
+    return path
+
+
+def act(page, **action: object) -> None:
+    page.evaluate("(action) => window.studio.act(action)", action)
+
+
+def states(page):
+    """The page in five states, by their names."""
+    yield "full rank"
+    page.click("#positions button.name >> nth=1")
+    yield "chosen position"
+    path = ["machine", "repeatability"]
+    act(page, do="set", path=path, value="0.2 furlongs")
+    page.wait_for_selector("#messages li")
+    yield "wrong text"
+    act(page, do="undo")
+    for name in ("z high", "x low", "x high", "y high"):
+        act(page, do="off", position=name)
+    page.wait_for_selector("#motions li")
+    yield "deficient"
+    page.click("#sweep")
+    yield "dialogue"
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_what_is_pressed_is_large_and_what_is_read_has_contrast(design: Path, scheme: str) -> None:
+    axe = os.environ.get("BALLPLATE_AXE")
+    with Studio(design) as studio, tab() as page:
+        page.emulate_media(color_scheme=scheme)
+        page.goto(studio.address)
+        until(page, "!!window.studio?.state()?.design")
+        page.wait_for_selector("#assumptions:not(.stale)")
+        for name in states(page):
+            assert page.evaluate(SMALL) == [], name
+            assert page.evaluate(FAINT) == [], name
+            if axe:
+                page.evaluate(Path(axe).read_text(encoding="utf-8"))
+                assert page.evaluate(SERIOUS) == [], name
+        assert page.errors == []
+
+
+def test_the_answer_comes_first_and_is_said_once_nothing_moves(design: Path) -> None:
+    with Studio(design) as studio, tab(1440) as page:
+        page.goto(studio.address)
+        until(page, "!!window.studio?.state()?.design")
+        said = page.locator("#said")
+        assert said.get_attribute("aria-live") == "polite"
+        first = said.inner_text()
+        assert "U6 on average" in first and "100 %" in first and "Full rank" in first
+        # Of what is nearly always wanted, nothing needs scrolling.
+        for part in ("#verdict", "#view", "#positions", "[data-job=suggest]"):
+            box = page.locator(part).bounding_box()
+            assert box["y"] + box["height"] <= 900, part
+        page.keyboard.press("Tab")
+        assert page.evaluate("document.activeElement.textContent") == "Skip to the answer"
+        levels = page.evaluate(
+            "[...document.querySelectorAll('h1, h2, h3')].map(one => Number(one.tagName[1]))"
+        )
+        assert levels[0] == 1 and levels.count(1) == 1
+        # A preview changes the figures, and is not read aloud.
+        page.evaluate("window.studio.view.handlers.onDrag('z low', [0.1, 0.1, 0])")
+        until(page, f"!document.querySelector('#verdict').innerText.startsWith({first[:5]!r})")
+        assert said.inner_text() == first
+        act(page, do="move", position="z low", by=[0.1, 0.1, 0])
+        settled(page, 1)
+        until(page, f"document.querySelector('#said').innerText !== {first!r}")
+        # What is undetermined says so in large type, with what to do next.
+        for name in ("z high", "x low", "x high", "y high"):
+            act(page, do="off", position=name)
+        settled(page, 5)
+        assert page.inner_text("#verdict .big") == "Undetermined"
+        assert page.locator("[data-job=suggest].primary").count() == 1
+        assert page.errors == []
+
+
+def test_the_map_is_of_lengths_and_of_points_on_request(design: Path) -> None:
+    with Studio(design) as studio, tab(1440) as page:
+        page.goto(studio.address)
+        until(page, "!!window.studio?.state()?.design?.map")
+        assert "ratio to the target" in page.inner_text("#legend")
+        assert "1 = target" in page.inner_text("#legend")
+        page.select_option("#map", "points")
+        page.wait_for_selector("#legend >> text=depends on the origin")
+        page.select_option("#map", "")
+        until(page, "document.querySelector('#legend').innerText === ''")
+        assert page.evaluate("window.studio.state().design.map") is None
+        assert page.errors == []
