@@ -99,8 +99,8 @@ class Prediction(Result):
 
         :raises MissingExtensionError: the extension that computes it is not installed.
         """
-        frame: pandas.DataFrame = service("position_information")(self).frame()
-        return frame
+        found: Result = service("position_information")(self)
+        return found.to_frame().set_index("error")
 
     @property
     def tasks(self) -> tuple[TaskUncertainty, ...]:

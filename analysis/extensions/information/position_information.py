@@ -6,31 +6,25 @@ what is undetermined then has no uncertainty that an update could start from.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from itertools import chain
 
 import numpy as np
-from ballplate.presentation import Data, MainTable, Result, aligned, number, picked, shown_unit
-from ballplate.rank import Verdict, moved_positions, null_changes, weak_changes
-from ballplate.results import Prediction
+from ballplate.presentation import Data, MainTable, Result, number, picked, shown_unit, table_lines
+from ballplate.rank import Direction, Verdict, moved_positions
+from ballplate.results import Prediction, estimated_curves
 from ballplate.simulator.computing import single_threaded
-from ballplate.simulator.design import Design, Lengths, Priors
+from ballplate.simulator.design import Design, Flags, Lengths
 from ballplate.simulator.estimation import Linearisation, linearise
 from ballplate.simulator.experiment import Experiment, lay_out, with_pool
-from ballplate.simulator.inputs import ExperimentError, Target
-from ballplate.simulator.machines import Array, ErrorModel, HasLines, Integers, Unit
+from ballplate.simulator.inputs import ExperimentError
+from ballplate.simulator.machines import Array, ErrorModel, Unit
 from ballplate.uncertainty import Quantity, uncertainties
 
-if TYPE_CHECKING:
-    import pandas
-
-# Points on each line along which an error is averaged.
-POINTS = 21
-
-# Share of an error's variance, or of the largest change of it, from which a direction is named.
-NAMED = 0.1
+# Part of an error's uncertainty from which a weak direction is one that hides it.
+HIDING = 1.0 / 3.0
 
 # Positions side by side in a table of text.
 SIDE_BY_SIDE = 6
@@ -53,38 +47,29 @@ class InformingPosition:
 
 @dataclass(frozen=True)
 class InformedError:
-    """An error with its `standard_uncertainty` in `unit`, the root mean square along its lines;
+    """An error with its `standard_uncertainty` in `unit`, the root mean square along its curves;
     NaN if it is undetermined anywhere on them.
 
-    `others` are the same without each position or, if that is added, with it; `information` is
-    1 - u²(with a position)/u²(without it). It is 1 of a position without which the error is
-    undetermined, NaN if the error is undetermined with it. `hidden_by` are indices of directions,
-    undetermined ones before weak ones, that make the error undetermined or uncertain.
+    `hidden_by` are indices of directions, undetermined ones before weak ones, that make the error
+    undetermined or uncertain.
     """
 
     name: str
     meaning: str
     unit: Unit
     standard_uncertainty: float
-    others: tuple[float, ...]
-    information: tuple[float, ...]
-    hidden_by: tuple[int, ...] = ()
-
-    @property
-    def is_undetermined(self) -> bool:
-        return bool(np.isnan(self.standard_uncertainty))
-
-    def is_lost(self, k: int) -> bool:
-        """Return whether the error is determined with a position, and not without it."""
-        return self.information[k] == 1.0 and bool(
-            np.isnan((self.standard_uncertainty, self.others[k])).any()
-        )
+    hidden_by: tuple[int, ...]
 
 
-@dataclass(frozen=True, repr=False)
+@dataclass(frozen=True, repr=False, eq=False)
 class PositionInformation(Result):
-    """Errors by positions. `average` is U6 with all positions except added ones, in metres, NaN if
-    any distance is undetermined; `directions` are motions of positions that hide errors, as text.
+    """Errors by positions, arrays (errors, positions).
+
+    `average` is U6 with all positions except added ones, in metres, NaN if any distance is
+    undetermined. `others` are the errors' standard uncertainties without each position or, if that
+    is added, with it. `information` is 1 - u²(with a position)/u²(without it): 1 where the error is
+    `undetermined_without` the position, NaN where it is undetermined with it. `directions` are
+    motions of positions along undetermined and weak directions, as text.
     """
 
     label: str
@@ -92,139 +77,74 @@ class PositionInformation(Result):
     average: float
     positions: tuple[InformingPosition, ...]
     errors: tuple[InformedError, ...]
+    others: Array
+    information: Array
+    undetermined_without: Flags
     directions: tuple[str, ...]
 
     def headline(self) -> str:
-        own = [position for position in self.positions if not position.is_added]
-        if np.isnan(self.average) or not own:
-            return f"{len(self.errors)} errors, {len(own)} positions"
-        worst = max(own, key=lambda position: np.nan_to_num(position.average, nan=np.inf))
-        if np.isnan(worst.average):
-            return f"without {worst.name} distances are undetermined"
-        values = (number(1e6 * value, 3) for value in (worst.average, self.average))
-        return "without {} U6 is {} µm on average, with all positions {} µm".format(
-            worst.name, *values
-        )
+        worst = max(self.positions, key=lambda one: np.nan_to_num(one.average, nan=np.inf))
+        average, without = (number(1e6 * value, 3) for value in (self.average, worst.average))
+        return f"U6 {average} µm, without {worst.name} {without} µm"
 
-    def frame(self) -> pandas.DataFrame:
-        """Return the information as a data frame, a row for each error and a column for each
-        position.
+    @property
+    def hidden(self) -> list[Data]:
+        """The undetermined and the weak errors with the directions that hide them, alike ones
+        together.
         """
-        import pandas
-
-        return pandas.DataFrame(
-            [error.information for error in self.errors],
-            pandas.Index([error.name for error in self.errors], name="error"),
-            [position.name for position in self.positions],
-        )
+        groups: dict[tuple[int, ...], list[str]] = {}
+        for error in self.errors:
+            if error.hidden_by:
+                groups.setdefault(error.hidden_by, []).append(error.name)
+        return [
+            {"errors": names, "directions": [self.directions[k] for k in hidden_by]}
+            for hidden_by, names in groups.items()
+        ]
 
     def lines(self) -> list[str]:
         lines = [
             self.heading,
-            "part of each error's information that goes with each position, in percent:"
-            " 100 (1 - u²/u²(without it))",
-            "u is the root mean square along the error's axis, or along lines through the volume",
+            "percent of each error's information that goes with each position:"
+            " 1 - u²/u²(without it)",
+            "all: the error is undetermined without it; -: it is undetermined with all positions",
         ]
+        # What has no number is shown by its word.
+        shown = np.where(self.undetermined_without, np.inf, 100.0 * self.information)
         for start in range(0, len(self.positions), SIDE_BY_SIDE):
-            stop = min(start + SIDE_BY_SIDE, len(self.positions))
-            lines += ["", *self._table(range(start, stop))]
-        cells, legend = range(len(self.positions)), list(self._hidden())
-        if any(error.is_lost(k) for error in self.errors for k in cells):
-            legend.insert(0, "all: without the position, the error is undetermined")
-        if any(error.is_undetermined for error in self.errors):
-            legend.insert(0, "-: the error is undetermined with all positions")
-        return [*lines, *([""] if legend else []), *legend]
-
-    def _table(self, chosen: range) -> list[str]:
-        positions = [self.positions[k] for k in chosen]
-        marks = ["+" if position.is_added else "" for position in positions]
-        names = [f"{mark}{p.name}" for mark, p in zip(marks, positions, strict=True)]
-        rows = [["error", "u", "", *names]]
-        for error in self.errors:
-            u = number(1e6 * error.standard_uncertainty, 3)
-            cells = ("all" if error.is_lost(k) else _percent(error.information[k]) for k in chosen)
-            rows.append([error.name, u, shown_unit(error.unit), *cells])
-        lengths = [number(1e6 * position.average, 3) for position in positions]
-        rows += [
-            ["readings", "", "", *(str(position.readings) for position in positions)],
-            ["U6 without", number(1e6 * self.average, 3), "µm", *lengths],
-        ]
-        minutes = [position.minutes for position in positions]
-        if any(value is not None for value in minutes):
-            cells = ("-" if value is None else f"{value:.0f}" for value in minutes)
-            rows.insert(-1, ["minutes", "", "", *cells])
-        return aligned(rows, [False, True, False, *(True for _ in positions)])
-
-    def _hidden(self) -> Iterator[str]:
-        """Yield the undetermined and the weak errors with what hides them, alike ones together."""
-        groups: dict[tuple[bool, tuple[int, ...]], list[str]] = {}
-        for error in self.errors:
-            if error.hidden_by:
-                groups.setdefault((error.is_undetermined, error.hidden_by), []).append(error.name)
-        for (is_undetermined, hidden_by), names in groups.items():
-            word = "undetermined" if is_undetermined else "weak"
-            yield f"{', '.join(names)}: {word}, hidden by motions of"
-            yield from (f"  {self.directions[k]}" for k in hidden_by)
+            columns: Data = {
+                "error": "name",
+                "u": (lambda error: 1e6 * error.standard_uncertainty, 3),
+                "": lambda error: shown_unit(error.unit),
+            }
+            for k in range(len(self.positions))[start : start + SIDE_BY_SIDE]:
+                columns[self.positions[k].name] = shown[:, k].tolist(), _percent
+            lines += ["", *table_lines(columns, self.errors)]
+        columns = {"position": _mark, "readings": "readings", "minutes": ("minutes", 2)}
+        columns["U6 without, µm"] = "average", 3
+        lines += ["", *table_lines(columns, self.positions)]
+        for group in self.hidden:
+            lines += ["", f"{', '.join(group['errors'])}:"]
+            lines += [f"  {direction}" for direction in group["directions"]]
+        return lines
 
     def columns(self) -> MainTable:
-        """Columns with one row per error and position."""
-        pairs = [(error, k) for error in self.errors for k in range(len(self.positions))]
-        columns = {
-            "error": [error.name for error, _ in pairs],
-            "position": [self.positions[k].name for _, k in pairs],
-            "information": [error.information[k] for error, k in pairs],
-            "undetermined without": [error.is_lost(k) for error, k in pairs],
-        }
-        return columns, ()
+        """Columns with one row per error: the information that goes with each position."""
+        names = [position.name for position in self.positions]
+        of_positions = zip(names, self.information.T.tolist(), strict=True)
+        return {"error": "name", **dict(of_positions)}, self.errors
 
     def data(self) -> Data:
-        names = [position.name for position in self.positions]
-        keys = ("name", "meaning", "unit", "standard_uncertainty", "hidden_by")
-        return {
-            **self.named,
-            **picked(self, "average"),
-            "unit": "m",
-            "positions": list(self.positions),
-            "directions": self.directions,
-            "errors": [
-                {
-                    **picked(error, *keys),
-                    "information": dict(zip(names, error.information, strict=True)),
-                    "undetermined_without": [
-                        name for k, name in enumerate(names) if error.is_lost(k)
-                    ],
-                }
-                for error in self.errors
-            ],
-        }
+        of_positions = ("information", "undetermined_without", "directions", "hidden")
+        names = ("average", "positions", "errors", *of_positions)
+        return {**self.named, "unit": "m", **picked(self, *names)}
 
 
-def _percent(share: float) -> str:
-    return "-" if np.isnan(share) else f"{100.0 * share:.1f}"
+def _mark(position: InformingPosition) -> str:
+    return f"+ {position.name}" if position.is_added else position.name
 
 
-@dataclass(frozen=True, eq=False)
-class _Function:
-    """An error function: values `basis` (m, k) times its k parameters of the model, `columns`."""
-
-    name: str
-    meaning: str
-    unit: Unit
-    columns: Integers
-    basis: Array
-
-
-def _functions(model: ErrorModel) -> list[_Function]:
-    """Return the functions of a model along their lines; parameters one by one without lines."""
-    t, functions = np.linspace(0.0, 1.0, POINTS), []
-    for name in dict.fromkeys(parameter.function for parameter in model.parameters):
-        columns = [k for k, p in enumerate(model.parameters) if p.function == name]
-        lines = model.lines(name, t) if isinstance(model, HasLines) else ()
-        basis = [line.basis for line in lines] or [np.eye(len(columns))]
-        first = model.parameters[columns[0]]
-        values = np.concatenate(basis)
-        functions.append(_Function(name, first.meaning, first.unit, np.array(columns), values))
-    return functions
+def _percent(value: float) -> str:
+    return "all" if np.isinf(value) else "-" if np.isnan(value) else f"{value:.1f}"
 
 
 @single_threaded
@@ -235,122 +155,86 @@ def position_information(
     and with the last position of each experiment `added`.
     """
     design, experiment = prediction.design, prediction.experiment
-    at, functions = linearise(design), _functions(design.model)
-    u = _mean_squares(at, functions)
-    counts = design.readings.repeats
-    minutes = {} if experiment is None else _minutes(experiment)
-    positions, others, shares = [], [], []
-    for k, name in enumerate(design.positions.names):
-        without = linearise(_unread(design, k))
-        readings = int(counts[design.readings.position == k].sum())
-        positions.append(_position(name, readings, minutes, without))
-        others.append(_mean_squares(without, functions))
-        shares.append(_shares(u, others[-1]))
-    for more in added:
-        candidate, design_with = more.positions[-1], linearise(lay_out(more))
-        column = _position(candidate.name, candidate.count, minutes, design_with)
-        positions.append(replace(column, is_added=True))
-        others.append(_mean_squares(design_with, functions))
-        shares.append(_shares(others[-1], u))
-    target = None if experiment is None else experiment.target_uncertainty
-    hidden_by = _hidden_by(at, functions, u, target)
-    errors = (
-        InformedError(
-            function.name,
-            function.meaning,
-            function.unit,
-            float(np.sqrt(u[row])),
-            tuple(float(np.sqrt(other[row])) for other in others),
-            tuple(float(share[row]) for share in shares),
-            hidden_by[row],
-        )
-        for row, function in enumerate(functions)
-    )
+    assert experiment is not None
+    minutes, names = _minutes(experiment), design.positions.names
+    counts = np.bincount(design.readings.position, design.readings.repeats, len(names))
+    cases = [(name, int(count), False) for name, count in zip(names, counts, strict=True)]
+    cases += [(more.positions[-1].name, more.positions[-1].count, True) for more in added]
+    designs = chain((_unread(design, k) for k in range(len(names))), map(lay_out, added))
+    positions, variances = [], []
+    for (name, count, is_added), changed in zip(cases, designs, strict=True):
+        at = linearise(changed)
+        average = _average(uncertainties(at, symbols=("U6",)).get("U6"))
+        positions.append(InformingPosition(name, count, minutes.get(name), average, is_added))
+        variances.append(list(_variances(at).values()))
+    whole = _variances(linearise(design))
+    others = np.array(variances).reshape(-1, len(whole)).T
+    with_all = np.broadcast_to(np.array([*whole.values()])[:, None], others.shape)
+    are_added = [is_added for _, _, is_added in cases]
+    more_known, less_known = np.where(are_added, (others, with_all), (with_all, others))
+    ratio = np.divide(more_known, less_known, out=np.ones(others.shape), where=less_known > 0.0)
+    information = np.where(np.isnan(less_known), 1.0, np.maximum(1.0 - ratio, 0.0))
     return PositionInformation(
         prediction.label,
         prediction.title,
         _average(prediction.lengths),
         tuple(positions),
-        tuple(errors),
-        _motions(prediction.verdict),
+        tuple(_errors(design.model, whole, prediction.verdict)),
+        np.sqrt(others),
+        np.where(np.isnan(more_known), np.nan, information),
+        np.isnan(less_known) & ~np.isnan(more_known),
+        tuple(_motions(direction) for direction in _directions(prediction.verdict)),
     )
 
 
-def _motions(judged: Verdict) -> tuple[str, ...]:
-    """Return motions of positions along undetermined and weak directions, as text."""
-    return tuple(
-        moved_positions(direction) or str(direction) for direction in (*judged.null, *judged.weak)
-    )
+def _directions(judged: Verdict) -> tuple[Direction, ...]:
+    return (*judged.null, *judged.weak)
+
+
+def _motions(direction: Direction) -> str:
+    word = "undetermined" if np.isinf(direction.standard_deviation) else "weak"
+    motions = moved_positions(direction)
+    return f"{word} with motions of {motions}" if motions else f"{word}: {direction}"
+
+
+def _errors(
+    model: ErrorModel, variances: Mapping[str, float], judged: Verdict
+) -> Iterator[InformedError]:
+    """Yield the errors of a model, each with the directions that hide it."""
+    first = {parameter.function: parameter for parameter in reversed(model.parameters)}
+    for name, variance in variances.items():
+        u, hidden_by = float(np.sqrt(variance)), []
+        for k, direction in enumerate(_directions(judged)):
+            is_null = np.isinf(direction.standard_deviation)
+            limit = HIDING * (0.0 if is_null else u)
+            peaks = [abs(part.peak) for part in direction.functions if part.name == name]
+            if is_null == np.isnan(u) and max(peaks, default=0.0) > limit:
+                hidden_by.append(k)
+        yield InformedError(name, first[name].meaning, first[name].unit, u, tuple(hidden_by))
 
 
 def _unread(design: Design, position: int) -> Design:
-    """Return a design without the readings of a position.
-
-    Its pose is held, which nothing depends on any more, so that no direction is undetermined by it.
-    """
-    readings, lengths, priors = design.readings, design.of(Lengths), design.of(Priors)
+    """Return a design without the readings of a position, whose pose stays a parameter."""
+    readings, lengths = design.readings, design.of(Lengths)
     is_kept = readings.position != position
     place = np.where(is_kept, np.cumsum(is_kept) - 1, -1)
-    held = design.positions.held.copy()
-    held[position] = True
-    fewer = replace(
-        design,
-        readings=readings.select(np.flatnonzero(is_kept)),
-        positions=replace(design.positions, held=held),
-    )
-    return fewer.observed(
-        lengths.select(is_kept[lengths.first]).reread(design, place),
-        priors.select(priors.position != position),
-    )
+    fewer = replace(design, readings=readings.select(np.flatnonzero(is_kept)))
+    left = design.observed(lengths.select(is_kept[lengths.first]))
+    return fewer.observed(*(kind.reread(design, place) for kind in left.observations))
 
 
-def _mean_squares(at: Linearisation, functions: Sequence[_Function]) -> Array:
-    """Return the mean variance of each function along its lines; NaN if it is undetermined."""
-    variances = []
-    for function in functions:
-        rows = np.zeros((len(function.basis), len(at.layout)))
-        rows[:, at.layout.model.start + function.columns] = function.basis
-        variances.append(np.mean(at.of_shared(rows) ** 2))
-    return np.array(variances)
-
-
-def _hidden_by(
-    at: Linearisation, functions: Sequence[_Function], variances: Array, target: Target | None
-) -> list[tuple[int, ...]]:
-    """Return the directions that hide each function, with its variances (errors,)."""
-    null = [shared for shared, _ in null_changes(at)]
-    weak = weak_changes(at, target)
-    hidden = []
-    for function, variance in zip(functions, variances.tolist(), strict=True):
-        changes = np.array(
-            [
-                np.mean((function.basis @ shared[at.layout.model][function.columns]) ** 2)
-                for shared in (*null, *weak)
-            ]
-        )
-        is_null = np.arange(len(changes)) < len(null)
-        if np.isnan(variance):
-            limit, chosen = NAMED * changes[is_null].max(initial=0.0), is_null
-        else:
-            limit, chosen = NAMED * variance, ~is_null
-        hidden.append(tuple(np.flatnonzero(chosen & (changes > limit)).tolist()))
-    return hidden
-
-
-def _shares(more: Array, fewer: Array) -> Array:
-    """Return the information (errors,) that more observations add, from variances with and without
-    them.
+def _variances(at: Linearisation) -> dict[str, float]:
+    """Return the mean variance of each error along its curves, or of its parameters without any;
+    NaN if it is undetermined.
     """
-    lost = 1.0 - more / np.where(fewer > 0.0, fewer, np.inf)
-    share = np.where(np.isnan(fewer), 1.0, np.maximum(np.where(fewer > 0.0, lost, 0.0), 0.0))
-    return np.where(np.isnan(more), np.nan, share)
-
-
-def _position(
-    name: str, readings: int, minutes: dict[str, float], at: Linearisation
-) -> InformingPosition:
-    lengths = uncertainties(at, symbols=("U6",)).get("U6")
-    return InformingPosition(name, readings, minutes.get(name), _average(lengths))
+    squares: dict[str, list[Array]] = {}
+    for curve in estimated_curves(at):
+        squares.setdefault(curve.name, []).append(curve.standard_uncertainties**2)
+    if not squares:
+        values = at.of_shared(np.eye(len(at.layout))[at.layout.model])
+        for parameter, u in zip(at.design.model.parameters, values, strict=True):
+            squares.setdefault(parameter.function, []).append(u[None] ** 2)
+    return {name: float(np.concatenate(parts).mean()) for name, parts in squares.items()}
 
 
 def _average(lengths: Quantity | None) -> float:
@@ -359,8 +243,7 @@ def _average(lengths: Quantity | None) -> float:
 
 def _minutes(experiment: Experiment) -> dict[str, float]:
     """Return the durations of positions and of candidates; empty without a valid pool."""
-    pool = experiment.pool
     with suppress(ExperimentError):
-        pool = pool or with_pool(experiment).pool
-    candidates = () if pool is None else pool.candidates
-    return {candidate.name: candidate.seconds / 60.0 for candidate in candidates}
+        if pool := with_pool(experiment).pool:
+            return {one.name: one.seconds / 60.0 for one in pool.candidates}
+    return {}

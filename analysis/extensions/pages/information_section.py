@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
-from .elements import Html, element, joined, note, scrolling
+from .elements import Html, element, joined, note, table
 from .quoted import QuotedData
 
 SHADES = 8
@@ -18,60 +16,32 @@ WORDS = (
 def information_section(information: QuotedData) -> Html:
     """Section with the table of errors by positions, and the motions that hide errors."""
     positions = list(information.at("positions").each())
-    heads = [element("th", "error", scope="col", class_="words"), element("th", "u", scope="col")]
-    heads += [element("th", position.text("name"), scope="col") for position in positions]
-    rows = [element("tr", *heads)]
-    rows.append(_head_row("readings", "", [position.number("readings") for position in positions]))
-    if any(position.data["minutes"] is not None for position in positions):
-        minutes = (
-            "" if position.data["minutes"] is None else position.number("minutes", digits=2)
-            for position in positions
-        )
-        rows.append(_head_row("minutes", "", list(minutes)))
-    u6 = [position.micro("average", digits=3) for position in positions]
-    rows.append(_head_row("U6 without it, µm", information.micro("average", digits=3), u6))
-    body = [_error_row(error, positions) for error in information.at("errors").each()]
-    parts = element("thead", *rows, class_="tall"), element("tbody", *body)
+    rows = [
+        ["readings", "", *(position.number("readings") for position in positions)],
+        ["minutes", "", *(position.number("minutes", digits=2) for position in positions)],
+        ["U6 without it, µm", *(part.micro("average") for part in (information, *positions))],
+    ]
+    if all(position.data["minutes"] is None for position in positions):
+        del rows[1]
+    for k, error in enumerate(information.at("errors").each()):
+        u, unit = error.amount("standard_uncertainty", "unit")
+        cells = (_cell(information, k, j) for j in range(len(positions)))
+        rows.append([f"{error.data['name']}, {unit}", u, *cells])
     caption = "Information of each error that goes with each position, %"
-    table = scrolling("table-errors", caption, *parts, class_="tight")
-    return joined([table, note(WORDS), _hidden(information)])
+    parts = [table("errors", caption, ["", "u", *(p.data["name"] for p in positions)], rows)]
+    for group in information.at("hidden").each():
+        names = joined((name.text() for name in group.at("errors").each()), ", ")
+        directions = joined((one.text() for one in group.at("directions").each()), "; ")
+        parts.append(element("p", names, ": ", directions, "."))
+    return joined([*parts, note(WORDS)])
 
 
-def _head_row(words: str, whole: str, cells: Sequence[str]) -> Html:
-    first = element("th", words, scope="row", class_="words")
-    return element("tr", first, *(element("td", cell) for cell in (whole, *cells)))
-
-
-def _error_row(error: QuotedData, positions: list[QuotedData]) -> Html:
-    u, unit = error.amount("standard_uncertainty", "unit")
-    shown = u if error.data["standard_uncertainty"] is None else joined([u, f" {unit}"])
-    first = element("th", error.text("name"), scope="row", title=error.data["meaning"])
-    cells = [element("td", shown)]
-    for position in positions:
-        name = position.data["name"]
-        share = error.data["information"][name]
-        if share is None:
-            cells.append(element("td", "–", class_="open"))
-        elif name in error.data["undetermined_without"]:
-            cells.append(element("td", "all", class_="heat deficient"))
-        else:
-            number = error.at("information").number(name, factor=100.0, digits=2)
-            shade = min(int(SHADES * share), SHADES - 1)
-            cells.append(element("td", number, class_=f"heat heat-{shade}"))
-    return element("tr", first, *cells)
-
-
-def _hidden(information: QuotedData) -> Html:
-    """Return the errors that directions hide, alike ones together."""
-    groups: dict[tuple[bool, tuple[int, ...]], list[Html]] = {}
-    for error in information.at("errors").each():
-        kind = error.data["standard_uncertainty"] is None, tuple(error.data["hidden_by"])
-        groups.setdefault(kind, []).append(error.text("name"))
-    items = []
-    for (is_undetermined, hidden_by), names in groups.items():
-        if hidden_by:
-            word = "undetermined" if is_undetermined else "weak"
-            motions = joined((information.at("directions").text(k) for k in hidden_by), "; or of ")
-            words = joined(names, ", "), f": {word}, hidden by motions of ", motions
-            items.append(element("li", *words))
-    return element("ul", *items) if items else Html()
+def _cell(information: QuotedData, k: int, j: int) -> Html:
+    """Return the cell of an error and a position, shaded by its part."""
+    part = information.at("information", k, j)
+    if part.data is None:
+        return element("span", "–", class_="part")
+    if information.data["undetermined_without"][k][j]:
+        return element("span", "all", class_="part deficient")
+    shade = min(int(SHADES * part.data), SHADES - 1)
+    return element("span", part.number(factor=100.0, digits=2), class_=f"part heat-{shade}")

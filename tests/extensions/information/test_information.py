@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 import yaml
 from ballplate.cli import main
+from ballplate.results.error_functions import POINTS
 from numpy.typing import NDArray
 
 from tests.oracle.campaigns import campaign_file, planned, random_file
@@ -59,7 +60,7 @@ class Deletion:
 
     def mean_squares(self, spread: dense.Spread) -> Real:
         """The mean variance of every error that has a parameter, along its axis."""
-        found, t = [], np.linspace(0.0, 1.0, 21)
+        found, t = [], np.linspace(0.0, 1.0, POINTS)
         start = self.problem.parameters - len(self.problem.a)
         for function in self.problem.functions:
             linear = np.zeros((len(t), self.problem.parameters))
@@ -93,15 +94,13 @@ def agree(path: Path) -> tuple[int, int]:
     for k, position in enumerate(found.positions):
         spread = deletion.spread(k)
         without = deletion.mean_squares(spread)
-        others = [error.others[k] for error in found.errors]
-        np.testing.assert_array_equal(np.isnan(others), np.isnan(without))
+        np.testing.assert_array_equal(np.isnan(found.others[:, k]), np.isnan(without))
         is_lost = np.isnan(without) & ~np.isnan(whole)
-        np.testing.assert_array_equal([error.is_lost(k) for error in found.errors], is_lost)
+        np.testing.assert_array_equal(found.undetermined_without[:, k], is_lost)
         expected = np.where(is_lost, 1.0, 1.0 - whole / without)
         np.testing.assert_allclose(frame.to_numpy()[:, k], expected, rtol=0.0, atol=1e-9)
         np.testing.assert_allclose(position.average, deletion.average(spread), rtol=1e-7)
-    lost = sum(error.is_lost(k) for error in found.errors for k in range(len(found.positions)))
-    return int(frame.notna().to_numpy().sum()), lost
+    return int(frame.notna().to_numpy().sum()), int(found.undetermined_without.sum())
 
 
 @pytest.mark.parametrize("first", [0, 10, 20])
@@ -133,17 +132,14 @@ def test_information_is_that_of_files_without_the_position(changes: dict[str, ob
         others = [other for other in sections["positions"] if other is not place]
         fewer = bp.experiment({**sections, "positions": others})
         without = bp.information(fewer)
-        for error, own in zip(found.errors, without.errors, strict=True):
-            u = own.standard_uncertainty
-            assert error.others[k] == pytest.approx(u, rel=1e-8, nan_ok=True)
+        u = [error.standard_uncertainty for error in without.errors]
+        np.testing.assert_allclose(found.others[:, k], u, rtol=1e-8)
         # The same position as a candidate adds what goes with it.
         added = bp.information(
             fewer, added=[bp.experiment({**sections, "positions": [*others, place]})]
         )
         assert added.positions[-1].is_added and added.positions[-1].name == place["name"]
-        np.testing.assert_allclose(
-            added.frame()[place["name"]], found.frame()[place["name"]], atol=1e-9
-        )
+        np.testing.assert_allclose(added.information[:, -1], found.information[:, k], atol=1e-9)
         assert added.positions[-1].average == pytest.approx(found.average, rel=1e-9, nan_ok=True)
 
 
@@ -155,24 +151,35 @@ def test_an_error_names_the_motions_that_hide_it(
     sections["positions"] = sections["positions"][:4]
     path.write_text(yaml.safe_dump(sections), encoding="utf-8")
     null, found = bp.check(path).verdict.null, bp.information(path)
-    hidden = {error.name: error.hidden_by for error in found.errors if error.is_undetermined}
+    hidden = {
+        error.name: error.hidden_by
+        for error in found.errors
+        if np.isnan(error.standard_uncertainty)
+    }
     assert set(hidden) == {"EXZ", "EAZ"}
-    for error in found.errors:
+    for row, error in enumerate(found.errors):
         named = [k for k, one in enumerate(null) if error.name in {f.name for f in one.functions}]
         assert error.hidden_by == tuple(named)
-        assert np.isnan(error.information).all() == error.is_undetermined
+        assert np.isnan(found.information[row]).all() == (error.name in hidden)
     assert main(["run", "--errors", str(path)]) == 1
     text = capsys.readouterr().out
     motions = "z high (0.854 µm), x low (0.3 µm along z, 1 µrad about y), x high (0.391 µm, 1 µrad"
-    assert f"\nEXZ: undetermined, hidden by motions of\n  {motions} about y)\n" in text
-    assert "\n-: the error is undetermined with all" in text and "\nall: " not in text
+    assert f"\nEXZ:\n  undetermined with motions of {motions} about y)\n" in text
     assert main(["run", "--errors", str(path), "--json"]) == 1
     data = json.loads(capsys.readouterr().out)
-    error = next(one for one in data["errors"] if one["name"] == "EXZ")
-    assert set(error["information"].values()) == {None}
-    assert [data["directions"][k] for k in error["hidden_by"]] == [f"{motions} about y)"]
+    row = [error["name"] for error in data["errors"]].index("EXZ")
+    assert set(data["information"][row]) == {None}
+    words = [data["directions"][k] for k in data["errors"][row]["hidden_by"]]
+    assert data["hidden"][0] == {"errors": ["EXZ"], "directions": words}
+
+
+def test_errors_of_a_model_without_curves_are_its_parameters() -> None:
+    found = bp.information("designs/certified/two-dimensions.yaml")
+    assert [error.name for error in found.errors] == ["alpha", "gamma"]
+    assert not np.isnan(found.information).any()
 
 
 def test_a_weak_error_names_weak_directions() -> None:
     found = bp.information(small_quickstart(target_uncertainty="0.01 um"))
     assert any(error.hidden_by for error in found.errors)
+    assert all(words.startswith("weak with motions of ") for words in found.directions)

@@ -24,19 +24,19 @@ export function matrix(container, data, { onHover, onChoose }) {
     make("caption", {}, "Information of each error that goes with each position, %"),
     make("thead", {}, make("tr", {}, make("th", { scope: "col" }, "error"),
       make("th", { scope: "col" }, "u"), ...data.positions.map(head)), ...heads),
-    make("tbody", {}, ...data.errors.map((error) => errorRow(error, data, onHover))));
+    make("tbody", {}, ...data.errors.map((error, row) => errorRow(error, row, data, onHover))));
+  const is_lost = data.undetermined_without.flat().some(Boolean);
   const shown = [make("div", { class: "scrolled whole", tabindex: "0", role: "region",
     "aria-label": "Errors by positions" }, table), ...gains(data)];
-  if (data.errors.some((error) => error.undetermined_without.length)) {
+  if (is_lost) {
     shown.push(make("p", { class: "hint" }, "all: without it, the error is undetermined."));
   }
   container.replaceChildren(...shown);
 }
 
-function errorRow(error, data, onHover) {
+function errorRow(error, row, data, onHover) {
   const is_open = error.standard_uncertainty === null;
-  const motions = error.hidden_by.map((k) => data.directions[k]).join("; or of ");
-  const words = `${is_open ? "undetermined" : "weak"}, hidden by motions of ${motions}`;
+  const words = error.hidden_by.map((k) => data.directions[k]).join("; ");
   let k = 0;
   const point = () => onHover(error, error.hidden_by.length ? error.hidden_by[k] : null);
   const turn = () => {
@@ -51,13 +51,11 @@ function errorRow(error, data, onHover) {
     : `${micro(error.standard_uncertainty)} ${UNITS[error.unit] ?? error.unit}`;
   return make("tr", { class: error.hidden_by.length ? "hidden-error" : "", onmouseenter: point },
     make("th", { scope: "row" }, name), make("td", {}, u),
-    ...data.positions.map((position) => cell(error, position)));
+    ...data.information[row].map((part, k) => cell(part, data.undetermined_without[row][k])));
 }
 
-function cell(error, { name }) {
-  const part = error.information[name];
+function cell(part, is_lost) {
   if (part === null) return make("td", { class: "open" }, "–");
-  const is_lost = error.undetermined_without.includes(name);
   const made = make("td", { class: is_lost ? "part lost" : "part" },
     is_lost ? "all" : percent(part));
   made.style.setProperty("--part", part);
