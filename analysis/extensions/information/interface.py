@@ -23,7 +23,7 @@ def information(
 
     >>> import ballplate as bp
     >>> bp.information(bp.quickstart()).headline()
-    'U6 0.143 µm, without x high 0.29 µm'
+    'U6 0.143 µm, without x high 0.290 µm'
     """
     from ballplate.results import check
 
