@@ -228,3 +228,17 @@ def test_a_place_is_asked_for_on_the_floor(page) -> None:
     page.wait_for_timeout(700)
     fingers("touchEnd")
     assert len(calls(page, "onPlace")) == 2
+
+
+def test_an_answer_builds_only_what_has_changed(page) -> None:
+    # The map comes after the answer, for the design that is shown already.
+    until(page, "window.studio.view.sheets.children.length === 3")
+    built = "window.studio.view.plates.map(({ group }) => group.uuid)"
+    memory = "({ ...window.studio.view.renderer.info.memory })"
+    before, used = page.evaluate(built), page.evaluate(memory)
+    page.evaluate("window.studio.act({ do: 'move', position: 'z low', by: [0.01, 0, 0] })")
+    settled(page, 1)
+    page.wait_for_timeout(300)
+    after = page.evaluate(built)
+    assert after[1:] == before[1:] and after[0] != before[0]
+    assert page.evaluate(memory) == used

@@ -71,14 +71,13 @@ export class Annotations {
 
   axis(name, [start, end], low, high) {
     const { pen, origin } = this;
-    const length = Math.hypot(end[0] - start[0], end[1] - start[1]);
+    const length = apart(start, end);
     if (length < NUMBERS) return;
     const along = direction(start, end);
     const middle = between(start, end, 0.5);
     const right = [-along[1], along[0]];
-    const side = Math.sign(right[0] * (middle[0] - this.centre[0])
-      + right[1] * (middle[1] - this.centre[1])) || 1;
-    const out = right.map((one) => side * one);
+    const isOut = apart(moved(middle, right, 1), this.centre) > apart(middle, this.centre);
+    const out = right.map((one) => (isOut ? one : -one));
     const places = ticks(low, high, Math.floor(length / NUMBERS)).map((value) =>
       [value, between(start, end, (value - low) / (high - low))]);
     const tip = moved(end, along, ARROW);
@@ -94,7 +93,7 @@ export class Annotations {
     pen.stroke();
     this.beside(`${name}, mm`, tip, along, 5, { bold: true, must: true });
     for (const [value, place] of places) {
-      const isOrigin = origin && Math.hypot(place[0] - origin[0], place[1] - origin[1]) < 4;
+      const isOrigin = origin && apart(place, origin) < 4;
       if (!isOrigin) this.beside(millimetres(value), place, out, TICK + 3, { colour: "--quiet" });
     }
   }
@@ -149,20 +148,10 @@ export class Annotations {
 
 const moved = ([x, y], [u, v], off) => [x + off * u, y + off * v];
 const between = (start, end, share) => start.map((one, k) => one + share * (end[k] - one));
-
-function direction(start, end) {
-  const [x, y] = [end[0] - start[0], end[1] - start[1]];
-  const length = Math.hypot(x, y) || 1;
-  return [x / length, y / length];
-}
-
-function millimetres(metres) {
-  return `${Number((1e3 * metres).toPrecision(6))}`.replace("-", "−");
-}
-
-function signed(metres) {
-  return `${metres < 0 ? "" : "+"}${millimetres(metres)}`;
-}
+const apart = (start, end) => Math.hypot(end[0] - start[0], end[1] - start[1]);
+const direction = (start, end) => end.map((one, k) => (one - start[k]) / (apart(start, end) || 1));
+const millimetres = (one) => `${Number((1e3 * one).toPrecision(6))}`.replace("-", "−");
+const signed = (one) => `${one < 0 ? "" : "+"}${millimetres(one)}`;
 
 // Both ends, and between them multiples of 1, 2 or 5 that are not too near to an end.
 function ticks(low, high, most) {

@@ -24,7 +24,7 @@ const PARTS = ["frame", "sheets", "root", "ghosts", "arrows", "spans"];
 const kept = (geometry) => Object.assign(geometry, { userData: { kept: true } });
 const GLOBE = kept(new THREE.SphereGeometry(1, 16, 12));
 const BAR = kept(new THREE.CylinderGeometry(1, 1, 1, 10));
-const TIP = kept(new THREE.ConeGeometry(1, 1, 12));
+const TIP = kept(new THREE.ConeGeometry(1, 3, 12));
 const OPEN = { transparent: true, depthWrite: false };
 const Vector = THREE.Vector3;
 
@@ -89,7 +89,7 @@ export class View {
     return new Vector(place[0], place[1], place[2] ?? 0);
   }
 
-  show(design, selected, { withMap = true } = {}) {
+  show(design, selected) {
     const { dimension, lower, upper, probes, positions } = design.scene;
     const bounds = JSON.stringify([dimension, lower, upper]);
     const isAnswer = design !== this.design;
@@ -97,8 +97,7 @@ export class View {
     if (isOther) this.empty();
     Object.assign(this, { design, selected, bounds });
     if (isOther) this.renew();
-    this.sheets.visible = withMap;
-    if (isAnswer) this.map();
+    this.map();
     // Plates that stay where they were are not built again.
     const before = new Map(this.plates.map((plate) => [plate.key, plate]));
     this.plates = positions.map((place, index) => {
@@ -143,8 +142,9 @@ export class View {
     }
     const ends = this.lattice(null, 2);
     for (let k = 0; k < ends.length; k += 2) {
-      const edge = new THREE.BufferGeometry().setFromPoints(ends.slice(k, k + 2));
-      this.frame.add(new THREE.Line(edge).computeLineDistances());
+      const edge = new THREE.Line(new THREE.BufferGeometry().setFromPoints(ends.slice(k, k + 2)));
+      edge.userData.ends = ends.slice(k, k + 2);
+      this.frame.add(edge.computeLineDistances());
     }
     this.controls.mouseButtons.LEFT = this.flat ? THREE.MOUSE.PAN : THREE.MOUSE.ROTATE;
     this.controls.touches.ONE = this.flat ? THREE.TOUCH.PAN : THREE.TOUCH.ROTATE;
@@ -190,39 +190,27 @@ export class View {
 
   // Uncertainty on levels of the volume, as transparent sheets of colours.
   map() {
-    const { map } = this.design;
-    const range = this.mapRange();
-    const mapped = JSON.stringify([map, this.ramp]);
+    const mapped = JSON.stringify([this.design.map, this.ramp]);
     if (mapped === this.mapped) return;
     this.mapped = mapped;
     this.clear(this.sheets);
+    const { x, y, slices = [], scale } = this.design.map ?? {};
+    const known = slices.flatMap(({ values }) => values.flat()).filter((one) => one !== null);
     // Where everything is undetermined there is nothing to compare.
-    if (!range?.high) return;
-    const { x, y } = map;
+    if (!known.some(Boolean)) return;
+    const { low, high } = scale ?? { low: Math.min(...known), high: Math.max(...known) };
     const [width, depth] = [x.at(-1) - x[0], y.at(-1) - y[0]];
-    for (const { level, values } of map.slices) {
-      const pixels = values.flat().flatMap((value) => {
-        const share = (value - range.low) / (range.high - range.low || 1);
-        return value === null ? [120, 120, 120, 90] : [...mixed(this.ramp, share), 140];
-      });
-      const map = new THREE.DataTexture(Uint8Array.from(pixels), x.length, y.length);
-      Object.assign(map, { magFilter: THREE.LinearFilter, colorSpace: THREE.SRGBColorSpace,
-        needsUpdate: true });
+    for (const { level, values } of slices) {
+      const pixels = values.flat().flatMap((value) => (value === null ? [120, 120, 120, 90]
+        : [...mixed(this.ramp, (value - low) / (high - low || 1)), 140]));
+      const map = Object.assign(new THREE.DataTexture(Uint8Array.from(pixels), x.length, y.length),
+        { magFilter: THREE.LinearFilter, colorSpace: THREE.SRGBColorSpace, needsUpdate: true });
       const sheet = new THREE.Mesh(new THREE.PlaneGeometry(width, depth),
         new THREE.MeshBasicMaterial({ ...OPEN, map, side: THREE.DoubleSide }));
       sheet.position.set(x[0] + width / 2, y[0] + depth / 2, level ?? 0);
       sheet.renderOrder = -1;
       this.sheets.add(sheet);
     }
-  }
-
-  mapRange() {
-    const { map } = this.design;
-    const every = map?.slices.flatMap((slice) => slice.values.flat()) ?? [];
-    const values = every.filter((value) => value !== null);
-    if (!values.length) return null;
-    const open = values.length < every.length;
-    return { low: Math.min(...values), high: Math.max(...values), ...map.scale, open };
   }
 
   // A plate with its balls, those that are not read last in `order`, and its styli.
@@ -243,9 +231,9 @@ export class View {
     for (const offset of offsets.map(this.vector)) {
       // Walls are for what the scales read: balls less the probe's offset.
       scales.push(...used.map((ball) => ball.clone().sub(offset)));
-      const head = nearest.clone().sub(offset);
-      const radii = [0.0018, 0.004, 0.005];
-      if (offset.length() > 1e-9) styli.add(...this.piece(nearest, head, radii, "near"));
+      if (offset.length() > 1e-9) {
+        styli.add(this.rod(nearest, nearest.clone().sub(offset), [0.0018, 0.004, 0.005], "near"));
+      }
     }
     const extent = new THREE.Box3().setFromPoints(scales.length ? scales : used);
     const body = this.body(place, balls);
@@ -270,22 +258,18 @@ export class View {
     return { block: new THREE.Mesh(box), edges, corners, normal: axes[2].normalize() };
   }
 
-  // A straight piece, or a globe if both its ends are the same.
-  rod(from, to, share, material, geometry = from === to ? GLOBE : BAR) {
-    const made = new THREE.Mesh(geometry, material);
+  // A bar with a globe or a tip at each end; radii are parts of the volume's size.
+  rod(from, to, radii, look, tip = GLOBE) {
+    const rod = new THREE.Group();
     const along = to.clone().sub(from);
-    const radius = share * this.size;
-    made.scale.set(radius, along.length() || radius, radius);
-    made.quaternion.setFromUnitVectors(new Vector(0, 1, 0), along.normalize());
-    made.position.copy(from).add(to).multiplyScalar(0.5);
-    return made;
-  }
-
-  // A straight piece with a globe at each end; radii as parts of the volume's size.
-  piece(from, to, [thin, ...ends], look) {
-    const { ball } = this.looks[look];
-    return [this.rod(from, to, thin, ball), this.rod(from, from, ends[0], ball),
-      this.rod(to, to, ends[1], ball)];
+    radii.map((one) => one * this.size).forEach((radius, k) => {
+      const part = new THREE.Mesh([BAR, GLOBE, tip][k], this.looks[look].ball);
+      part.scale.set(radius, k ? radius : along.length(), radius);
+      part.position.copy(from).addScaledVector(along, [0.5, 0, 1][k]);
+      part.quaternion.setFromUnitVectors(new Vector(0, 1, 0), along.clone().normalize());
+      rod.add(part);
+    });
+    return rod;
   }
 
   named(name) {
@@ -321,9 +305,8 @@ export class View {
       const from = this.vector(place);
       const by = this.vector(found.value[k]).multiplyScalar(scale);
       if (by.length() < 1e-6) return;
-      const { ball } = this.looks[found.standardised[k] > 3.5 ? "wrong" : "quiet"];
-      const [neck, to] = [0.7, 1].map((share) => from.clone().addScaledVector(by, share));
-      this.arrows.add(this.rod(from, neck, 0.0012, ball), this.rod(neck, to, 0.005, ball, TIP));
+      const look = found.standardised[k] > 3.5 ? "wrong" : "quiet";
+      this.arrows.add(this.rod(from, from.clone().add(by), [0.0012, 0.0012, 0.006], look, TIP));
     });
     this.draw();
   }
@@ -333,7 +316,7 @@ export class View {
     this.clear(this.spans);
     this.segments = segments.map(({ from, to, label }) => {
       const [start, end] = [from, to].map(this.vector);
-      this.spans.add(...this.piece(start, end, [0.0035, 0.008, 0.008], "span"));
+      this.spans.add(this.rod(start, end, [0.0035, 0.008, 0.008], "span"));
       return { label, middle: start.add(end).multiplyScalar(0.5) };
     });
     this.draw();
@@ -347,18 +330,16 @@ export class View {
     if (!isThere) this.amplitude = 0;
     this.swing();
     this.draw();
-    if (!isThere || this.swinging) return;
     const animate = (now) => {
-      this.swinging = this.lines.visible && !this.still;
       if (!this.lines.visible) return;
       const share = this.still ? 1 : Math.sin((2 * Math.PI * now) / PERIOD);
       this.amplitude = SHARE * this.size * share;
       this.swing();
       this.draw();
-      if (this.swinging) requestAnimationFrame(animate);
+      if (!this.still) this.next = requestAnimationFrame(animate);
     };
-    this.swinging = true;
-    requestAnimationFrame(animate);
+    cancelAnimationFrame(this.next);
+    if (isThere) this.next = requestAnimationFrame(animate);
   }
 
   swing() {
@@ -436,9 +417,7 @@ export class View {
     const away = this.camera.getWorldDirection(new Vector());
     const hidden = cornersOf(this.volume).sort((a, b) => b.dot(away) - a.dot(away))[0];
     for (const edge of this.frame.children) {
-      const ends = edge.geometry.attributes.position;
-      const meets = [0, 1].some((k) =>
-        new Vector().fromBufferAttribute(ends, k).distanceTo(hidden) < 1e-6 * this.size);
+      const meets = edge.userData.ends.some((end) => end.distanceTo(hidden) < 1e-6 * this.size);
       edge.material = this.looks[meets && !this.flat ? "rear" : "front"].edge;
     }
   }
@@ -452,21 +431,15 @@ export class View {
   // Where a plate, or a point in metres, is on the screen, for whoever drives the page.
   screen(what) {
     const point = typeof what === "string" ? this.named(what)?.middle : this.vector(what);
-    const corner = this.corner();
-    return point ? this.pixel(point).map((one, k) => one + corner[k]) : null;
-  }
-
-  corner() {
-    const { left, top } = this.canvas.getBoundingClientRect();
-    return [left + this.canvas.clientLeft, top + this.canvas.clientTop];
+    const { left, top } = this.annotations.paper.getBoundingClientRect();
+    return point ? this.pixel(point).map((one, k) => one + [left, top][k]) : null;
   }
 
   ray({ clientX, clientY }) {
-    const { clientWidth, clientHeight } = this.canvas;
-    const [left, top] = this.corner();
+    const { left, top, width, height } = this.annotations.paper.getBoundingClientRect();
     const caster = new THREE.Raycaster();
-    caster.setFromCamera(new THREE.Vector2((2 * (clientX - left)) / clientWidth - 1,
-      1 - (2 * (clientY - top)) / clientHeight), this.camera);
+    caster.setFromCamera(new THREE.Vector2((2 * (clientX - left)) / width - 1,
+      1 - (2 * (clientY - top)) / height), this.camera);
     return caster;
   }
 
