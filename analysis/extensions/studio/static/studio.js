@@ -74,9 +74,10 @@ function draw(design) {
   dress(design);
   view.motion = page.motion;
   view.show(design, page.selected);
-  const along = design.scene.dimension === 3 ? ", with Shift along its normal" : "";
-  $("hint").textContent =
-    `Drag a plate along its plane${along}. Drag elsewhere to turn the view.`;
+  const [along, does] = design.scene.dimension === 3
+    ? [", with Shift along its normal", "turn"] : ["", "move"];
+  $("hint").textContent = `Drag a plate along its plane${along}; Escape puts it back, Alt lets it`
+    + ` through walls. Drag elsewhere to ${does} the view; double-click the floor to add a plate.`;
   legend();
 }
 

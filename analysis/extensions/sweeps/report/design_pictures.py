@@ -40,7 +40,7 @@ COLOURS = {INK: "--ink", MUTED: "--muted", PAPER: "--paper"} | {
 # enough for dark letters everywhere.
 MOST_BANDS = 10
 
-LIGHT = ("#f6f9fc", "#79a4cb")
+LIGHT = ("#f6f2fa", "#a58cc7")
 
 DARK = "#101010"
 
