@@ -14,7 +14,7 @@ from ballplate.simulator.machines.protocol import Array, HasLines, Unit
 from ..presentation.formatting import as_data
 
 # Points of a curve.
-POINTS = 21
+POINTS = 41
 # Lines reported of a function; of more, the last, which are inside the volume.
 MOST_LINES = 3
 

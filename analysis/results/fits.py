@@ -300,7 +300,7 @@ class Fit(FitResult):
         >>> import ballplate as bp
         >>> fit = bp.fit(bp.quickstart(), bp.simulate(bp.quickstart()))
         >>> fit.error_functions[0].name, fit.error_functions[0].values.shape
-        ('EXX', (21,))
+        ('EXX', (41,))
         """
         return estimated_curves(self.functions.at, self.sigma)
 

@@ -161,7 +161,9 @@ def _throughout(run: QuotedData, lengths: QuotedData) -> list[str | Html]:
     whole = lengths.at("all")
     if not judged or share is None or whole.data[share] is None:
         return []
-    return [" Of the lengths throughout the volume, ", whole.share(share), " are within it."]
+    undetermined = run.data["quantities"]["U6"]["undetermined"]
+    are = "determined, and within the target" if undetermined else "within it"
+    return [" Of the lengths throughout the volume, ", whole.share(share), f" are {are}."]
 
 
 def _rank(run: QuotedData, contents: DesignContents) -> Html:

@@ -46,7 +46,8 @@ def tour(page, folder: Path, design: Path) -> None:
     picture("verdict", "#answers")
     for name in ("z high", "x low", "x high", "y high"):
         page.click(f"[aria-label='read {name}']")
-        until(page, f"window.studio.state().text.includes('{name}, enabled: false')")
+        place = f"window.studio.state().design.scene.positions.find((one) => one.name === {name!r})"
+        until(page, f"!{place}.enabled")
     picture("undetermined")
     page.click("[data-job=suggest]")
     page.wait_for_selector("#suggestions li")

@@ -387,6 +387,10 @@ def test_a_design_begins_with_the_questions_of_init(tmp_path: Path) -> None:
         assert "Measuring volume" in page.inner_text("#begin-status")
         answer("volume", "500", "400", "300")
         page.wait_for_selector("#error-plate:not(:empty)")
+        # A page that is loaded again has the answers still.
+        page.reload()
+        page.wait_for_selector("#error-plate:not(:empty)")
+        assert page.input_value("#answer-volume-1") == "400" and page.evaluate(at) == "cantilever"
         answer("plate", "4", "4", "200")
         answer("temperature", "0.1")
         answer("hours", "4")
@@ -397,7 +401,7 @@ def test_a_design_begins_with_the_questions_of_init(tmp_path: Path) -> None:
         page.wait_for_selector("#begin", state="hidden")
         state = settled(page, 1)
         assert not state["saved"] and wording.A_DRAFT_NOT_SAVED in page.inner_text("#notice")
-        assert "full rank" in page.inner_text("#verdict")
+        assert "Full rank" in page.inner_text("#verdict")
         page.keyboard.press("Control+s")
         until(page, "window.studio.state().saved")
         # Later, another design begins beside it.

@@ -16,14 +16,13 @@ export const begins = () => !$("begin").hidden;
 // Show the page, unless nothing is installed that has the questions: then the example is shown.
 export async function begin() {
   const { state } = page;
-  if (questions === null) {
+  if (!questions) {
     const found = await ask("/api/questions");
-    if (found.missing) {
-      tell(`${state.note ? `${state.note}; ` : ""}no questions are asked: ${found.missing}`);
-      return;
-    }
+    const note = `${state.note ? `${state.note}; ` : ""}no questions are asked: ${found.missing}`;
+    if (found.missing) return void tell(note);
     ({ questions } = found);
     $("questions").replaceChildren(...questions.map(group));
+    restore();
   }
   const others = state.files.filter((name) => name !== state.file);
   $("begin-files").hidden = !others.length;
@@ -45,7 +44,6 @@ export async function begin() {
 function show(isShown) {
   $("begin").hidden = !isShown;
   $("design").hidden = isShown;
-  document.body.classList.toggle("begins", isShown);
   page.show();
 }
 
@@ -85,6 +83,16 @@ function group(question) {
 }
 
 const controls = (box) => [...box.querySelectorAll("input, select")];
+const property = (control) => (control.type === "radio" ? "checked" : "value");
+
+// Answers of this tab outlive a page that is loaded again.
+function restore() {
+  const kept = JSON.parse(sessionStorage.getItem("answers") ?? "[]");
+  controls($("questions")).forEach((one, k) => {
+    one[property(one)] = kept[k] ?? one[property(one)];
+    one.dispatchEvent(new Event("input"));
+  });
+}
 
 function number(question, field, k) {
   const id = `answer-${question.name}-${k}`;
@@ -150,6 +158,8 @@ async function update() {
   clearTimeout(timer);
   asked += 1;
   const mine = asked;
+  const kept = controls($("questions")).map((one) => one[property(one)]);
+  sessionStorage.setItem("answers", JSON.stringify(kept));
   const answers = Object.fromEntries(questions.map((one) => [one.name, entry(one).text]));
   try {
     const found = await ask("/api/draft", { ...answers, name: $("begin-name").value.trim() });
@@ -174,9 +184,8 @@ function messages() {
     controls(box).forEach((one) => one.setAttribute("aria-invalid", String(!!message)));
     if (message) said.push(`${label}: ${message}`);
   }
-  if ($("begin-status").textContent !== said.join(". ")) {
-    $("begin-status").textContent = said.join(". ");
-  }
+  const status = said.join(". ");
+  if ($("begin-status").textContent !== status) $("begin-status").textContent = status;
 }
 
 function summary() {
