@@ -43,7 +43,7 @@ def tour(page, folder: Path, design: Path) -> None:
         small(shot, folder / f"studio-{name}.webp" if name else folder / "studio.webp")
 
     picture("")
-    picture("verdict", "#answers")
+    picture("verdict", "#answer")
     for name in ("z high", "x low", "x high", "y high"):
         page.click(f"[aria-label='read {name}']")
         place = f"window.studio.state().design.scene.positions.find((one) => one.name === {name!r})"
@@ -66,7 +66,9 @@ def tour(page, folder: Path, design: Path) -> None:
     page.mouse.move(x, y - 20, steps=6)
     page.mouse.up()
     settled(page, revision + 1)
+    page.click("#details summary")
     picture("drag")
+    page.click("#details summary")
     page.click("#position [aria-label='r3c3']")
     settled(page, revision + 2)
     picture("position")
