@@ -51,7 +51,8 @@ function close(said = "") {
   show(false);
   page.view.resize();
   page.view.home();
-  $("view").focus();
+  $("view").focus({ preventScroll: true });
+  window.scrollTo(0, 0);
   tell(said);
 }
 
