@@ -40,9 +40,8 @@ def tour(page, folder: Path, design: Path) -> None:
         page.mouse.move(620, 5)
         page.wait_for_timeout(1200)
         shot = page.locator(part).screenshot() if part else page.screenshot()
-        small(shot, folder / f"studio-{name}.webp" if name else folder / "studio.webp")
+        small(shot, folder / f"studio-{name}.webp")
 
-    picture("")
     picture("verdict", "#answer")
     for name in ("z high", "x low", "x high", "y high"):
         page.click(f"[aria-label='read {name}']")
