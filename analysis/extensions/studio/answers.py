@@ -131,9 +131,10 @@ def _row(quantity: Quantity) -> Data:
 
 def scene(experiment: Experiment, problems: Mapping[str, str]) -> dict[str, Any]:
     """Return the volume and all positions, with what is wrong with some by their names, as plain
-    data in metres.
+    data in metres. Positions that are `unclear` have no place.
     """
     volume = experiment.machine.volume
+    names = {place.name for place in experiment.positions}
     return {
         "dimension": experiment.dimension,
         "lower": volume.lower.tolist(),
@@ -144,6 +145,7 @@ def scene(experiment: Experiment, problems: Mapping[str, str]) -> dict[str, Any]
             place_data(experiment, place) | {"problem": problems.get(place.name)}
             for place in experiment.positions
         ],
+        "unclear": {name: text for name, text in problems.items() if name not in names},
     }
 
 

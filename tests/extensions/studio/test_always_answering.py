@@ -91,6 +91,9 @@ def test_what_cannot_be_understood_is_left_out_too(document):
     wrong = done(document, {"do": "text", "text": document.text.replace("[back, front]", "[bakc]")})
     found = judgement(wrong)
     assert [place["name"] for place in found.scene["positions"]] == NAMES[:4]
+    assert [place["name"] for place in found.scene["positions"]] + [
+        *found.scene["unclear"]
+    ] == NAMES
     expected = bp.run(without(document, "y low", "y high"))
     assert found.answer["rank"]["deficiency"] == expected.verdict.deficiency > 0
     assert found.answer["rank"]["observations"] == expected.verdict.observations

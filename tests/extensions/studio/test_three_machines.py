@@ -56,6 +56,7 @@ class Mouse:
     """What a person does; `page` is in a tab of its own."""
 
     touches = False
+    moves = 1
 
     def __init__(self, page: Any) -> None:
         self.page = page
@@ -79,6 +80,8 @@ class Mouse:
 
 
 class Keyboard(Mouse):
+    moves = 3
+
     def reach(self, selector: str) -> None:
         matches = "([s]) => document.activeElement === document.querySelector(s)"
         for _ in range(400):
@@ -105,7 +108,7 @@ class Keyboard(Mouse):
 
     def move(self, name: str) -> None:
         self.reach("#view")
-        for _ in range(3):
+        for _ in range(self.moves):
             self.page.keyboard.press("ArrowRight")
 
 
@@ -113,8 +116,9 @@ class Touch(Mouse):
     touches = True
 
     def press(self, selector: str) -> None:
-        self.page.locator(selector).scroll_into_view_if_needed()
-        self.page.tap(selector)
+        found = self.page.locator(selector).first
+        found.scroll_into_view_if_needed()
+        found.tap()
 
     def move(self, name: str) -> None:
         self.page.locator("#view").scroll_into_view_if_needed()
@@ -204,13 +208,13 @@ def test_from_an_empty_folder(tmp_path: Path, machine: str, hands_of: type[Mouse
             if part == 0:
                 hands.press(first)
                 hands.move(names[0])
-                moved = done(page, revision + 1)["design"]["scene"]["positions"][0]
+                moved = done(page, revision + hands.moves)["design"]["scene"]["positions"][0]
                 assert moved["origin"] != state["design"]["scene"]["positions"][0]["origin"]
                 # Another is taken out of the volume, and the others go on.
                 revision = page.evaluate(f"{STATE}.revision")
                 hands.press("#forms [data-section=positions] > summary")
-                corner = '#forms [data-path=\'["positions",1,"corner","x"]\']'
-                hands.write(corner, "5 m")
+                steps = '"corner","x"' if is_flat else '"level"'
+                hands.write(f"#forms [data-path='[\"positions\",1,{steps}]']", "5 m")
                 state = done(page, revision + 1)
                 assert state["design"]["scene"]["positions"][1]["problem"] and not state["stale"]
                 hands.press(f"[aria-label='read {names[2]}']")

@@ -12,7 +12,12 @@ export function choose(name) {
 export function positions() {
   const { state, selected } = page;
   const list = state.design?.scene.positions ?? [];
-  $("positions").replaceChildren(...list.map(item));
+  const unclear = Object.entries(state.design?.scene.unclear ?? {}).map(([name, problem]) =>
+    make("li", { class: "wrong", title: problem },
+      make("input", { type: "checkbox", checked: true, title: "switch this position off",
+        "aria-label": `read ${name}`, onchange: () => act({ do: "off", position: name }) }),
+      make("span", { class: "name" }, name), make("small", {}, "unclear")));
+  $("positions").replaceChildren(...list.map(item), ...unclear);
   const place = list.find((one) => one.name === selected);
   $("position").hidden = !place;
   if (place) details(place);
