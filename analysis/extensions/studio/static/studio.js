@@ -1,11 +1,12 @@
 // The page of the studio: it asks, the engine answers, and everything that is shown comes from
 // there.
-import { ask_later, dress, figures, legend, unfold_text } from "./answers.js";
+import { ask_later, dress, figures, unfold_text } from "./answers.js";
 import { begin, begins } from "./begin.js";
 import {
   candidate, dialog, drawn, fit, forget_suggestions, poll, start, sweep,
 } from "./computations.js";
 import { build, flow } from "./forms.js";
+import { legend } from "./legend.js";
 import { errors } from "./matrix.js";
 import {
   $, act, ask, focus, latency, options, page, preview, refocus, refresh, tell, watch,
