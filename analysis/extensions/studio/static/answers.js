@@ -54,6 +54,7 @@ export function figures(design, messages, pending = false) {
   const box = $("verdict");
   box.classList.toggle("bad", wrong || rank?.deficiency > 0);
   box.classList.toggle("old", wrong);
+  box.classList.toggle("open", !design?.target);
   box.classList.toggle("warn", !wrong && !rank?.deficiency && is_missed);
   const fit = make("button", { id: "fit", onclick: () => act({ do: "fit" }) },
     "Fit all positions to the volume");
@@ -160,6 +161,7 @@ async function ask_drawn() {
   page.view.move(motion);
   legend();
   quantities(found.quantities);
+  ["legend", "quantities"].forEach((name) => $(name).classList.remove("stale"));
 }
 
 let waiting = null;
