@@ -39,7 +39,13 @@ from ballplate.planning.short_names import short_names
 from ballplate.results.checked_designs import predict
 from ballplate.simulator.computing.processes import in_processes
 from ballplate.simulator.computing.rounding import comparable
-from ballplate.simulator.computing.steps import Report, counted, unreported
+from ballplate.simulator.computing.steps import (
+    EnoughError,
+    ProgressStep,
+    Report,
+    counted,
+    unreported,
+)
 from ballplate.simulator.computing.threads import single_threaded
 from ballplate.simulator.experiment.model import AtMost, Candidate, Experiment, Pool, Position
 from ballplate.simulator.inputs.extensions import optional_service, service
@@ -416,44 +422,65 @@ def _search(
     # In a small pool most selections are met again and again, and one process remembers them.
     shares = [first] if is_small else [[start] for start in first]
     depth = 2 if is_small else 1
-    tasks: list[tuple[object, ...]] = [
-        (problem, None, 0),
-        *((problem, share, depth) for share in shares),
-    ]
-    relaxed, *found_selections = counted(
-        in_processes(_task, tasks, workers), "starts of the search", len(tasks), report
-    )
-    selections = [
-        selection for some in found_selections if isinstance(some, list) for selection in some
-    ]
-    # Of a selection that is just enough, most of what an exchange passes through is deficient.
-    ways = (
-        (False, True)
-        if _is_just_enough(problem, min(selections, key=lambda selection: selection.order))
-        else (False,)
-    )
-    for by_pivots in ways[1:]:
-        tasks = [(problem, share, depth, by_pivots) for share in shares]
-        found_by_pivots = counted(
-            in_processes(_task, tasks, workers), "starts by pivots", len(tasks), report
+    selections: list[Found] = []
+    bounds: list[Bound] = []
+
+    def try_all(unit_name: str, tasks: Sequence[tuple[object, ...]]) -> None:
+        def report_best(step: ProgressStep) -> None:
+            report(replace(step, remark=_best_words(problem, selections), can_end=True))
+
+        outcomes = in_processes(_task, tasks, workers)
+        for outcome in counted(outcomes, unit_name, len(tasks), report_best):
+            if isinstance(outcome, Bound):
+                bounds.append(outcome)
+            else:
+                selections.extend(outcome or ())
+
+    try:
+        try_all(
+            "starts of the search",
+            [(problem, None, 0), *((problem, share, depth) for share in shares)],
         )
-        selections += [
-            selection for some in found_by_pivots if isinstance(some, list) for selection in some
-        ]
-    if isinstance(relaxed, Bound):
-        by_weight = np.argsort(-comparable(relaxed.weights), kind="stable").tolist()
-        start = starts(problem, by_weight, 0, seed)[-1]
-        selections += [
-            improve(problem, start, Losses(problem, by_pivots), depth) for by_pivots in ways
-        ]
-    selections = sorted(set(selections), key=lambda selection: selection.order)
-    if not is_small:
-        best_starts = [selection.chosen for selection in selections[:BEST_STARTS]]
-        tasks = [(problem, [start], 2, by_pivots) for start in best_starts for by_pivots in ways]
-        again = counted(in_processes(_task, tasks, workers), "deeper searches", len(tasks), report)
-        selections += [selection for some in again if isinstance(some, list) for selection in some]
-    best = min(selections, key=lambda selection: selection.order)
-    return best, relaxed if isinstance(relaxed, Bound) else None
+        # Of a selection that is just enough, most of what an exchange passes through is deficient.
+        ways = (False, True) if _is_just_enough(problem, _best(selections)) else (False,)
+        for by_pivots in ways[1:]:
+            tasks = [(problem, share, depth, by_pivots) for share in shares]
+            try_all("starts by pivots", tasks)
+        if bounds:
+            by_weight = np.argsort(-comparable(bounds[0].weights), kind="stable").tolist()
+            start = starts(problem, by_weight, 0, seed)[-1]
+            selections += [
+                improve(problem, start, Losses(problem, by_pivots), depth) for by_pivots in ways
+            ]
+        if not is_small:
+            ordered = sorted(set(selections), key=lambda selection: selection.order)
+            deeper = [
+                (problem, [selection.chosen], 2, by_pivots)
+                for selection in ordered[:BEST_STARTS]
+                for by_pivots in ways
+            ]
+            try_all("deeper searches", deeper)
+    except EnoughError:
+        # Before the first start there is nothing to go on with.
+        if not selections:
+            selections.append(improve(problem, first[0], Losses(problem), 0))
+    return _best(selections), bounds[0] if bounds else None
+
+
+def _best(selections: Sequence[Found]) -> Found:
+    return min(selections, key=lambda selection: selection.order)
+
+
+def _best_words(problem: SelectionProblem, selections: Sequence[Found]) -> str:
+    """The best selection so far and its cost in words; empty before there is any."""
+    if not selections:
+        return ""
+    best, criterion = _best(selections), problem.criterion
+    if not np.isfinite(best.value):
+        return "none determines everything yet"
+    spent = problem.constraints.spent(best.chosen)
+    value = f"{1e6 * best.value:.4g} µm" if criterion.unit == "m" else f"{best.value:.4g}"
+    return f"best so far {criterion.name} {value} with {spent.budget}"
 
 
 @single_threaded

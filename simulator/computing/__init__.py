@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from .processes import begin_worker, in_processes, interruptions_blocked, processors
     from .rounding import above, blank, comparable, first_largest_of_columns
     from .spreading import evenly_spread
-    from .steps import ProgressStep, Report, counted, unreported
+    from .steps import EnoughError, ProgressStep, Report, counted, unreported
     from .threads import scipy_linalg, single_threaded
 
 __getattr__, __dir__ = lazily(__name__, __file__)

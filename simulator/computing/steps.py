@@ -13,7 +13,8 @@ Item = TypeVar("Item")
 class ProgressStep:
     """Progress of a step: its name, the number done, and the total.
 
-    `before` were done in an earlier run; `remark` is an additional text.
+    `before` were done in an earlier run; `remark` is an additional text. Where it `can_end`, the
+    report may raise `EnoughError`.
 
     >>> print(ProgressStep("data sets", 512, 2048, "accurate to 1.5 %"))
     512 of 2048 data sets, accurate to 1.5 %
@@ -24,6 +25,7 @@ class ProgressStep:
     wanted: int
     remark: str = ""
     before: int = 0
+    can_end: bool = False
 
     def __str__(self) -> str:
         remark = f", {self.remark}" if self.remark else ""
@@ -31,7 +33,11 @@ class ProgressStep:
 
 
 Report = Callable[[ProgressStep], object]
-"""Receives each step of the progress."""
+"""Receives each step of the progress; see `EnoughError`."""
+
+
+class EnoughError(Exception):
+    """Raised by a report to end a search with the best result so far."""
 
 
 def unreported(step: ProgressStep) -> None:

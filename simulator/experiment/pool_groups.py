@@ -169,7 +169,7 @@ def is_within(indices: Array, lower: Array, upper: Array) -> Any:
     )
 
 
-def entered(around: Array, boxes: Array) -> Array:
+def entered(around: Array, boxes: Array) -> Any:
     """Return which of boxes (n, 2, d) each artefact enters (…, n), by its ends `around` (…, 2, d);
     what touches a box does not enter it.
     """

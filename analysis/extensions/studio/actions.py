@@ -28,11 +28,15 @@ from ballplate.simulator.machines import Array
 
 from .document import DesignDocument, changed
 from .drafts import draft_of
+from .filling import added, filling, refilled, taken
 
 Arguments = Mapping[str, Any]
 
 # Places are written to this many metres, a hundredth of a millimetre.
 STEP = 1e-5
+
+# Places along an axis of a pool that fills the volume.
+MOST_PLACES = 20
 
 
 class ActionError(ValueError):
@@ -129,8 +133,61 @@ def _added(document: DesignDocument, action: Arguments) -> str:
 
 
 def _planned(document: DesignDocument, action: Arguments) -> str:
-    """The positions of a plan in place of the present ones; the pool stays."""
-    return _with(document, [TextChange(("positions",), _plain(action["positions"]))])
+    """The positions of a plan: others are switched off and stay in the file, as does the pool."""
+    entries = to_python(draft_of(document, planning=True).tree).get("positions") or ()
+    chosen = {str(settings["name"]): settings for settings in _plain(action["positions"])}
+    is_read = {str(entry["name"]): entry.get("enabled", True) for entry in entries}
+    changes = [
+        TextChange(("positions", k, "enabled"), False)
+        for k, (name, enabled) in enumerate(is_read.items())
+        if enabled and name not in chosen
+    ]
+    for name, settings in chosen.items():
+        if not is_read.get(name):
+            number = 2
+            while settings["name"] in is_read:
+                settings["name"], number = f"{name} ({number})", number + 1
+            changes.append(TextChange(("positions",), settings, "append"))
+    return _with(document, changes)
+
+
+def _filled(document: DesignDocument, action: Arguments) -> str:
+    """A pool that fills the volume, in planes with the probes of each, in place of its groups."""
+    experiment = draft_of(document)
+    artefact = str(action.get("artefact") or next(iter(experiment.layouts)))
+    if artefact not in experiment.layouts:
+        raise ActionError(f"no artefact {artefact}")
+    try:
+        probes = {str(plane): [*map(str, some)] for plane, some in action["probes"].items()}
+        turns, count = [*map(int, action["quarter_turns"])], int(action["count"])
+    except (AttributeError, TypeError, ValueError):
+        raise ActionError("give probes by plane, quarter turns, and the count of places") from None
+    if not set(turns) <= {0, 1, 2, 3} or not 1 <= count <= MOST_PLACES:
+        raise ActionError(f"quarter turns are 0 to 3, and places along an axis 1 to {MOST_PLACES}")
+    groups = filling(experiment, artefact, probes, turns, count)
+    return _with(document, refilled(to_python(experiment.tree), artefact, groups))
+
+
+def _limited(document: DesignDocument, action: Arguments) -> str:
+    """A further entry of a list of the pool's limits: a forbidden box, or a candidate left out."""
+    data = to_python(draft_of(document).tree)
+    return _with(document, [added(data, _limit(action), _plain(action["entry"]))])
+
+
+def _lifted(document: DesignDocument, action: Arguments) -> str:
+    """The pool without an entry of a list of its limits."""
+    steps, data = _limit(action), to_python(draft_of(document).tree)
+    entries = ((data.get("pool") or {}).get("limits") or {}).get(steps[-1]) or ()
+    index = int(action["index"])
+    if not 0 <= index < len(entries):
+        raise ActionError(f"no pool.limits.{steps[-1]}[{index}]")
+    return _with(document, [taken(data, steps, index)])
+
+
+def _limit(action: Arguments) -> Steps:
+    if action["limit"] not in ("forbidden", "at_most"):
+        raise ActionError("a limit is forbidden or at_most")
+    return ("pool", "limits", str(action["limit"]))
 
 
 def _repaired(document: DesignDocument, action: Arguments) -> str:
@@ -345,6 +402,9 @@ ACTIONS: Mapping[str, Callable[[DesignDocument, Arguments], str]] = {
     "add": _added,
     "repair": _repaired,
     "plan": _planned,
+    "fill": _filled,
+    "limit": _limited,
+    "lift": _lifted,
     "remove": _removed,
     "off": _switched_off,
     "on": _switched_on,

@@ -11,13 +11,20 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from multiprocessing.connection import Connection
 from multiprocessing.process import BaseProcess
+from multiprocessing.synchronize import Event
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from ballplate.extensions.repair.written import position_settings
 from ballplate.presentation import Data, finite, picked
-from ballplate.simulator.computing import ProgressStep, Report, begin_worker, interruptions_blocked
+from ballplate.simulator.computing import (
+    EnoughError,
+    ProgressStep,
+    Report,
+    begin_worker,
+    interruptions_blocked,
+)
 from ballplate.simulator.experiment import lay_out
 from ballplate.simulator.inputs import ExperimentError, number_of
 
@@ -32,6 +39,9 @@ MOST_RUNNING = 2
 
 # Seconds for a process that is asked to end.
 PATIENCE = 2.0
+
+# Computations that end with the best result so far when they are stopped for the first time.
+WITH_BEST = frozenset({"plan"})
 
 # Data sets of Monte Carlo unless another number is asked for.
 TRIALS = 256
@@ -59,13 +69,15 @@ def _monte_carlo(document: DesignDocument, settings: Mapping[str, Any], report: 
 
 
 def _plan(document: DesignDocument, settings: Mapping[str, Any], report: Report) -> Any:
-    from ballplate.planning import Request, campaign
+    from ballplate.planning import HOUR, Budget, Request, campaign
 
-    found = campaign(evaluable_of(document, planning=True), Request(), report=report)
+    hours = settings.get("hours")
+    request = Request(budget=None if hours is None else Budget(HOUR * float(hours)))
+    found = campaign(evaluable_of(document, planning=True), request, report=report)
     chosen, lengths = found.chosen_experiment, found.prediction.quantities.get("U6")
     return {
         "lines": found.lines(),
-        "words": f"the plan: {number_of(len(chosen.positions), 'position')}, {found.budget}",
+        "words": f"the plan: {number_of(len(chosen.positions), 'position')}, {found.spent.budget}",
         "average": None if lengths is None else finite(lengths.average),
         "maximum": None if lengths is None else finite(lengths.maximum),
         "deficiency": found.prediction.verdict.deficiency,
@@ -130,7 +142,8 @@ CHECKS: Mapping[str, Callable[[DesignDocument, Mapping[str, Any]], None]] = {"sw
 class Job:
     """A computation in a process of its own, of the design with a `fingerprint`: `state` is
     running, done or failed, `step` its progress, `result` its outcome or the reason of its
-    failure, and `page` its page, if any. Its temporary files are in a `folder` that is removed
+    failure, and `page` its page, if any. It is asked by the event `enough` to end with the best
+    result so far. Its temporary files are in a `folder` that is removed
     with it, since a stopped process removes no file.
     """
 
@@ -139,6 +152,7 @@ class Job:
     process: BaseProcess
     connection: Connection
     folder: str
+    enough: Event
     state: str = "running"
     step: str = ""
     result: Any = None
@@ -158,6 +172,14 @@ class Job:
         except (EOFError, OSError):
             self.state, self.result = "failed", "the computation ended without a result"
 
+    def end_with_best(self) -> bool:
+        """Ask for the best result so far; True if there can be one and it was not asked before."""
+        self.look()
+        can_end = self.state == "running" and self.name in WITH_BEST and not self.enough.is_set()
+        if can_end:
+            self.enough.set()
+        return can_end
+
     def stop(self) -> None:
         """End the process, which may be one that does not listen."""
         self.process.terminate()
@@ -174,6 +196,7 @@ class Job:
             "job": self.name,
             **picked(self, "fingerprint", "state", "step", "result"),
             "page": bool(self.page),
+            "ending": self.state == "running" and self.enough.is_set(),
         }
 
 
@@ -191,12 +214,13 @@ def started(name: str, document: DesignDocument, settings: Mapping[str, Any]) ->
     context = multiprocessing.get_context("spawn")
     receiver, sender = context.Pipe(duplex=False)
     folder = tempfile.mkdtemp(prefix="ballplate-studio-")
-    arguments = (folder, sender, name, document, dict(settings))
+    enough = context.Event()
+    arguments = (folder, sender, name, document, dict(settings), enough)
     process = context.Process(target=_work_in, args=arguments, daemon=True)
     with interruptions_blocked():
         process.start()
     sender.close()
-    return Job(name, document.fingerprint, process, receiver, folder)
+    return Job(name, document.fingerprint, process, receiver, folder, enough)
 
 
 def _work_in(
@@ -205,18 +229,25 @@ def _work_in(
     name: str,
     document: DesignDocument,
     settings: Mapping[str, Any],
+    enough: Event,
 ) -> None:
     """Work in a process of its own, with its temporary files in a folder."""
     begin_worker(os.getppid())
     tempfile.tempdir = folder
-    _work(connection, name, document, settings)
+    _work(connection, name, document, settings, enough)
 
 
 def _work(
-    connection: Connection, name: str, document: DesignDocument, settings: Mapping[str, Any]
+    connection: Connection,
+    name: str,
+    document: DesignDocument,
+    settings: Mapping[str, Any],
+    enough: Event | None = None,
 ) -> None:
     def report(step: ProgressStep) -> None:
         connection.send(("step", str(step)))
+        if step.can_end and enough is not None and enough.is_set():
+            raise EnoughError
 
     try:
         result = JOBS[name](document, settings, report)

@@ -24,6 +24,7 @@ from ballplate.simulator.inputs import (
 from .answers import answer, drawn_answer, later_answer, scene
 from .document import DesignDocument, data_of, variants_of
 from .drafts import draft_of, evaluable, evaluable_of, problems
+from .filling import pool_of
 
 
 @dataclass(frozen=True)
@@ -99,6 +100,14 @@ def matrix(document: DesignDocument, added: Sequence[DesignDocument]) -> dict[st
     candidates = [each for each in more if len(each.positions) > len(experiment.positions)]
     data: dict[str, Any] = information(check(experiment), candidates).to_dict()
     return data
+
+
+def pooled(document: DesignDocument) -> dict[str, Any]:
+    """Return the candidates of a document's pool, as plain data; see `pool_of`.
+
+    :raises ExperimentError: nothing of it can be evaluated.
+    """
+    return pool_of(evaluable_of(document, planning=True))
 
 
 class Judge:

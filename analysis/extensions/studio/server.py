@@ -87,6 +87,7 @@ def application(session: Session, token: str, port: int) -> Starlette:
                 methods=["POST"],
             ),
             Route("/api/drawn", _answering(_drawing(session)), methods=["POST"]),
+            Route("/api/pool", _answering(lambda request, body: session.pool())),
             Route("/api/later", _answering(lambda request, body: session.later())),
             Route("/pages/{number:int}", _made_page(session)),
             Mount("/static", StaticFiles(directory=STATIC)),

@@ -38,7 +38,7 @@ from .document import (
 )
 from .drafts import POSITION
 from .jobs import JOBS, MOST_RUNNING, Job, started
-from .judging import DesignJudgement, Judge, drawn, figures, judgement, later, matrix
+from .judging import DesignJudgement, Judge, drawn, figures, judgement, later, matrix, pooled
 from .recovery import give_up, keep, kept_in, name_of_kept, recovered
 
 ENDINGS = (".yaml", ".yml")
@@ -87,6 +87,7 @@ class Session:
         self._jobs: dict[int, Job] = {}
         self.revision = 0
         self._judge, self._aside, self._beside = Judge(), Judge(), Judge()
+        self._of_pool = Judge()
         self._answer: dict[str, Any] | None = None
         self._scene: dict[str, Any] | None = None
         self._burst: tuple[Any, ...] = ()
@@ -220,6 +221,17 @@ class Session:
         found = self._computed(partial(matrix, added=added), document, self._beside)
         return {"fingerprint": document.fingerprint, **found}
 
+    def pool(self) -> dict[str, Any]:
+        """Return the candidates of the design's pool, and its fingerprint.
+
+        :raises ExperimentError: the text is invalid.
+        :raises RefusedError: another such request came meanwhile.
+        """
+        with self._lock:
+            document = self._document
+        found = self._computed(pooled, document, self._of_pool)
+        return {"fingerprint": document.fingerprint, **found}
+
     def drawn(self, kind: str, motion: int | None) -> dict[str, Any]:
         """Return the map of a `kind`, the motion of a direction by its index, all quantities of
         the design, and its fingerprint.
@@ -268,23 +280,24 @@ class Session:
             return job.page
 
     def stop(self, number: int) -> None:
-        """Stop a computation and remove it.
+        """Stop a computation and remove it; a plan ends with its best choice first.
 
         :raises RefusedError: its number is unknown.
         """
         with self._lock:
             if number not in self._jobs:
                 raise RefusedError(f"no computation {number}")
-            self._jobs.pop(number).stop()
+            if not self._jobs[number].end_with_best():
+                self._jobs.pop(number).stop()
 
     def close(self) -> None:
         """Stop all computations."""
         with self._lock:
-            for judge in (self._judge, self._aside, self._beside):
+            for judge in (self._judge, self._aside, self._beside, self._of_pool):
                 judge.asked += 1
                 judge.stop()
-            for number in list(self._jobs):
-                self.stop(number)
+            while self._jobs:
+                self._jobs.popitem()[1].stop()
 
     def _controls(self) -> dict[str, Callable[[Mapping[str, Any]], None]]:
         """Actions on the file instead of the design."""

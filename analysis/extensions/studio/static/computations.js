@@ -134,7 +134,8 @@ function computations(list) {
   const there = new Map([...$("jobs").children].map((item) => [item.dataset.said, item]));
   const items = told.map((job) => {
     const is_current = job.fingerprint === page.state.fingerprint;
-    const said = JSON.stringify([page.state.session, job.id, job.state, job.page, is_current]);
+    const said = JSON.stringify([page.state.session, job.id, job.state, job.page, is_current,
+      job.ending]);
     const item = there.get(said) ?? computation(job, said, is_current);
     const step = job.state === "running" && job.step ? `: ${job.step}` : "";
     item.querySelector(".step").textContent = step;
@@ -156,7 +157,8 @@ function computation(job, said, is_current) {
   return make("li", { "data-state": job.state, "data-said": said },
     make("strong", {}, job.job), ` ${job.state}`, make("span", { class: "step" }), " ",
     make("button", { "data-focus": `job ${job.id}`, onclick: stop },
-      job.state === "running" ? "stop" : "close"),
+      job.state !== "running" ? "close" : job.ending ? "stop without a plan" : "stop"),
+    job.ending ? make("small", {}, " ends with the best so far") : null,
     " ",
     job.page ? make("a", { href: `/pages/${job.id}`, target: "_blank", rel: "noopener",
       "data-page": "" }, "open its page") : null,

@@ -11,6 +11,7 @@ import { errors } from "./matrix.js";
 import {
   $, act, ask, focus, latency, options, page, preview, refocus, refresh, tell, watch,
 } from "./page.js";
+import { pool } from "./pool.js";
 import { choose, positions } from "./positions.js";
 import { View } from "./view.js";
 
@@ -49,6 +50,7 @@ function show() {
   positions();
   if (page.schema) build($("forms"), state.data, page.schema, state.messages, set);
   drawn();
+  pool();
   informed();
   refocus(focused);
 }
@@ -127,6 +129,7 @@ $("reopen").onclick = () => {
 $("toggle-text").onclick = () => unfold_text($("text-box").hidden);
 $("step").onchange = (event) => { view.step = Number(event.target.value); };
 $("errors").ontoggle = informed;
+$("pool").ontoggle = $("show-pool").onchange = pool;
 $("map").onchange = () => {
   show();
   ask_later(0);

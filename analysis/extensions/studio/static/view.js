@@ -19,8 +19,10 @@ const LOOKS = {
   front: { colour: "--quiet" },
   rear: { colour: "--quiet", dashes: [0.003, 0.01] },
   span: { colour: "--ramp-2" },
+  pooled: { colour: "--quiet", dashes: [0.005, 0.007] },
+  forbidden: { colour: "--bad", fill: 0.14 },
 };
-const PARTS = ["frame", "sheets", "root", "ghosts", "arrows", "spans"];
+const PARTS = ["frame", "sheets", "root", "ghosts", "arrows", "spans", "pooled"];
 const kept = (geometry) => Object.assign(geometry, { userData: { kept: true } });
 const GLOBE = kept(new THREE.SphereGeometry(1, 16, 12));
 const BAR = kept(new THREE.CylinderGeometry(1, 1, 1, 10));
@@ -296,6 +298,25 @@ export class View {
       this.settle(plate);
       return plate;
     });
+    this.draw();
+  }
+
+  // Outlines of candidates, and boxes that nothing may enter.
+  pool(outlines, boxes) {
+    this.clear(this.pooled);
+    const edge = (corner, k, corners) => [corner, corners[(k + 1) % corners.length]];
+    const ends = outlines.flatMap((outline) => outline.map(this.vector).flatMap(edge));
+    const thin = new THREE.BufferGeometry().setFromPoints(ends);
+    const lines = new THREE.LineSegments(thin, this.looks.pooled.edge);
+    this.looks.pooled.edge.opacity = 0.55;
+    if (ends.length) this.pooled.add(lines.computeLineDistances());
+    for (const box of boxes) {
+      const extent = new THREE.Box3(...box.map(this.vector));
+      const solid = new THREE.BoxGeometry(...extent.getSize(new Vector()));
+      solid.translate(...extent.getCenter(new Vector()));
+      this.pooled.add(new THREE.Mesh(solid, this.looks.forbidden.fill),
+        new THREE.LineSegments(new THREE.EdgesGeometry(solid), this.looks.forbidden.edge));
+    }
     this.draw();
   }
 

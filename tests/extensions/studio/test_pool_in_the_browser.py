@@ -1,0 +1,77 @@
+"""A pool that a person makes, limits and plans from in the studio, in a real browser."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from ballplate.designs import shipped
+
+from tests.extensions.studio.chromium import Studio, chromium, settled, tab, until
+
+pytest.importorskip("starlette", reason="the studio is an extra")
+INSTALL = "python -m pip install 'ballplate[test,browser]', and a Chromium"
+pytest.importorskip("playwright", reason=f"no browser is driven without it: {INSTALL}")
+
+pytestmark = [
+    pytest.mark.browser,
+    pytest.mark.slow,
+    pytest.mark.skipif(chromium() is None, reason=f"no Chromium on this machine: {INSTALL}"),
+]
+
+DRAWN = "window.studio.view.pooled.children.map((one) => one.type)"
+
+
+@pytest.fixture
+def page(tmp_path: Path) -> Iterator:
+    path = tmp_path / "plate.yaml"
+    path.write_bytes(Path(shipped("quickstart.yaml")).read_bytes())
+    with Studio(path) as studio, tab() as page:
+        page.goto(studio.address)
+        until(page, "!!window.studio?.state()?.design && !window.studio.state().pending")
+        yield page
+        assert page.errors == []
+
+
+def fields(page, key: str, text: str) -> None:
+    page.fill(f"[data-pool='{key}']", text)
+    page.press(f"[data-pool='{key}']", "Tab")
+
+
+def test_a_pool_is_filled_limited_and_planned_from(page):
+    before = page.evaluate("window.studio.state().text")
+    page.click("#pool summary")
+    page.wait_for_selector("#pool-said >> text=No candidates yet")
+    for plane in ("x", "y"):
+        page.uncheck(f"[data-pool='plane {plane}']")
+    fields(page, "quarter turns", "0")
+    fields(page, "places along each axis", "4")
+    page.click("#fill")
+    page.wait_for_selector("#pool-said >> text=64 candidates")
+    until(page, f"{DRAWN}.join() === 'LineSegments'")
+    page.select_option("[data-pool='corner']", "x high, y high, z high")
+    page.click("#forbid")
+    page.wait_for_selector("#pool-said >> text=in a forbidden box")
+    until(page, f"{DRAWN}.includes('Mesh')")
+    fields(page, "0 z", "0 mm, 400 mm")
+    text = settled(page, 3)["text"]
+    assert text.count("z: [0 mm, 400 mm]") == 1, text
+    page.wait_for_selector("#pool-said >> text=9 in a forbidden box")
+    page.click("[data-pool='Allow box 1 again']")
+    page.wait_for_selector("#pool-said >> text=64 candidates")
+    # Stopped, the plan is the best so far; applied, it is one step.
+    fields(page, "hours at most", "8")
+    page.click("#plan")
+    page.wait_for_selector("#jobs .step >> text=best so far", timeout=200_000)
+    page.click("#jobs button >> text=stop")
+    page.wait_for_selector("#suggestions li >> text=the plan", timeout=200_000)
+    filled = page.evaluate("window.studio.state().text")
+    page.click("#suggestions [data-apply]")
+    assert "enabled: false" in settled(page, 5)["text"]
+    page.click("#undo")
+    assert settled(page, 6)["text"] == filled
+    for revision in range(7, 11):
+        page.click("#undo")
+        last = settled(page, revision)["text"]
+    assert last == before

@@ -1,0 +1,161 @@
+"""Pools that are made, limited and planned from in the studio."""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+
+import ballplate as bp
+import pytest
+from ballplate.designs import shipped
+
+pytest.importorskip("starlette", reason="the studio is an extra")
+
+from ballplate.extensions.studio.actions import ActionError, done
+from ballplate.extensions.studio.document import DesignDocument, experiment_of, opened, undone
+from ballplate.extensions.studio.jobs import JOBS
+from ballplate.extensions.studio.judging import pooled
+from ballplate.extensions.studio.session import Session
+from ballplate.simulator.experiment import Experiment
+from ballplate.simulator.inputs import ExperimentError
+
+PROBES = {"x": ["right", "left"], "y": ["back", "front"], "z": ["down"]}
+FILL = {"do": "fill", "probes": PROBES, "quarter_turns": [0, 1], "count": 3}
+CORNER = {"x": ["0 mm", "200 mm"], "y": ["0 mm", "200 mm"], "z": ["0 mm", "200 mm"]}
+SMALL = {"probes": {"z": ["down"]}, "quarter_turns": [0], "count": 2}
+FORBID = {"do": "limit", "limit": "forbidden", "entry": CORNER}
+
+
+@pytest.fixture
+def document(tmp_path: Path) -> DesignDocument:
+    path = tmp_path / "plate.yaml"
+    path.write_bytes(Path(shipped("quickstart.yaml")).read_bytes())
+    return opened(path)
+
+
+def planned(document: DesignDocument) -> Experiment:
+    return experiment_of(document, planning=True)
+
+
+def test_a_pool_that_fills_the_volume_is_a_group_for_each_plane(document):
+    """All candidates that its ranges state can be read, and they reach from end to end."""
+    filled = done(document, FILL)
+    assert filled.text.startswith(document.text.rstrip("\n"))
+    lines = filled.text.removeprefix(document.text.rstrip("\n")).strip().splitlines()
+    assert len(lines) == 2 + 3, lines
+    pool = planned(filled).pool
+    assert pool is not None and "outside the volume" not in pool.dropped
+    # Of 3 levels, 3 x 3 places and 2 turns in each plane, some are positions of the file.
+    offered = [one for one in pool.candidates if not one.drawn]
+    assert len(offered) + pool.dropped.get("the same as others", 0) == 3 * 3 * 9 * 2
+    # Again with other planes: the groups are replaced.
+    again = done(filled, FILL | {"probes": {"z": ["down"]}, "quarter_turns": [0], "count": 2})
+    assert again.text.count("planes:") == 1 and "count: 2" in again.text
+    again = done(again, FILL)
+    assert planned(again).pool is not None and again.text.count("planes:") == 3
+
+
+def test_a_corner_is_forbidden_and_allowed_again(document):
+    filled = done(document, FILL | {"probes": {"z": ["down"]}})
+    before = pooled(filled)
+    assert before["boxes"] == [] and before["count"] == len(before["names"])
+    # The file's own positions are in the low corner; there is none in the upper one.
+    corner = {axis: ["900 mm", "2 m"] for axis in "xyz"}
+    forbidden = done(filled, FORBID | {"entry": corner})
+    after = pooled(forbidden)
+    assert after["boxes"] == [[[0.9] * 3, [1.0] * 3]]
+    dropped = after["dropped"]["in a forbidden box"]
+    assert dropped > 0 and after["count"] + dropped >= before["count"] > after["count"]
+    left = done(forbidden, {"do": "lift", "limit": "forbidden", "index": 0})
+    assert left.text == filled.text
+    # One is left out by its name.
+    entry = {"of": {"name": before["names"][0]}, "count": 0}
+    out = done(filled, {"do": "limit", "limit": "at_most", "entry": entry})
+    assert pooled(out)["left_out"] == before["names"][:1]
+    assert pooled(out)["names"] == before["names"][1:]
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"probes": {}}, "no plane to fill"),
+        ({"probes": {"z": ["up"]}}, "no probe up"),
+        ({"probes": {"z": []}}, "no probe reads plane z"),
+        ({"count": 0}, "places along an axis 1 to 20"),
+        ({"quarter_turns": [4]}, "quarter turns are 0 to 3"),
+        ({"probes": 1}, "give probes by plane"),
+    ],
+)
+def test_what_cannot_be_filled_is_refused(document, change, words):
+    with pytest.raises((ActionError, ExperimentError), match=words):
+        done(document, FILL | change)
+
+
+def test_outlines_are_drawn_once_and_not_without_end(document):
+    found = pooled(done(document, FILL | {"count": 8}))
+    assert found["count"] > 2000 and len(found["outlines"]) == 1000 and found["more"] > 0
+    assert found["probes"] == PROBES
+
+
+def finished(session: Session, number: int) -> dict:
+    end = time.monotonic() + 120
+    while (job := session.jobs()[number - 1])["state"] == "running":
+        assert time.monotonic() < end, job
+        time.sleep(0.05)
+    return job
+
+
+def test_an_applied_plan_has_the_figures_of_the_command_and_keeps_what_is_off(document):
+    """Positions that are not chosen stay with what is written about them, and can be read again."""
+    text = document.text.replace("probes: [down]}\n", "probes: [down]}  # ours\n", 1)
+    filled = done(done(document, {"do": "text", "text": text}), FILL | SMALL)
+    filled.path.write_text(filled.text, encoding="utf-8")
+    found = JOBS["plan"](filled, {"hours": 4}, lambda step: None)
+    command = bp.plan(filled.path, hours=4)
+    applied = done(filled, {"do": "plan", "positions": found["plan"]})
+    assert "  # ours\n" in applied.text and "enabled: false" in applied.text
+    after = experiment_of(applied)
+    assert [place.name for place in after.positions if place.enabled] == [
+        place.name for place in sorted(command.chosen_experiment.positions, key=of_file(after))
+    ]
+    lengths = bp.run(after).quantities["U6"]
+    assert lengths.average == pytest.approx(found["average"], rel=1e-9)
+    assert found["average"] == command.prediction.quantities["U6"].average
+    assert undone(applied).text == filled.text
+    # The names of what is off are not used again.
+    again = done(applied, {"do": "plan", "positions": [{**found["plan"][0], "name": "z low"}]})
+    assert len({place.name for place in experiment_of(again).positions}) == len(
+        experiment_of(again).positions
+    )
+
+
+def of_file(experiment: Experiment):
+    names = [place.name for place in experiment.positions]
+    return lambda place: names.index(place.name)
+
+
+def test_a_plan_that_is_stopped_has_the_best_choice_so_far(document):
+    filled = done(document, FILL | SMALL | {"count": 4})
+    document.path.write_text(filled.text, encoding="utf-8")
+    session = Session(document.path)
+    try:
+        number = session.start("plan", {"hours": 8})
+        end = time.monotonic() + 120
+        while "best so far U6" not in (job := session.jobs()[0])["step"]:
+            assert job["state"] == "running" and time.monotonic() < end, job
+            time.sleep(0.05)
+        assert "positions" in job["step"]
+        session.stop(number)
+        assert session.jobs()[0]["ending"]
+        job = finished(session, number)
+        assert job["state"] == "done" and job["result"]["plan"], job
+        assert job["result"]["deficiency"] == 0 and "8 h" in "".join(job["result"]["lines"])
+        session.stop(number)
+        assert session.jobs() == []
+        # Who does not want to wait stops it twice.
+        number = session.start("plan", {})
+        session.stop(number)
+        session.stop(number)
+        assert session.jobs() == []
+    finally:
+        session.close()
