@@ -102,7 +102,8 @@ function forbidden() {
   const rows = (limits().forbidden ?? []).map((box, k) => make("div", { class: "bar box" },
     ...axes.map((axis) => make("label", {}, `${axis} `, make("input", { size: 14,
       value: box[axis]?.join(", ") ?? "", placeholder: "everywhere",
-      "aria-label": `forbidden box ${k + 1}, from and to along ${axis}`, "data-pool": `${k} ${axis}`,
+      "aria-label": `forbidden box ${k + 1}, from and to along ${axis}`,
+      "data-pool": `${k} ${axis}`,
       onchange: (event) => act({ do: "set", path: ["pool", "limits", "forbidden", k, axis],
         value: event.target.value.trim() && `[${event.target.value}]` }) }))),
     lift("forbidden", k, `Allow box ${k + 1} again`, "allow")));
