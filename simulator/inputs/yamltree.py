@@ -12,7 +12,6 @@ import stat
 from collections import abc
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -195,15 +194,6 @@ def parse_tree(text: str, file: str, minor: list[Message] | None = None) -> Node
     >>> to_python(parse_tree("a: [1e-6, on, 010]", "example"))
     {'a': (1e-06, 'on', 10)}
     """
-    root, messages = _parsed(text, file, minor is not None)
-    if minor is not None:
-        minor += messages
-    return root
-
-
-# Whoever changes a text reads it several times.
-@lru_cache(maxsize=4)
-def _parsed(text: str, file: str, is_lenient: bool) -> tuple[Node, list[Message]]:
     builder = _Builder(file)
     control = NOT_PRINTABLE.search(text)
     if control is not None:
@@ -219,18 +209,20 @@ def _parsed(text: str, file: str, is_lenient: bool) -> tuple[Node, list[Message]
         # Since 6.0.4, PyYAML refuses a thousand brackets in a line before it yields the first.
         end = error.problem_mark
         if end is not None and "nesting depth" in str(error.problem):
-            return _parsed(text[: end.index], file, False)
+            return parse_tree(text[: end.index], file)
         builder.messages.append(_syntax_message(error, text, file))
         builder.root = None
-    if builder.messages and (not is_lenient or builder.root is None):
+    if builder.messages and (minor is None or builder.root is None):
         raise ExperimentError(sorted(builder.messages))
+    if minor is not None:
+        minor += builder.messages
     if builder.root is None:
         raise refused(
             file,
             "the file is empty; write at least title, machine, error_model, artefacts and"
             " positions",
         )
-    return builder.root, builder.messages
+    return builder.root
 
 
 def to_list(value: Any) -> Any:

@@ -50,10 +50,12 @@ LEFT_OUT = (
     "_trust",
     "_found",
 )
-# The same, for single classes: the reading of the laboratory's tables; and functions in Python,
-# whose module text and options count instead.
+# The same, for single classes: the reading of the laboratory's tables; positions that are not read,
+# which no experiment that is computed has; and functions in Python, whose module text and options
+# count instead.
 LEFT_OUT_OF = {
-    "Experiment": ("readings", "extensions"),
+    "Experiment": ("readings", "extensions", "switched_off", "faults"),
+    "Position": ("enabled",),
     "Prior": ("data",),
     "PythonCalibration": ("functions",),
 }
