@@ -135,7 +135,7 @@ function directions(found) {
   if (!rest.length) return;
   const more = make("details", {}, make("summary", {}, `${rest.length} more`),
     make("ol", {}, ...rest));
-  more.open = Boolean(unfolded) || page.motion >= MOST_DIRECTIONS;
+  more.open = Boolean(unfolded);
   $("motions").append(more);
 }
 
@@ -195,7 +195,6 @@ let all_assumed = false;
 function assumed(found) {
   const rows = found?.assumptions ?? [];
   $("assumptions").hidden = !rows.length;
-  $("rests").hidden = !found?.warning;
   $("rests").textContent = found?.warning ?? "";
   if (!rows.length) return;
   const times = (ratio) => (Number.isFinite(ratio) ? `${Number(ratio.toPrecision(3))}` : "");

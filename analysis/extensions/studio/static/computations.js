@@ -66,12 +66,13 @@ function apply(one) {
   else act({ do: "repair", edits: one.edits }, "applied");
 }
 
+const BESIDE = "computing beside the studio …";
 // What refuses the start, or nothing.
 export async function start(job, settings = {}) {
   let refused = "";
   try {
     await ask("/api/start", { job, settings });
-    tell("computing beside the studio …");
+    tell(BESIDE);
   } catch (error) {
     refused = error.message;
     tell(refused, true);
@@ -98,6 +99,7 @@ export async function poll() {
   running = list;
   computations(running);
   if (list.some((job) => job.state === "running")) polling = setTimeout(poll, 300);
+  else if ($("notice").textContent === BESIDE) tell("");
 }
 
 function take({ job, result, fingerprint }) {
