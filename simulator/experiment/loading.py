@@ -231,10 +231,11 @@ def _build(
     # What may read calibrated balls, and have priors; more than there is of it where some is wrong.
     off = [position for position in positions.values() if not position.enabled]
     enabled = {i: position for i, position in positions.items() if position.enabled}
+    offered = tuple(candidates.positions or enabled.values())
+    named = dict(enumerate((*offered, *off)))
     readers, reader_count = enabled, position_count - len(off)
-    named = dict(enumerate((*(candidates.positions or enabled.values()), *off)))
     if planning:
-        readers = dict(enumerate(candidates.positions or enabled.values()))
+        readers = dict(enumerate(offered))
         reader_count = len(readers) + (not candidates.complete)
     calibrations = {}
     for key, settings in sections.entries("calibration").items():
@@ -295,7 +296,7 @@ def _build(
         sections=own_sections,
         extensions=needed_extensions(sections),
     )
-    if tolerant:
+    if tolerant and (problems.messages or off):
         return experiment, problems.messages
     experiment = enabled_only(experiment)
     return experiment if planning or pool is None else placed_only(experiment), []

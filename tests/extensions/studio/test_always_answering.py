@@ -218,3 +218,20 @@ pool:
     assert u6(judgement(after).answer) == pytest.approx(found["average"], rel=1e-9)
     assert found["average"] == planned.prediction.quantities["U6"].average
     assert undone(after).text == document.text and pool in after.text
+
+
+def test_an_artefact_of_the_pool_alone_is_not_evaluated(tmp_path):
+    """What a plan might set up has no readings yet, as for the commands."""
+    path = tmp_path / "pool.yaml"
+    bar = "artefacts:\n  bar: {kind: two_spheres, length: 500 mm}\n"
+    pool = """
+pool:
+  candidates:
+    - {name: on bar, artefact: bar, pose: {origin: [200 mm, 500 mm, 500 mm]}, probes: [down]}
+"""
+    text = TEXT.replace("artefacts:\n", bar).replace(", plane: ", ", artefact: plate, plane: ")
+    text = text.replace("- kind: distances\n", "- kind: distances\n    artefact: plate\n")
+    path.write_text(text + pool, encoding="utf-8")
+    found, expected = judgement(opened(path)).answer, bp.run(path)
+    assert found["rank"]["parameters"] == expected.design.parameter_count
+    assert u6(found) == expected.quantities["U6"].average
