@@ -615,10 +615,10 @@ def read_balls(positions: Iterable[Position]) -> np.ndarray[tuple[int], np.dtype
 def _check_balls_read(name: str, positions: list[Position], references: References) -> None:
     layout = references.layouts[name]
     enabled = [position for position in positions if position.enabled]
-    unread = np.setdiff1d(np.arange(len(layout.names)), read_balls(enabled))
     if not enabled:
         # An artefact whose positions are all switched off is left out with them.
         return
+    unread = np.setdiff1d(np.arange(len(layout.names)), read_balls(enabled))
     if references.artefacts[name].role == "plate" and len(unread):
         names = listing(layout.names[i] for i in unread)
         text = (

@@ -107,9 +107,14 @@ def _posed(
     experiment = draft_of(document, planning=True)
     place = _position(experiment, name)
     position_pose = pose(experiment, place)
-    origin = np.round(position_pose.origin / STEP) * STEP
-    new = with_pose(experiment, name, Pose(position_pose.rotation, np.round(origin, 9) + 0.0))
+    new = with_pose(experiment, name, _rounded(position_pose))
     return with_experiment(document.text, document.path, experiment, new)
+
+
+def _rounded(pose: Pose) -> Pose:
+    """Return a pose whose origin is written to whole steps."""
+    origin = np.round(np.round(pose.origin / STEP) * STEP, 9)
+    return Pose(pose.rotation, origin + 0.0)
 
 
 def _about_middle(experiment: Experiment, place: Position, rotation: Array) -> Pose:
@@ -236,10 +241,9 @@ def _put(document: DesignDocument, action: Arguments) -> str:
     else:
         new = experiment.positions[-1] if name is None else _position(experiment, str(name))
     middle = middle_of(experiment.layouts[new.artefact])[: len(at)]
-    origin = np.round((at - new.pose.rotation @ middle) / STEP) * STEP
-    pose = Pose(new.pose.rotation, np.round(origin, 9) + 0.0)
-    added = with_added(experiment, replace(new, pose=pose, enabled=True))
-    return with_experiment(document.text, document.path, experiment, added)
+    pose = _rounded(Pose(new.pose.rotation, at - new.pose.rotation @ middle))
+    with_new = with_added(experiment, replace(new, pose=pose, enabled=True))
+    return with_experiment(document.text, document.path, experiment, with_new)
 
 
 def _whole(experiment: Experiment) -> Position:
@@ -265,8 +269,8 @@ def _fitted(document: DesignDocument, action: Arguments) -> str:
         is_free = np.maximum((volume.upper - volume.lower) - (high - low), 0.0)
         share = np.where(was_free > STEP, (low - lowest) / np.maximum(was_free, STEP), 0.5)
         by = volume.lower + share * is_free - low
-        origin = np.round((place.pose.origin + by) / STEP) * STEP
-        new = with_pose(new, place.name, Pose(place.pose.rotation, np.round(origin, 9) + 0.0))
+        pose = _rounded(Pose(place.pose.rotation, place.pose.origin + by))
+        new = with_pose(new, place.name, pose)
     return with_experiment(document.text, document.path, experiment, new)
 
 
