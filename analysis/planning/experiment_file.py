@@ -60,9 +60,9 @@ def experiment_text(
     are changed keys of influence quantities by index. `with_times` adds a pool with the durations
     of positions.
 
-    An experiment made or changed in Python keeps no text of a file.
+    An experiment made or changed in Python, or whose file is gone, keeps no comments.
 
-    :raises ExperimentError: the source cannot be read again.
+    :raises ExperimentError: the source cannot be read.
     """
     source = experiment.source
     text, root, tree = _source(experiment)
@@ -117,7 +117,7 @@ def _source(experiment: Experiment) -> tuple[str, Node, Node]:
     :raises ExperimentError: the source cannot be read again.
     """
     source = experiment.source
-    if source.name == "experiment" and not source.is_file():
+    if not source.is_file():
         return "", experiment.tree, experiment.tree
     # What is written has line feeds, whatever its source has.
     text = read_text(source).replace("\r\n", "\n")

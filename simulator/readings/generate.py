@@ -107,10 +107,11 @@ def true_artefacts(design: Design, generator: np.random.Generator) -> Array:
     balls = design.balls.places.copy()
     certified = [kind for kind in design.observations if kind.balls.shape[1]]
     rows = [kind.rows(design, nominal_state(design), None) for kind in certified]
-    d, off = design.dimension, np.concatenate([np.zeros(0), *(block.residual for block in rows)])
-    sought = np.split(
-        generator.standard_normal(len(off)) - off, np.cumsum([len(kind) for kind in certified])
-    )
+    d = design.dimension
+    sought = [
+        kind.whitened(kind.errors(generator, 1)[0]) - block.residual
+        for kind, block in zip(certified, rows, strict=True)
+    ]
     # Balls without oblique items vary along each axis separately, which needs no large matrix.
     oblique = [kind.balls[kind.along < 0].ravel() for kind in certified]
     ends = np.unique(np.concatenate([np.zeros(0, np.int64), *oblique]))
@@ -118,7 +119,7 @@ def true_artefacts(design: Design, generator: np.random.Generator) -> Array:
     among[ends] = np.arange(len(ends))
     pull, stiffness = np.zeros(balls.shape), np.zeros(balls.shape)
     together, sides = [np.zeros((0, d * len(ends)))], [np.zeros(0)]
-    for kind, block, side in zip(certified, rows, sought, strict=False):
+    for kind, block, side in zip(certified, rows, sought, strict=True):
         separate = np.flatnonzero((kind.along >= 0) & ~np.isin(kind.balls[:, 0], ends))
         coordinate = kind.balls[separate, 0], kind.along[separate]
         slope = block.by_ball[separate, 0, coordinate[1]]

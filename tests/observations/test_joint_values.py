@@ -18,6 +18,7 @@ from ballplate.simulator.estimation.linearisation import linearise
 from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.experiment.model import Experiment
+from ballplate.simulator.readings.generate import true_artefacts
 from numpy.typing import NDArray
 from scipy.linalg import null_space
 from scipy.stats import norm
@@ -214,6 +215,21 @@ def test_simulated_certificates_share_the_part_in_common(tmp_path: Path) -> None
     errors = joint.errors(np.random.default_rng(3), 400) / joint.value
     assert np.ptp(errors, axis=1).max() < 1e-8
     assert errors[:, 0].std() == pytest.approx(1e-5, rel=0.15)
+
+
+def test_simulated_artefacts_do_not_depend_on_the_choice_of_eigenvectors(tmp_path: Path) -> None:
+    """Processors choose other eigenvectors of equal variances; a seed's readings stay the same."""
+    item = distances(standard_uncertainty="1 um", correlation=0.9)
+    design = lay_out(written(tmp_path, item))
+    joint = design.of(JointValues)
+    (root,) = joint.roots
+    equal = root.deviations < root.deviations.max() / 2.0
+    turned = root.vectors.copy()
+    turned[:, equal] = turned[:, equal][:, ::-1] * [1, -1, 1, -1]
+    other = design.observed(joint.given(roots=(replace(root, vectors=turned),)))  # type: ignore[arg-type]
+    drawn = [true_artefacts(one, np.random.default_rng(3)) for one in (design, other)]
+    assert np.abs(drawn[0] - design.balls.places).max() > 1e-7
+    np.testing.assert_allclose(*drawn, rtol=0, atol=1e-15)
 
 
 @pytest.mark.parametrize("how", ["stated", "table"])

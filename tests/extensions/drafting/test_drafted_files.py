@@ -124,6 +124,17 @@ def test_what_a_file_states_is_the_data_sheet() -> None:
     assert experiment.layouts["plate"].names[-1] == "r6c6"
 
 
+def test_a_plan_of_a_drafted_design_is_a_file(tmp_path: Path) -> None:
+    """A design that was never written to a file has one nevertheless after its plan."""
+    stated = {key: value for key, value in SMALL.items() if key != "hours"}
+    planned = bp.plan(bp.design(**stated), hours=4)
+    assert planned.is_determined
+    file = tmp_path / "planned.yaml"
+    file.write_text(planned.to_yaml(tmp_path), encoding="utf-8")
+    average = bp.run(bp.load(file)).quantities["U6"].average
+    assert average == pytest.approx(planned.prediction.quantities["U6"].average, rel=1e-9)
+
+
 def test_a_target_of_ones_own() -> None:
     text = drafted(BRIDGE, target="1 um + L/500, k=3")
     assert "target_uncertainty: 1 um + 2 um/m" in text and "coverage_factor: 3" in text
