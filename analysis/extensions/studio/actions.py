@@ -6,7 +6,7 @@ line in `ACTIONS`.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence, Set
 from dataclasses import replace
 from typing import Any
 
@@ -138,8 +138,11 @@ def _added(document: DesignDocument, action: Arguments) -> str:
 
 
 def _planned(document: DesignDocument, action: Arguments) -> str:
-    """The positions of a plan: others are switched off and stay in the file, as does the pool."""
-    entries = to_python(draft_of(document, planning=True).tree).get("positions") or ()
+    """The positions and certificates of a plan: other positions are switched off and stay in the
+    file, as does the pool, less the certificates, which could be had twice otherwise.
+    """
+    data = _plain(to_python(draft_of(document, planning=True).tree))
+    entries = data.get("positions") or ()
     chosen = {str(settings["name"]): settings for settings in _plain(action["positions"])}
     is_read = {str(entry["name"]): entry.get("enabled", True) for entry in entries}
     changes = [
@@ -153,7 +156,28 @@ def _planned(document: DesignDocument, action: Arguments) -> str:
             while settings["name"] in is_read:
                 settings["name"], number = f"{name} ({number})", number + 1
             changes.append(TextChange(("positions",), settings, "append"))
-    return _with(document, changes)
+    return _with(document, changes + _had(data, set(action.get("calibration", ()))))
+
+
+def _had(data: Any, names: Set[str]) -> list[TextChange]:
+    """The changes of a file's `data` that make calibration out of items of its pool."""
+    pool = data.get("pool") or {}
+    priced = pool.get("calibration") or ()
+    chosen = [k for k, entry in enumerate(priced) if str(entry["name"]) in names]
+    if not chosen:
+        return []
+    items = [
+        {key: value for key, value in priced[k].items() if key not in ("name", "price")}
+        for k in chosen
+    ]
+    steps: Steps = ("pool", "calibration")
+    changes = [TextChange(("calibration",), item, "append") for item in items]
+    if not data.get("calibration"):
+        changes = [TextChange(("calibration",), items)]
+    gone = [(*steps, k) for k in chosen[::-1]]
+    if len(gone) == len(priced):
+        gone = [steps if len(pool) > 1 else ("pool",)]
+    return changes + [TextChange(where, kind="remove") for where in gone]
 
 
 def _filled(document: DesignDocument, action: Arguments) -> str:

@@ -25,7 +25,7 @@ from ballplate.simulator.computing import (
     begin_worker,
     interruptions_blocked,
 )
-from ballplate.simulator.experiment import lay_out
+from ballplate.simulator.experiment import Position, lay_out
 from ballplate.simulator.inputs import ExperimentError, number_of
 
 from .answers import place_data
@@ -83,6 +83,9 @@ def _plan(document: DesignDocument, settings: Mapping[str, Any], report: Report)
         "deficiency": found.prediction.verdict.deficiency,
         "places": [place_data(chosen, place) for place in chosen.positions],
         "plan": [position_settings(chosen, place) for place in chosen.positions],
+        "calibration": [
+            candidate.name for candidate in found.chosen if not isinstance(candidate.item, Position)
+        ],
     }
 
 

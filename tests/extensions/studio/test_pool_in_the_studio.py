@@ -129,6 +129,34 @@ def test_an_applied_plan_has_the_figures_of_the_command_and_keeps_what_is_off(do
     )
 
 
+@pytest.mark.parametrize("stated", [True, False])
+def test_an_applied_plan_has_its_certificates(document, stated: bool) -> None:
+    """What a plan chose to have certified is written, once, and the figures are the plan's."""
+    pool = """
+pool:
+  times: {set_up: 10 min}
+  calibration:
+    - {name: lab, kind: distances, pairs: corner diagonals, standard_uncertainty: 0.05 um}
+    - {name: ours, kind: distances, pairs: corner sides, standard_uncertainty: 0.1 um}
+"""
+    text = document.text.rstrip() + "\n" + pool
+    if not stated:
+        start = text.index("calibration:\n")
+        text = text[:start] + text[text.index("\n\n", start) :]
+    document.path.write_text(text, encoding="utf-8")
+    document = opened(document.path)
+    found = JOBS["plan"](document, {}, lambda step: None)
+    assert found["calibration"] == ["lab", "ours"]
+    action = {"do": "plan", "positions": found["plan"], "calibration": found["calibration"]}
+    applied = done(document, action)
+    assert len(experiment_of(applied).calibration) == 2 + stated
+    average = bp.run(experiment_of(applied)).quantities["U6"].average
+    assert average == pytest.approx(found["average"], rel=1e-9)
+    # A certificate is had once: what is planned next has it.
+    assert JOBS["plan"](applied, {}, lambda step: None)["calibration"] == []
+    assert undone(applied).text == document.text
+
+
 def of_file(experiment: Experiment):
     names = [place.name for place in experiment.positions]
     return lambda place: names.index(place.name)

@@ -62,7 +62,8 @@ function suggestion(one, k) {
 function apply(one) {
   suggestions = suggestions.filter((other) => other !== one);
   if (one.settings) act({ do: "add", settings: one.settings }, "position added");
-  else if (one.plan) act({ do: "plan", positions: one.plan }, "planned; undo leads back");
+  else if (one.plan) act(
+    { do: "plan", positions: one.plan, calibration: one.calibration }, "planned; undo leads back");
   else act({ do: "repair", edits: one.edits }, "applied");
 }
 
