@@ -86,7 +86,7 @@ def run(options: Namespace) -> int:
             print_lines([*([""] if len(plans) > 1 else []), *plans[-1].lines()])
             if options.assumptions:
                 assumed = plans[-1].assumptions
-                none = ["assumptions: not evaluated; U6 is undetermined or not computed"]
+                none = ["assumptions: not evaluated; U6 is undetermined, zero or not computed"]
                 print_lines(["", *(none if assumed is None else assumed.lines())])
         data: Data = plans[-1].to_dict()
         if with_trials:

@@ -83,11 +83,11 @@ class Prediction(Result):
 
     @cached_property
     def assumptions(self) -> PredictedAssumptions | None:
-        """What the prediction takes for granted, with U6 without it; None if U6 is undetermined or
-        was not computed, or without the extension.
+        """What the prediction takes for granted, with U6 without it; None if U6 is undetermined,
+        zero or not computed, or without the extension.
         """
         lengths = self.quantities.get("U6")
-        if lengths is None or self.experiment is None or np.isnan(lengths.average):
+        if lengths is None or self.experiment is None or not lengths.average > 0.0:
             return None
         effects = optional_service("assumption_effects")
         return None if effects is None else effects(self.experiment, lengths)

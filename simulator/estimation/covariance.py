@@ -112,7 +112,7 @@ def spectrum(factor: Factor, drawn: Spectrum | None = None) -> Spectrum:
         rank = len(values) - deficiency
         gap = float("inf")
         if 0 < deficiency < len(values):
-            gap = float(values[rank - 1] / max(values[rank], np.finfo(float).tiny))
+            gap = float(values[rank - 1]) / max(float(values[rank]), float(np.finfo(float).tiny))
         if judged is factor and deficiency == 0:
             return Spectrum(values, scale, 0, gap, triangle=scaled)
         right = np.linalg.svd(scaled)[2]

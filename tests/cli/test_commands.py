@@ -429,6 +429,7 @@ def test_all_shipped_designs_are_as_expected() -> None:
     )
     assert len(paths) >= 11
     assert run("check", *paths) == 0
+    assert run("run", *paths) == 0
 
 
 def test_closed_pipe_is_no_error() -> None:

@@ -146,11 +146,13 @@ def _micrometres(*values: float) -> list[str]:
 def predicted_assumptions(experiment: Experiment) -> Assumptions:
     """Return the effects of all assumptions of an experiment on the U6 of its design.
 
-    :raises ValueError: U6 is undetermined, or has no two evaluation points.
+    :raises ValueError: U6 is undetermined or zero, or has no two evaluation points.
     """
     lengths = uncertainties(linearise(lay_out(experiment)), symbols=("U6",)).get("U6")
-    if lengths is None or np.isnan(lengths.average):
-        raise ValueError("U6 is undetermined, or has no two evaluation points; mend the design")
+    if lengths is None or not lengths.average > 0.0:
+        raise ValueError(
+            "U6 is undetermined or zero, or has no two evaluation points; mend the design"
+        )
     return assumption_effects(experiment, lengths)
 
 
@@ -230,8 +232,12 @@ def _with_parameters(
 def _entries_of(
     together: Experiment, experiment: Experiment, assumptions: Sequence[PredictionAssumption]
 ) -> Experiment:
-    """Return the experiment with the entries that some assumptions change."""
+    """Return the experiment with the entries that some assumptions change.
+
+    Priors have a coefficient for each parameter of the error model, so they change with it.
+    """
     keys = {key for assumption in assumptions for key in assumption.changes}
+    keys |= {"priors"} if "error_model" in keys else set()
     return replace(experiment, **{key: getattr(together, key) for key in keys})
 
 

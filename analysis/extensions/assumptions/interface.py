@@ -15,7 +15,7 @@ def assumptions(experiment: Experiment | PathLike) -> Assumptions:
     """Return what the prediction of an experiment takes for granted, and U6 without each
     assumption, as `run --assumptions` prints it.
 
-    :raises ValueError: the experiment has no two evaluation points, or U6 is undetermined.
+    :raises ValueError: the experiment has no two evaluation points, or U6 is undetermined or zero.
 
     >>> import ballplate as bp
     >>> [effect.assumption.name for effect in bp.assumptions(bp.quickstart()).effects[:2]]

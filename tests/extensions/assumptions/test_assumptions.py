@@ -282,6 +282,23 @@ def test_the_headline_names_what_more_than_doubles_the_uncertainty() -> None:
     assert "times" not in bp.run(small_quickstart(**narrow)).headline()
 
 
+def test_priors_have_the_parameters_of_the_larger_model(tmp_path: Path) -> None:
+    """The row of a larger error model is that of the file with its entries, priors included."""
+    prior = {"parameter": "EXX t^1", "value": "0 m", "standard_uncertainty": "1 um"}
+    path = tmp_path / "e.yaml"
+    path.write_text(yaml.safe_dump(small_sections(12, 1, priors=[prior])), encoding="utf-8")
+    assert "model" in {effect.assumption.name for effect in bp.assumptions(path).effects}
+    assert agree(path) > 5
+
+
+def test_zero_lengths_have_no_table() -> None:
+    """In one position of a plate the scale of x is the standard: distances along it are exact."""
+    experiment = bp.load(TOP / "designs" / "certified" / "two-dimensions.yaml")
+    prediction = bp.run(experiment.with_({"positions[1]": None, "calibration": []}))
+    assert prediction["U6"].average == 0.0 and prediction["U6"].undetermined
+    assert prediction.assumptions is None
+
+
 def test_undetermined_lengths_have_no_table(capsys: pytest.CaptureFixture[str]) -> None:
     path = TOP / "designs" / "planning" / "campaign.yaml"
     prediction = bp.run(path)
@@ -292,7 +309,7 @@ def test_undetermined_lengths_have_no_table(capsys: pytest.CaptureFixture[str]) 
     assert main(["run", str(path)]) == 0
     without = capsys.readouterr().out
     assert main(["run", str(path), "--assumptions"]) == 0
-    line = "assumptions: not evaluated; U6 is undetermined or not computed"
+    line = "assumptions: not evaluated; U6 is undetermined, zero or not computed"
     assert capsys.readouterr().out == f"{without}\n{line}\n"
 
 
