@@ -211,7 +211,9 @@ class Pool:
     them.
 
     `must` are the indices of required ones. `dropped` counts generated candidates that cannot be
-    read, or are duplicates, by reason.
+    read, or are duplicates, by reason. `forbidden` are the lower and upper ends (n, 2, d) of boxes
+    that no artefact may enter, infinite where they are not limited, and `edge` is the margin of a
+    plate around its balls, if stated.
     """
 
     candidates: tuple[Candidate, ...]
@@ -219,6 +221,8 @@ class Pool:
     must: tuple[int, ...]
     at_most: tuple[AtMost, ...]
     dropped: Mapping[str, int]
+    forbidden: Array
+    edge: float | None
 
 
 @dataclass(frozen=True, eq=False)

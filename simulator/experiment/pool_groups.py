@@ -21,7 +21,7 @@ from ..geometry.positions import (
     PlanePlacement,
     Pose,
     ball_coordinates,
-    bounding_rectangle,
+    corners,
     nominal_pose,
 )
 from ..inputs.messages import Steps
@@ -156,9 +156,7 @@ def outline(pose: Pose, layout: BallLayout, edge: float) -> Array:
     """Return the lowest and the highest co-ordinates (2, d) of a plate with `edge` of material
     beyond its balls.
     """
-    (corners_beyond, low), (right, high) = bounding_rectangle(layout) + [[-edge], [edge]]
-    around = np.array([(x, y, 0.0) for x in (corners_beyond, right) for y in (low, high)])
-    return extent(around[:, : len(pose.origin)] @ pose.rotation.T + pose.origin)
+    return extent(corners(pose, layout, edge))
 
 
 def is_within(indices: Array, lower: Array, upper: Array) -> Any:

@@ -56,13 +56,16 @@ SET_UP, READING, PROBE_CHANGE, PLANE_CHANGE = 20 * 60.0, 15.0, 2 * 60.0, 30 * 60
 
 @dataclass
 class Candidates:
-    """Valid positions to choose from; `complete` is true if every entry is valid."""
+    """Valid positions to choose from, and the boxes (n, 2, d) that none may enter; `complete` is
+    true if every entry is valid.
+    """
 
     found: list[Candidate] = field(default_factory=list)
     dropped: dict[str, int] = field(default_factory=dict)
     complete: bool = True
     names: set[str] = field(default_factory=set)
     seen: dict[Any, str] = field(default_factory=dict)
+    forbidden: Array = field(default_factory=lambda: np.zeros((0, 2, 3)))
 
     def add(self, candidate: Candidate) -> None:
         """Add a candidate unless the same exists already."""
@@ -120,10 +123,10 @@ def resolve_candidates(
     times: TimesSettings = sections.get("pool", "times")
     limits: LimitsSettings = sections.get("pool", "limits")
     reach = _reach(limits, references)
-    forbidden = _forbidden(limits, references)
+    result.forbidden = _forbidden(limits, references)
     bounds = None
     if machine is not None and machine.dimension == references.dimension:
-        bounds = Bounds(machine.volume, probes, reach, limits.edge, forbidden)
+        bounds = Bounds(machine.volume, probes, reach, limits.edge, result.forbidden)
     all_drawn = len(positions) == written_count(root, "positions")
     result.complete = is_known and is_list and names_differ and all_drawn
     for i, position in positions.items():
@@ -272,12 +275,21 @@ def resolve_pool(
     if complete:
         check_lengths(by_steps, candidates.positions, references)
     at_most += [AtMost(tuple(members), 1) for members in radii.values() if len(members) > 1]
-    must, limited = _limits(sections.get("pool", "limits"), chosen_from, complete, references)
+    limits: LimitsSettings = sections.get("pool", "limits")
+    must, limited = _limits(limits, chosen_from, complete, references)
     times: TimesSettings = sections.get("pool", "times")
     changes = ChangeTimes(
         _or(times.probe_change, PROBE_CHANGE), _or(times.plane_change, PLANE_CHANGE)
     )
-    return Pool(tuple(chosen_from), changes, must, (*at_most, *limited), candidates.dropped)
+    return Pool(
+        tuple(chosen_from),
+        changes,
+        must,
+        (*at_most, *limited),
+        candidates.dropped,
+        candidates.forbidden,
+        limits.edge,
+    )
 
 
 def _candidate(

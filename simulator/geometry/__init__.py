@@ -29,6 +29,7 @@ if TYPE_CHECKING:
         Axis,
         Pose,
         ball_coordinates,
+        corners,
         plane_rotation,
     )
     from .rotations import rotation_matrix

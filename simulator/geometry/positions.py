@@ -117,6 +117,15 @@ def bounding_rectangle(layout: BallLayout) -> Array:
     return np.array([plane.min(axis=0), plane.max(axis=0)])
 
 
+def corners(pose: Pose, layout: BallLayout, edge: float = 0.0) -> Array:
+    """Return the corners (4, d), in order round it, of the rectangle around an artefact's balls and
+    an `edge` of material beyond them.
+    """
+    (left, low), (right, high) = bounding_rectangle(layout) + [[-edge], [edge]]
+    plane = [(left, low, 0.0), (right, low, 0.0), (right, high, 0.0), (left, high, 0.0)]
+    return np.array(plane)[:, : len(pose.origin)] @ pose.rotation.T + pose.origin
+
+
 def ball_coordinates(pose: Pose, layout: BallLayout) -> Array:
     """Return the nominal co-ordinates (n, d) of an artefact's balls in the machine, in metres."""
     return layout.coordinates[:, : len(pose.origin)] @ pose.rotation.T + pose.origin

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 Step = str | int
 Steps = tuple[Step, ...]
@@ -23,7 +23,8 @@ UNPRINTABLE = re.compile(
 class Message:
     """One error of a file; ``line`` and ``column`` count from 1 and are 0 for the whole file.
 
-    ``path`` is the path in the experiment, such as ``positions[1].probes[0]``, or empty.
+    ``path`` is the path in the experiment, such as ``positions[1].probes[0]``, or empty, and
+    ``steps`` are its keys and indices, if the message is about a value of the file.
     """
 
     file: str
@@ -31,6 +32,7 @@ class Message:
     column: int
     path: str
     text: str
+    steps: Steps = field(default=(), compare=False, repr=False)
 
     def __str__(self) -> str:
         location = f"{self.file}:{self.line}:{self.column}" if self.line else self.file

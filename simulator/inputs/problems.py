@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from .messages import MORE_ERRORS, MOST_MESSAGES, ExperimentError, Message, Step, Steps, format_path
@@ -39,7 +39,7 @@ class Problems:
 
     def add_at(self, mark: Mark, steps: Steps, text: str) -> None:
         """Add a message about a path at another location, such as in a table."""
-        message = mark.message(format_path(steps), text)
+        message = replace(mark.message(format_path(steps), text), steps=steps)
         if message in self._reported:
             return
         if len(self.messages) >= MOST_MESSAGES:

@@ -31,6 +31,13 @@ NOT_PRINTABLE = re.compile("[^\t\n\r\x20-\x7e\x85\xa0-\ud7ff\ue000-\ufffd\U00010
 
 LOADER: Any = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
 
+# Unquoted scalars that are neither texts nor numbers.
+WORDS = {
+    **dict.fromkeys(("", "~", "null", "Null", "NULL")),
+    **dict.fromkeys(("true", "True", "TRUE"), True),
+    **dict.fromkeys(("false", "False", "FALSE"), False),
+}
+
 # Part of the YAML parser's message → fact and remedy for the author.
 REMEDIES = (
     (
@@ -296,12 +303,10 @@ def resolve_scalar(text: str) -> str | int | float | bool | None:
     >>> [resolve_scalar(text) for text in texts]
     [1e-06, 'yes', 10, 8, '12:30', None, -inf, True]
     """
-    if text in ("", "~", "null", "Null", "NULL"):
-        return None
-    if text in ("true", "True", "TRUE"):
-        return True
-    if text in ("false", "False", "FALSE"):
-        return False
+    if text in WORDS:
+        return WORDS[text]
+    if text[0] not in "+-.0123456789":
+        return text
     if len(text) > 300 and re.fullmatch(r"[-+]?[0-9]+|0[ox][0-9a-fA-F]+", text):
         raise ValueError("a number with more than 300 digits; write it with an exponent")
     if re.fullmatch(r"[-+]?[0-9]+", text):

@@ -97,7 +97,7 @@ def edit(actions: list[dict[str, str]]) -> None:
     """Let the studio do what its page would ask for instead of serving, in a thread as its server
     does, and compute no figures.
     """
-    from ballplate.extensions.studio import judging, serving
+    from ballplate.extensions.studio import processes, serving
 
     def serve(session: Any, *_: object) -> None:
         def act() -> None:
@@ -110,7 +110,7 @@ def edit(actions: list[dict[str, str]]) -> None:
         thread.join()
 
     vars(serving)["serve"] = serve
-    type.__setattr__(judging.Judge, "begin", lambda *_: None)
+    type.__setattr__(processes.Worker, "begin", lambda *_: 0)
 
 
 def trace(blocks: int) -> None:

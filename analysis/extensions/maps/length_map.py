@@ -16,7 +16,7 @@ from ballplate.simulator.computing import (
     unreported,
 )
 from ballplate.simulator.design import Design, Flags
-from ballplate.simulator.estimation import MeasuredPoints, displacements, linearise
+from ballplate.simulator.estimation import Linearisation, MeasuredPoints, displacements, linearise
 from ballplate.simulator.experiment import Experiment, lay_out
 from ballplate.simulator.geometry import even_grid
 from ballplate.simulator.inputs import QuantityError, hint, parse_length_function
@@ -84,18 +84,22 @@ def length_settings(
 
 @single_threaded
 def length_map(
-    experiment: Experiment, settings: LengthMapSettings, report: Report = unreported
+    experiment: Experiment,
+    settings: LengthMapSettings,
+    report: Report = unreported,
+    at: Linearisation | None = None,
 ) -> LengthMap:
     """Return uncertainties of all lengths between points of a grid over the volume, at zero machine
     error.
 
-    `report` gets the number of finished lengths.
+    `report` gets the number of finished lengths; `at` is the linearised design, if known.
     """
-    design = lay_out(experiment)
+    at = at or linearise(lay_out(experiment))
+    design = at.design
     points = grid_points(design, settings.grid)
     edges = class_edges(float(np.linalg.norm(design.machine.volume.size)))
     names = direction_names(design.dimension)
-    deficiency, tiles = _tiles(design, points, settings)
+    tiles = _tiles(at, points, settings)
     factors = (1.0, settings.coverage_factor, settings.target_factor)
     by_point, by_length = _Tally(len(points), factors), _Tally(len(edges) - 1, factors)
     by_direction, whole = _Tally(len(names), factors), _Tally(1, factors)
@@ -127,7 +131,7 @@ def length_map(
         experiment.label,
         experiment.title,
         design,
-        deficiency,
+        at.deficiency,
         experiment.expected_rank_deficiency,
         settings,
         points,
@@ -147,9 +151,9 @@ def length_pairs(
     experiment: Experiment, settings: LengthMapSettings
 ) -> tuple[Array, list[PairTile]]:
     """Points (n, d) of the grid, and all lengths between them in tiles."""
-    design = lay_out(experiment)
-    points = grid_points(design, settings.grid)
-    return points, list(_tiles(design, points, settings)[1])
+    at = linearise(lay_out(experiment))
+    points = grid_points(at.design, settings.grid)
+    return points, list(_tiles(at, points, settings))
 
 
 def pair_csv(experiment: Experiment, settings: LengthMapSettings) -> Iterator[str]:
@@ -169,16 +173,13 @@ def pair_csv(experiment: Experiment, settings: LengthMapSettings) -> Iterator[st
         yield from table_csv(columns)[int(k > 0) :]
 
 
-def _tiles(
-    design: Design, points: Array, settings: LengthMapSettings
-) -> tuple[int, Iterator[PairTile]]:
-    """Rank deficiency, and the tiles of all pairs of points."""
-    linearisation = linearise(design)
-    probes = np.full(len(points), design.probes.names.index(settings.probe))
-    moved = displacements(linearisation, MeasuredPoints(points, probes))
+def _tiles(at: Linearisation, points: Array, settings: LengthMapSettings) -> Iterator[PairTile]:
+    """Return the tiles of all pairs of points."""
+    probes = np.full(len(points), at.design.probes.names.index(settings.probe))
+    moved = displacements(at, MeasuredPoints(points, probes))
     if settings.with_repeatability:
-        moved.own[:] = np.diag(design.machine.repeatability)
-    return linearisation.deficiency, pair_tiles(moved)
+        moved.own[:] = np.diag(at.design.machine.repeatability)
+    return pair_tiles(moved)
 
 
 def grid_points(design: Design, counts: tuple[int, ...]) -> Array:

@@ -90,14 +90,21 @@ def is_inside(
     position: Position, layout: BallLayout, volume: Volume, probes: Mapping[str, Probe]
 ) -> bool:
     """True if all scale readings of a position are in the volume, as in a file."""
-    places = ball_coordinates(position.pose, layout)
     lower, upper = volume.of_readings
-    for group in position.readings:
-        for name in group.probes:
-            centres = places[group.ball_indices] - probes[name].offset
-            if (centres < lower).any() or (centres > upper).any():
-                return False
-    return True
+    readings = scale_readings(position, layout, probes)
+    return bool(((readings >= lower) & (readings <= upper)).all())
+
+
+def scale_readings(position: Position, layout: BallLayout, probes: Mapping[str, Probe]) -> Array:
+    """Return all scale readings (n, d) of a position: the balls less the offsets of probes."""
+    balls = ball_coordinates(position.pose, layout)
+    return np.concatenate(
+        [
+            balls[group.ball_indices] - probes[name].offset
+            for group in position.readings
+            for name in group.probes
+        ]
+    )
 
 
 def with_position(experiment: Experiment, position: Position) -> Experiment:

@@ -154,9 +154,11 @@ def with_text_changes(
 
     :raises ExperimentError: as for `with_experiment`.
     """
+    if variant is None:
+        return with_changes(text, str(source), changes)
     for change in changes:
-        for path in _in_file(parse_tree(text, str(source)), variant, change):
-            text = with_changes(text, str(source), [path])
+        in_file = _in_file(parse_tree(text, str(source)), variant, change)
+        text = with_changes(text, str(source), [in_file])
     return text
 
 
@@ -235,14 +237,11 @@ def _of_value(steps: Steps, setting: Any, before: Any, after: Any) -> Iterator[T
     yield TextChange(steps, after)
 
 
-def _in_file(root: Node, variant: str | None, change: TextChange) -> Iterator[TextChange]:
+def _in_file(root: Node, variant: str, change: TextChange) -> TextChange:
     """Return the change for one variant, whose new values have paths.
 
     :raises ExperimentError: the variant already has a value below this path.
     """
-    if variant is None:
-        yield change
-        return
     overrides = written(root, "variants", variant)
     assert isinstance(root, MappingNode) and isinstance(overrides, MappingNode)
     place = tuple(map(str, change.steps))
@@ -252,8 +251,7 @@ def _in_file(root: Node, variant: str | None, change: TextChange) -> Iterator[Te
         own_place = place_of(root, path)
         if place[: len(own_place)] == own_place:
             steps = ("variants", variant, path, *change.steps[len(own_place) :])
-            yield TextChange(steps, change.value, change.kind)
-            return
+            return TextChange(steps, change.value, change.kind)
         if own_place[: len(whole)] == tuple(map(str, whole)):
             mark = mark_of(root, ("variants", variant, path), of_key=True)
             place_text = format_path(whole)
@@ -262,7 +260,7 @@ def _in_file(root: Node, variant: str | None, change: TextChange) -> Iterator[Te
     settings: Any = changed_data(to_python(root), change)
     for step in whole:
         settings = settings[step]
-    yield TextChange(("variants", variant, _path_of(root, whole)), settings)
+    return TextChange(("variants", variant, _path_of(root, whole)), settings)
 
 
 def _path_of(root: Node, steps: Steps) -> str:

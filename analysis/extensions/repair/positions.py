@@ -31,9 +31,9 @@ def positions(experiment: Experiment) -> Iterator[Change]:
         layout = experiment.layouts[artefact]
         makers = _plate_poses if is_plate(experiment, artefact) else _bar_poses
         for words, plane, pose in makers(experiment, artefact):
-            across = _probes_across(experiment, artefact, plane)
+            across = probes_across(experiment, artefact, plane)
             every = np.arange(len(layout.names))
-            name = _free_name(experiment, f"more {plane or ''}".strip())
+            name = free_name(experiment, f"more {plane or ''}".strip())
             for names in dict.fromkeys((across, tuple(experiment.probes))):
                 new = Position(
                     name, artefact, Pose(*pose), (ReadingGroup(names, layout.names, every, 1),)
@@ -58,11 +58,12 @@ def with_added(experiment: Experiment, position: Position) -> Experiment:
     """Return the experiment with an additional position, under another name if this one is
     in use.
     """
-    name = _free_name(experiment, position.name)
+    name = free_name(experiment, position.name)
     return with_position(experiment, replace(position, name=name))
 
 
-def _free_name(experiment: Experiment, name: str) -> str:
+def free_name(experiment: Experiment, name: str) -> str:
+    """Return a name, or the first with a number after it, that no position has."""
     names = {place.name for place in experiment.positions} | {*experiment.switched_off}
     return next(
         candidate_name
@@ -123,8 +124,10 @@ def _bar_poses(
         )
 
 
-def _probes_across(experiment: Experiment, artefact: str, plane: Axis | None) -> tuple[str, ...]:
-    """Probes that read the artefact in that plane, or those that reach across it, or the first."""
+def probes_across(experiment: Experiment, artefact: str, plane: Axis | None) -> tuple[str, ...]:
+    """Return the probes that read the artefact in that plane, or those that reach across it, or the
+    first.
+    """
     places = [place for place in experiment.positions if place.artefact == artefact]
     for place in places:
         plane_axes = plane_of(place.pose.rotation)

@@ -72,7 +72,7 @@ def edits(before: Experiment, after: Experiment) -> tuple[Edit, ...]:
     for name, probe in after.probes.items():
         if name not in before.probes:
             changes.append(Edit(("probes", name), [written_length(v) for v in probe.offset]))
-    settings_before = {place.name: position_settings(before, place) for place in before.positions}
+    places_before = {place.name: place for place in before.positions}
     # With one probe, a file need not name it.
     named = to_python(before.tree).get("positions", ()) if len(after.probes) > 1 else ()
     unnamed = {
@@ -81,10 +81,13 @@ def edits(before: Experiment, after: Experiment) -> tuple[Edit, ...]:
         if len(before.probes) == 1 and lacks_probes(candidate)
     }
     for place in after.positions:
+        place_before = places_before.get(place.name)
+        if place_before is place and place.name not in unnamed:
+            continue
         settings = position_settings(after, place)
-        if place.name not in settings_before:
+        if place_before is None:
             changes.append(Edit(("positions",), settings, True))
-        elif settings != settings_before[place.name] or place.name in unnamed:
+        elif place.name in unnamed or settings != position_settings(before, place_before):
             changes.append(Edit(("positions", place.name), settings))
     candidates = () if after.pool is None else after.pool.candidates
     for k, item in enumerate(after.calibration):

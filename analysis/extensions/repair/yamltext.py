@@ -89,15 +89,15 @@ def with_changes(text: str, file: str, changes: Iterable[TextChange]) -> str:
     >>> with_changes(text, "example", [TextChange(("plate", "balls"), 6)])
     'plate: {balls: 6}  # ours\n'
     """
+    data = to_python(parse_tree(text, file))
     for change in changes:
-        before = to_python(parse_tree(text, file))
         spans = _spans(text, file)
-        text = _changed(spans, change)
+        text, data = _changed(spans, change), changed_data(data, change)
         try:
             after = to_python(parse_tree(text, file))
         except ExperimentError:
             after = None
-        if after != changed_data(before, change):
+        if after != data:
             raise _refusal(
                 _way(spans, change.steps)[-1],
                 change.steps,
@@ -215,20 +215,22 @@ def _changed(text: _Text, change: TextChange) -> str:
                 f"others refer to this as *{span.anchor}, and would change with it; change it by"
                 " hand",
             )
-    is_there = len(way) == len(change.steps) + 1
-    if not is_there and (len(way) < len(change.steps) or way[-1].kind != "mapping"):
+    last, missing = way[-1], change.steps[len(way) - 1 :]
+    is_empty = last.start == last.end and last is not text.root
+    if missing and (change.kind == "remove" or not (last.kind == "mapping" or is_empty)):
         raise _refusal(
-            way[-1], change.steps, "there is no mapping or list to extend; write it by hand"
+            last, change.steps, "there is no mapping or list to extend; write it by hand"
         )
     if change.kind == "remove":
-        return _without(text, way[-2], way[-1], change)
-    if not is_there:
-        value = [change.value] if change.kind == "append" else change.value
-        return _with_entry(text, way[-1], value, str(change.steps[-1]))
-    if change.kind == "set" or way[-1].kind != "list":
-        value = [change.value] if change.kind == "append" else change.value
-        return _with_value(text, way[-2], way[-1], change, value)
-    return _with_entry(text, way[-1], change.value)
+        return _without(text, way[-2], last, change)
+    if change.kind == "append" and last.kind == "list":
+        return _with_entry(text, last, change.value)
+    value = [change.value] if change.kind == "append" else change.value
+    for step in reversed(missing if is_empty else missing[1:]):
+        value = {step: value}
+    if missing and not is_empty:
+        return _with_entry(text, last, value, str(missing[0]))
+    return _with_value(text, way[-2], last, change, value)
 
 
 def _with_value(text: _Text, above: _Span, span: _Span, change: TextChange, value: Any) -> str:

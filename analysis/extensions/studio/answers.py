@@ -4,7 +4,7 @@ undetermined directions.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from time import perf_counter
 from typing import Any
 
@@ -18,7 +18,7 @@ from ballplate.extensions.pages.motions import (
 )
 from ballplate.extensions.pages.page_facts import target_in_words
 from ballplate.extensions.repair.written import plane_of
-from ballplate.extensions.sweeps.error_map_uncertainty import LEVELS, ErrorMap, Slice, point_map
+from ballplate.extensions.sweeps.error_map_uncertainty import LEVELS, ErrorMap, in_slices, point_map
 from ballplate.presentation import Data, finite, percent, picked, uncertainty_words
 from ballplate.rank import Verdict, verdict
 from ballplate.results import (
@@ -45,9 +45,9 @@ NO_TARGET = "1 um"
 
 
 @single_threaded
-def answer(experiment: Experiment, moving: bool = False) -> dict[str, Any]:
-    """Return the immediate view of a design, as plain data in metres, with the seconds of
-    computation.
+def summary(experiment: Experiment, moving: bool = False) -> dict[str, Any]:
+    """Return rank, lengths and tasks of a design compared with the target, as plain data in metres,
+    with the seconds of computation.
 
     While something is `moving`, undetermined directions are counted, but not described.
     """
@@ -79,25 +79,25 @@ def answer(experiment: Experiment, moving: bool = False) -> dict[str, Any]:
 
 
 @single_threaded
-def drawn_answer(experiment: Experiment, kind: str, motion: int | None) -> dict[str, Any]:
-    """Return what is drawn when nothing moves: the map of a `kind`, "lengths", "points" or None
-    for another, the motion of an undetermined direction by its index, and all quantities.
+def quantities_and_pictures(
+    experiment: Experiment, linearisation: Linearisation, kind: str | None, motion: int | None
+) -> dict[str, Any]:
+    """Return all quantities, the map of a `kind`, "lengths", "points" or None for another, and the
+    motion of an undetermined direction by its index.
     """
-    linearisation = linearise(lay_out(experiment))
     target = experiment.target_uncertainty
     quantities = uncertainties(linearisation, target=target)
-    maps = {"lengths": lambda: _length_map(experiment), "points": lambda: _map(linearisation)}
     return {
         "quantities": [_row(quantity) for quantity in quantities.values()],
-        "map": maps[kind]() if kind in maps else None,
+        "map": MAPS[kind](experiment, linearisation) if kind in MAPS else None,
         "motions": None if motion is None else _motions(linearisation, target, motion),
     }
 
 
 @single_threaded
-def later_answer(experiment: Experiment) -> dict[str, Any]:
-    """Return what comes later than the rest, since the design is evaluated again for each row: the
-    source of scale as `lines` of text, and `assumptions`, None without U6.
+def scale_and_assumptions(experiment: Experiment) -> dict[str, Any]:
+    """Return the source of scale as `lines` of text, and `assumptions`, None without U6; the design
+    is evaluated again for each row.
     """
     prediction = predict(experiment, with_scale=True)
     scale, assumptions = prediction.scale, prediction.assumptions
@@ -204,30 +204,25 @@ def _motions(linearisation: Linearisation, target: Target | None, index: int) ->
     }
 
 
-def _length_map(experiment: Experiment) -> Data:
+def _length_map(experiment: Experiment, linearisation: Linearisation) -> Data:
     """Return the largest uncertainty of the lengths from each point of a grid, as a ratio to the
     target, or in metres without one; None if one of them is undetermined.
     """
     counts = (LENGTH_NODES, LENGTH_NODES, len(LEVELS))[: experiment.dimension]
     target = target_in_words(experiment)
-    lengths = length_map(experiment, length_settings(experiment, target or NO_TARGET, counts))
+    settings = length_settings(experiment, target or NO_TARGET, counts)
+    lengths = length_map(experiment, settings, at=linearisation)
     groups = lengths.by_point
-    values = lengths.settings.target_factor * groups.maximum_ratio if target else groups.maximum
+    values = settings.target_factor * groups.maximum_ratio if target else groups.maximum
     values = np.where(groups.undetermined > 0, np.nan, values)
-    axes = [np.unique(points) for points in lengths.points.T]
-    heights: list[float | None] = axes[2].tolist() if len(axes) == 3 else [None]
-    of_levels = values.reshape(len(axes[0]), len(axes[1]), -1).transpose(2, 1, 0)
-    slices = [
-        Slice(name, height, level)
-        for name, height, level in zip(LEVELS, heights, of_levels, strict=False)
-    ]
     largest = float(np.nanmax(values, initial=0.0))
     high, unit = (max(1.0, largest), "target") if target else (largest, "m")
     scale = {"low": 0.0, "high": high, "largest": largest, "unit": unit}
-    return _map_data(ErrorMap(axes[0], axes[1], tuple(slices), None)) | {"scale": scale}
+    of_levels = values.reshape(LENGTH_NODES, LENGTH_NODES, -1).T
+    return _map_data(in_slices(linearisation.design, of_levels)) | {"scale": scale}
 
 
-def _map(linearisation: Linearisation) -> Data:
+def _point_map(experiment: Experiment, linearisation: Linearisation) -> Data:
     """Return standard uncertainties of corrected points through the volume, None if
     undetermined.
     """
@@ -249,3 +244,10 @@ def _map_data(mapped: ErrorMap) -> Data:
             for map_slice in mapped.slices
         ],
     }
+
+
+MAPS: Mapping[Any, Callable[[Experiment, Linearisation], Data]] = {
+    "lengths": _length_map,
+    "points": _point_map,
+}
+"""Maps through the volume, by the names that the page has for them."""

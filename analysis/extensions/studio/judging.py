@@ -1,30 +1,35 @@
-"""Computations during changes of a design, in a process that later ones stop."""
+"""Views of a document: what the page asks for during changes, computed in processes beside the
+studio's.
+"""
 
 from __future__ import annotations
 
-import multiprocessing
-import os
-from collections.abc import Callable, Sequence
-from contextlib import suppress
-from dataclasses import dataclass, replace
-from multiprocessing.connection import Connection
-from multiprocessing.process import BaseProcess
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any
 
+from ballplate.extensions.repair.yamltext import TextChange
 from ballplate.results import check
-from ballplate.simulator.computing import begin_worker, interruptions_blocked
+from ballplate.simulator.computing import Report, single_threaded, unreported
+from ballplate.simulator.estimation import Linearisation, linearise
+from ballplate.simulator.experiment import Experiment, lay_out
 from ballplate.simulator.inputs import (
     ExperimentError,
     Message,
     optional_service,
-    refused,
+    to_list,
     to_python,
 )
 
-from .answers import answer, drawn_answer, later_answer, scene
+from .actions import draft_after
+from .answers import quantities_and_pictures, scale_and_assumptions, scene, summary
 from .document import DesignDocument, data_of, variants_of
-from .drafts import draft_of, evaluable, evaluable_of, problems
+from .drafts import draft_of, draft_with, evaluable, evaluable_of, problems
 from .filling import pool_of
+from .processes import Work
+
+Arguments = Mapping[str, Any]
 
 
 @dataclass(frozen=True)
@@ -40,69 +45,79 @@ class DesignJudgement:
     variants: tuple[str, ...]
 
 
-def judgement(document: DesignDocument, moving: bool = False) -> DesignJudgement:
-    """Return the view of a document, and faults of its text; `moving`: see `answer`."""
+def judgement(
+    document: DesignDocument, arguments: Arguments | None = None, report: Report = unreported
+) -> DesignJudgement:
+    """Return the view of a document, and faults of its text."""
     variants = variants_of(document) if document.variant else ()
     try:
         draft = draft_of(document)
     except ExperimentError as error:
         return DesignJudgement(None, None, error.messages, data_of(document), variants)
     messages, data = draft.faults or (), to_python(draft.tree)
-    found = None
+    answer = None
     try:
-        found = answer(evaluable(draft), moving)
+        answer = summary(evaluable(draft))
     except ExperimentError as error:
         messages = tuple(dict.fromkeys((*messages, *error.messages)))
-    seen = scene(draft, problems(draft))
-    return DesignJudgement(seen, found, messages, data, variants)
+    return DesignJudgement(scene(draft, problems(draft)), answer, messages, data, variants)
 
 
-def figures(document: DesignDocument) -> dict[str, Any]:
-    """Return the answer to what of a document can be evaluated while it is moved, and what is
-    wrong with its positions.
+def previewed(
+    document: DesignDocument, action: Arguments, report: Report = unreported
+) -> dict[str, Any]:
+    """Return the answer to what of a document can be evaluated after an action, as while it moves,
+    and what is then wrong with its positions; the action is not written.
 
-    :raises ExperimentError: nothing can.
+    :raises ActionError: the action is unknown or incomplete.
+    :raises ExperimentError: nothing can be evaluated.
     """
-    judged = judgement(document, moving=True)
-    if judged.answer is None or judged.scene is None:
-        raise ExperimentError(judged.messages)
-    places = judged.scene["positions"]
-    wrong = [{"name": place["name"], "problem": place["problem"]} for place in places]
-    return {**judged.answer, "scene": {"positions": wrong}}
+    draft = draft_after(document, action)
+    wrong = problems(draft)
+    places = [{"name": place.name, "problem": wrong.get(place.name)} for place in draft.positions]
+    return {**summary(evaluable(draft), moving=True), "scene": {"positions": places}}
 
 
-def drawn(document: DesignDocument, kind: str, motion: int | None) -> dict[str, Any]:
-    """Return the map of a document's design, a motion and all quantities; see `drawn_answer`.
-
-    :raises ExperimentError: nothing of it can be evaluated.
-    """
-    return drawn_answer(evaluable_of(document), kind, motion)
-
-
-def later(document: DesignDocument) -> dict[str, Any]:
-    """Return the source of scale of a document's design, and its assumptions.
-
-    :raises ExperimentError: nothing of it can be evaluated.
-    """
-    return later_answer(evaluable_of(document))
+def _pictures(document: DesignDocument, arguments: Arguments, report: Report) -> dict[str, Any]:
+    """Return all quantities, the `map` of a kind and the `motion` of an index."""
+    experiment, linearisation = _linearised(document, arguments["revision"])
+    kind, motion = arguments.get("map"), arguments.get("motion")
+    return quantities_and_pictures(experiment, linearisation, kind, motion)
 
 
-def matrix(document: DesignDocument, added: Sequence[DesignDocument]) -> dict[str, Any]:
-    """Return how much of each error's information goes with each position of a document's design,
-    and with the last position of each one `added`; empty without the extension that computes it.
+@lru_cache(maxsize=1)
+@single_threaded
+def _linearised(document: DesignDocument, revision: int) -> tuple[Experiment, Linearisation]:
+    """Return what can be evaluated, which other maps and motions of one revision share."""
+    experiment = evaluable_of(document)
+    return experiment, linearise(lay_out(experiment))
 
-    :raises ExperimentError: nothing of them can be evaluated.
+
+def _support(document: DesignDocument, arguments: Arguments, report: Report) -> dict[str, Any]:
+    """Return the source of scale and the assumptions."""
+    return scale_and_assumptions(evaluable_of(document))
+
+
+def _matrix(document: DesignDocument, arguments: Arguments, report: Report) -> dict[str, Any]:
+    """Return how much of each error's information goes with each position, and with one of given
+    `settings` that is added; empty without the extension that computes it.
     """
     information = optional_service("position_information")
     if information is None:
         return {}
-    experiment, *more = (evaluable_of(each) for each in (document, *added))
-    candidates = [each for each in more if len(each.positions) > len(experiment.positions)]
-    data: dict[str, Any] = information(check(experiment), candidates).to_dict()
+    experiment, candidates = evaluable_of(document), []
+    if settings := arguments.get("settings"):
+        change = TextChange(("positions",), to_list(settings), "append")
+        candidates.append(evaluable(draft_with(draft_of(document), [change])))
+    # A candidate that cannot be read is none.
+    added = [each for each in candidates if len(each.positions) > len(experiment.positions)]
+    data: dict[str, Any] = information(check(experiment), added).to_dict()
     return data
 
 
-def pooled(document: DesignDocument) -> dict[str, Any]:
+def pooled(
+    document: DesignDocument, arguments: Arguments | None = None, report: Report = unreported
+) -> dict[str, Any]:
     """Return the candidates of a document's pool, as plain data; see `pool_of`.
 
     :raises ExperimentError: nothing of it can be evaluated.
@@ -110,83 +125,11 @@ def pooled(document: DesignDocument) -> dict[str, Any]:
     return pool_of(evaluable_of(document, planning=True))
 
 
-class Judge:
-    """A process that computes one thing of one document at a time: what comes after it stops what
-    is under way, so that a result is always of the document that came last.
-
-    It serves one caller at a time; `asked` counts the requests.
-    """
-
-    def __init__(self) -> None:
-        self.is_busy = False
-        self.asked = 0
-        self._process: BaseProcess | None = None
-        self._connection: Connection | None = None
-
-    def begin(self, work: Callable[[DesignDocument], Any], document: DesignDocument) -> None:
-        """Begin a computation, and stop the running one."""
-        if self.is_busy or self._process is None or not self._process.is_alive():
-            self.stop()
-            self._start()
-        assert self._connection is not None
-        self._document, self.is_busy = document, True
-        # That a process has ended is found when its result is looked for.
-        with suppress(OSError):
-            self._connection.send((work, replace(document, back=(), forward=())))
-
-    def look(self) -> Any:
-        """Return the outcome of the computation, if complete.
-
-        :raises ExperimentError: the text is invalid, or the work failed for another reason.
-        """
-        if not self.is_busy or self._connection is None or not self._connection.poll():
-            return None
-        try:
-            received = self._connection.recv()
-        except (EOFError, OSError):
-            self.stop()
-            received = "the computation ended without a result"
-        self.is_busy = False
-        if isinstance(received, ExperimentError):
-            raise received
-        if isinstance(received, str):
-            raise refused(self._document.path, f"no figures: {received}")
-        return received[0]
-
-    def stop(self) -> None:
-        """Stop the running computation."""
-        if self._process is not None and self._connection is not None:
-            self._process.kill()
-            self._process.join()
-            self._connection.close()
-        self._process, self.is_busy = None, False
-
-    def _start(self) -> None:
-        # Not a copy of this process, which would have its threads' locks without the threads, but
-        # where the system can, of one that has nothing but the modules.
-        can_fork = "forkserver" in multiprocessing.get_all_start_methods()
-        context: Any = multiprocessing.get_context("forkserver" if can_fork else "spawn")
-        if can_fork:
-            context.set_forkserver_preload(["__main__", f"{__package__}.prepared"])
-        self._connection, child_end = context.Pipe()
-        self._process = context.Process(target=_serve, args=(child_end,), daemon=True)
-        with interruptions_blocked():
-            self._process.start()
-        child_end.close()
-
-
-def _serve(connection: Connection) -> None:
-    begin_worker(os.getppid())
-    # The studio may end at any moment.
-    with suppress(EOFError, OSError):
-        while True:
-            work, document = connection.recv()
-            outcome: Any
-            try:
-                outcome = (work(document),)
-            except ExperimentError as error:
-                outcome = error
-            except Exception as error:
-                # Whatever it is, a person who waits is told of it.
-                outcome = f"{type(error).__name__}: {error}"
-            connection.send(outcome)
+VIEWS: Mapping[str, Work] = {
+    "preview": previewed,
+    "drawn": _pictures,
+    "later": _support,
+    "matrix": _matrix,
+    "pool": pooled,
+}
+"""Views that the page asks for by these names besides the judgement."""

@@ -12,6 +12,7 @@ import logging
 import math
 import secrets
 from collections.abc import Awaitable, Callable
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -30,10 +31,9 @@ from starlette.staticfiles import StaticFiles
 from starlette.types import ASGIApp, Receive, Scope, Send
 
 from .actions import ActionError
+from .jobs import in_words
+from .judging import VIEWS
 from .session import OutdatedError, RefusedError, Session
-
-# What answers a request with its content.
-Work = Callable[[Request, dict[str, Any]], Any]
 
 STATIC = Path(__file__).parent / "static"
 
@@ -61,34 +61,24 @@ def application(session: Session, token: str, port: int) -> Starlette:
     """The application of a session that is served on the loopback address."""
     hosts = {f"127.0.0.1:{port}", f"localhost:{port}"}
     page = (STATIC / "index.html").read_text(encoding="utf-8")
+    answers: dict[str, Callable[[dict[str, Any]], Any]] = {
+        "state": lambda body: session.state(),
+        "do": partial(_act, session),
+        "schema": lambda body: _schema(),
+        "questions": lambda body: _questions(),
+        "draft": session.draft,
+        "jobs": lambda body: session.jobs(),
+        "start": partial(_start, session),
+        "stop": partial(_stop, session),
+        **{name: partial(session.view, name) for name in VIEWS},
+    }
     app = Starlette(
         routes=[
             Route("/", _page(page, token, port)),
-            Route("/api/state", _answering(lambda request, body: session.state())),
-            Route("/api/do", _answering(_acting(session)), methods=["POST"]),
-            Route(
-                "/api/preview",
-                _answering(lambda request, body: session.preview(body)),
-                methods=["POST"],
+            *(
+                Route(f"/api/{name}", _answering(work), methods=["GET", "POST"])
+                for name, work in answers.items()
             ),
-            Route("/api/schema", _answering(lambda request, body: _schema())),
-            Route("/api/questions", _answering(lambda request, body: _questions())),
-            Route(
-                "/api/draft",
-                _answering(lambda request, body: session.draft(body)),
-                methods=["POST"],
-            ),
-            Route("/api/jobs", _answering(lambda request, body: session.jobs())),
-            Route("/api/start", _answering(_starting(session)), methods=["POST"]),
-            Route("/api/stop", _answering(_stopping(session)), methods=["POST"]),
-            Route(
-                "/api/matrix",
-                _answering(lambda request, body: session.matrix(body.get("settings"))),
-                methods=["POST"],
-            ),
-            Route("/api/drawn", _answering(_drawing(session)), methods=["POST"]),
-            Route("/api/pool", _answering(lambda request, body: session.pool())),
-            Route("/api/later", _answering(lambda request, body: session.later())),
             Route("/pages/{number:int}", _made_page(session)),
             Mount("/static", StaticFiles(directory=STATIC)),
         ]
@@ -163,7 +153,7 @@ def _made_page(session: Session) -> Callable[[Request], Awaitable[Response]]:
 
 
 def _answering(
-    work: Work,
+    work: Callable[[dict[str, Any]], Any],
 ) -> Callable[[Request], Awaitable[Response]]:
     """A request that is answered with plain data, or with the `error` that a person has made: an
     answer like any other, which a browser does not count among its own failures.
@@ -184,17 +174,11 @@ def _answering(
             if not isinstance(body, dict):
                 return _error("send an object", 400)
         try:
-            return _json(await run_in_threadpool(work, request, body))
-        except ExperimentError as error:
-            text = "; ".join(
-                f"{message.path}: {message.text}" if message.path else message.text
-                for message in error.messages
-            )
-            return _error(text)
+            return _json(await run_in_threadpool(work, body))
         except KeyError as error:
             return _error(f"the request needs {error}")
-        except (ActionError, RefusedError) as error:
-            return _json({"error": str(error), "outdated": isinstance(error, OutdatedError)})
+        except (ActionError, ExperimentError, RefusedError) as error:
+            return _json({"error": in_words(error), "outdated": isinstance(error, OutdatedError)})
         except Exception as error:
             # Nothing has changed by it; whoever looks after the program finds it in the terminal.
             logger.exception("the studio failed to answer %s", request.url.path)
@@ -236,35 +220,18 @@ def _error(text: str, status: int = 200) -> Response:
     return _json({"error": text}, status)
 
 
-def _acting(session: Session) -> Work:
-    def act(request: Request, body: dict[str, Any]) -> Any:
-        session.act(body)
-        return session.state()
-
-    return act
+def _act(session: Session, body: dict[str, Any]) -> Any:
+    session.act(body)
+    return session.state()
 
 
-def _starting(session: Session) -> Work:
-    def start(request: Request, body: dict[str, Any]) -> Any:
-        return {"id": session.start(str(body.get("job")), body.get("settings") or {})}
-
-    return start
+def _start(session: Session, body: dict[str, Any]) -> Any:
+    return {"id": session.start(str(body.get("job")), body.get("settings") or {})}
 
 
-def _stopping(session: Session) -> Work:
-    def stop(request: Request, body: dict[str, Any]) -> Any:
-        session.stop(int(body.get("id", 0)))
-        return session.jobs()
-
-    return stop
-
-
-def _drawing(session: Session) -> Work:
-    def draw(request: Request, body: dict[str, Any]) -> Any:
-        motion = body.get("motion")
-        return session.drawn(str(body.get("map")), motion if isinstance(motion, int) else None)
-
-    return draw
+def _stop(session: Session, body: dict[str, Any]) -> Any:
+    session.stop(int(body.get("id", 0)))
+    return session.jobs()
 
 
 def _questions() -> Any:

@@ -7,7 +7,6 @@ import time
 from collections.abc import Callable, Mapping
 from contextlib import suppress
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
 from threading import RLock
 from typing import Any
@@ -19,6 +18,7 @@ from ballplate.simulator.inputs import (
     ExperimentError,
     Message,
     Trust,
+    format_path,
     refused,
     service,
 )
@@ -36,9 +36,9 @@ from .document import (
     undone,
     variants_of,
 )
-from .drafts import POSITION
 from .jobs import JOBS, MOST_RUNNING, Job, started
-from .judging import DesignJudgement, Judge, drawn, figures, judgement, later, matrix, pooled
+from .judging import VIEWS, DesignJudgement, judgement
+from .processes import Worker
 from .recovery import give_up, keep, kept_in, name_of_kept, recovered
 
 ENDINGS = (".yaml", ".yml")
@@ -86,8 +86,10 @@ class Session:
         self._kept: dict[str, Any] | None = None
         self._jobs: dict[int, Job] = {}
         self.revision = 0
-        self._judge, self._aside, self._beside = Judge(), Judge(), Judge()
-        self._of_pool = Judge()
+        self._judge, moving = Worker(), Worker()
+        # What is asked for once nothing moves gives way to what moves.
+        self._workers = {"preview": moving, "drawn": moving, "later": moving}
+        self._workers |= {"matrix": Worker(), "pool": Worker()}
         self._answer: dict[str, Any] | None = None
         self._scene: dict[str, Any] | None = None
         self._burst: tuple[Any, ...] = ()
@@ -159,6 +161,9 @@ class Session:
         :raises ExperimentError: a file cannot express it.
         :raises RefusedError: it is not permitted.
         """
+        if action.get("do") == "keep":
+            self._keep(action)
+            return
         with self._lock:
             self._ensure_seen(action)
             control = self._controls().get(str(action.get("do")))
@@ -173,16 +178,25 @@ class Session:
                 control(action)
             self._burst = burst
 
-    def preview(self, action: Mapping[str, Any]) -> dict[str, Any]:
-        """Return the view of the design after an action, without the change.
+    def view(self, name: str, arguments: Mapping[str, Any]) -> dict[str, Any]:
+        """Return a view of the design by its name in `VIEWS`, with the design's fingerprint.
 
-        :raises ActionError, ExperimentError, RefusedError: as for `act`.
+        :raises ActionError, ExperimentError: the arguments, or the text, are invalid.
+        :raises RefusedError: a later request came meanwhile, or the page shows another state.
         """
         with self._lock:
-            self._ensure_seen(action)
-            document = self._document
-        data: Data = self._computed(figures, done(document, action), self._aside)
-        return data
+            self._ensure_seen(arguments)
+            document, worker = self._document, self._workers[name]
+            settings = {**arguments, "revision": self.revision}
+            number = worker.begin(VIEWS[name], document, settings)
+        while True:
+            with self._lock:
+                if worker.asked != number:
+                    raise RefusedError("a later request replaced this one")
+                result = worker.look()
+                if not worker.is_busy:
+                    return {"fingerprint": document.fingerprint, **result}
+            time.sleep(INTERVAL)
 
     def draft(self, answers: Mapping[str, Any]) -> dict[str, Any]:
         """Return the draft of answers to the questions of a data sheet, with a message for the
@@ -196,53 +210,6 @@ class Session:
             path, message = Path("design.yaml"), {"name": str(error)}
         draft: dict[str, Any] = service("sheet_draft")(path, answers)
         return draft | {"messages": draft["messages"] | message}
-
-    def later(self) -> dict[str, Any]:
-        """Return the source of scale of the design, its assumptions, and its fingerprint.
-
-        :raises ExperimentError: the text is invalid.
-        :raises RefusedError: another request came meanwhile.
-        """
-        with self._lock:
-            document = self._document
-        return {"fingerprint": document.fingerprint, **self._computed(later, document, self._aside)}
-
-    def matrix(self, settings: Mapping[str, Any] | None) -> dict[str, Any]:
-        """Return how much of each error's information goes with each position, with the
-        `settings` of a candidate, if any, and the fingerprint of the design.
-
-        :raises ActionError, ExperimentError: the settings, or the text, are invalid.
-        :raises RefusedError: another such request came meanwhile.
-        """
-        with self._lock:
-            document = self._document
-        action = {"do": "add", "settings": settings}
-        added = [] if settings is None else [done(document, action)]
-        found = self._computed(partial(matrix, added=added), document, self._beside)
-        return {"fingerprint": document.fingerprint, **found}
-
-    def pool(self) -> dict[str, Any]:
-        """Return the candidates of the design's pool, and its fingerprint.
-
-        :raises ExperimentError: the text is invalid.
-        :raises RefusedError: another such request came meanwhile.
-        """
-        with self._lock:
-            document = self._document
-        found = self._computed(pooled, document, self._of_pool)
-        return {"fingerprint": document.fingerprint, **found}
-
-    def drawn(self, kind: str, motion: int | None) -> dict[str, Any]:
-        """Return the map of a `kind`, the motion of a direction by its index, all quantities of
-        the design, and its fingerprint.
-
-        :raises ExperimentError: the text is invalid.
-        :raises RefusedError: another request came meanwhile.
-        """
-        with self._lock:
-            document = self._document
-        work = partial(drawn, kind=kind, motion=motion)
-        return {"fingerprint": document.fingerprint, **self._computed(work, document, self._aside)}
 
     def start(self, name: str, settings: Mapping[str, Any]) -> int:
         """Start a computation, and return its number.
@@ -288,16 +255,16 @@ class Session:
             if number not in self._jobs:
                 raise RefusedError(f"no computation {number}")
             if not self._jobs[number].end_with_best():
-                self._jobs.pop(number).stop()
+                self._jobs.pop(number).worker.stop()
 
     def close(self) -> None:
         """Stop all computations."""
         with self._lock:
-            for judge in (self._judge, self._aside, self._beside, self._of_pool):
-                judge.asked += 1
-                judge.stop()
+            for worker in (self._judge, *self._workers.values()):
+                worker.asked += 1
+                worker.stop()
             while self._jobs:
-                self._jobs.popitem()[1].stop()
+                self._jobs.popitem()[1].worker.stop()
 
     def _controls(self) -> dict[str, Callable[[Mapping[str, Any]], None]]:
         """Actions on the file instead of the design."""
@@ -305,7 +272,6 @@ class Session:
             "undo": lambda action: self._become(undone(self._document)),
             "redo": lambda action: self._become(redone(self._document)),
             "variant": self._choose,
-            "keep": self._keep,
             "save": self._save,
             "open": self._open,
             "begin": self._begin_new,
@@ -336,7 +302,7 @@ class Session:
 
     def _begin(self) -> None:
         self._begun = time.monotonic()
-        self._judge.begin(judgement, self._document)
+        self._judge.begin(judgement, self._document, {})
 
     def _await(self) -> None:
         """Wait for the judgement of the present document, as long as a page waits."""
@@ -361,27 +327,6 @@ class Session:
             self._answer = result.answer or self._answer
             self._scene = result.scene or self._scene
 
-    def _computed(
-        self, work: Callable[[DesignDocument], Any], document: DesignDocument, judge: Judge
-    ) -> Any:
-        """Return the result for a document that is not evaluated in the view; further such
-        requests to the `judge` stop it.
-
-        :raises RefusedError: it was stopped.
-        """
-        with self._lock:
-            judge.asked += 1
-            number = judge.asked
-            judge.begin(work, document)
-        while True:
-            with self._lock:
-                if judge.asked != number:
-                    raise RefusedError("a later request replaced this one")
-                result = judge.look()
-                if result is not None:
-                    return result
-            time.sleep(INTERVAL)
-
     def _choose(self, action: Mapping[str, Any]) -> None:
         names = variants_of(self._document)
         if action.get("name") not in names:
@@ -389,15 +334,22 @@ class Session:
         self._become(replace(self._document, variant=action["name"]))
 
     def _keep(self, action: Mapping[str, Any]) -> None:
+        """Keep the quantities for comparison, or give them up; without the lock while they are
+        computed.
+        """
         self._await()
-        if self._judge.is_busy:
-            raise RefusedError("the results are being computed; wait for them")
-        if self._judgement.answer is None:
-            raise RefusedError("there are no figures of this design; correct it before keeping it")
-        self._kept = (
-            None if action.get("off") else self._computed(_quantities, self._document, self._aside)
-        )
-        self.revision += 1
+        with self._lock:
+            self._ensure_seen(action)
+            if self._judge.is_busy:
+                raise RefusedError("the results are being computed; wait for them")
+            if self._judgement.answer is None:
+                raise RefusedError(
+                    "there are no figures of this design; correct it before keeping it"
+                )
+        kept = None if action.get("off") else self.view("drawn", {})
+        with self._lock:
+            self._kept = kept
+            self.revision += 1
 
     def _save(self, action: Mapping[str, Any]) -> None:
         name = action.get("name")
@@ -495,10 +447,6 @@ class Session:
         )
 
 
-def _quantities(document: DesignDocument) -> dict[str, Any]:
-    return drawn(document, "none", None)
-
-
 def _with_first_variant(document: DesignDocument) -> DesignDocument:
     names = variants_of(document)
     return replace(document, variant=names[0] if names else None)
@@ -506,12 +454,13 @@ def _with_first_variant(document: DesignDocument) -> DesignDocument:
 
 def _message_data(message: Message, data: Any) -> Data:
     """Return a message as plain data; it is about `what`, a position by its name."""
-    found, path = POSITION.match(message.path), message.path
-    with suppress(LookupError, TypeError):
-        if found:
-            name = data["positions"][int(found[1])]["name"]
-            path = f'position "{name}"{path[found.end() :].replace(".", ", ", 1)}'
-    return {**picked(message, "line", "column", "path", "text"), "what": path}
+    what = message.path
+    if message.steps[:1] == ("positions",):
+        with suppress(LookupError, TypeError):
+            name = data["positions"][message.steps[1]]["name"]
+            rest = format_path(message.steps[2:])
+            what = f'position "{name}"{rest and f", {rest}"}'
+    return {**picked(message, "line", "column", "path", "text"), "what": what}
 
 
 __all__ = ["ActionError", "OutdatedError", "RefusedError", "Session"]

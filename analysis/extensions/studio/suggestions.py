@@ -4,7 +4,7 @@ uncertainty most.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 from ballplate.extensions.repair.changes import ChangeKind, apply_all
@@ -27,7 +27,7 @@ MOST_TOLD = 5
 
 
 def suggested_repairs(
-    document: DesignDocument, report: Report = unreported
+    document: DesignDocument, settings: Mapping[str, Any], report: Report = unreported
 ) -> list[dict[str, Any]]:
     """Return full repairs, as text, with the positions that they add or move, as plain data.
 
@@ -65,7 +65,9 @@ def _edit_data(edit: Edit) -> Data:
     return {"path": list(edit.steps), "value": edit.value, "is_new": edit.is_new}
 
 
-def next_positions(document: DesignDocument, report: Report = unreported) -> list[dict[str, Any]]:
+def next_positions(
+    document: DesignDocument, settings: Mapping[str, Any], report: Report = unreported
+) -> list[dict[str, Any]]:
     """Return further positions, of the pool if there is one, with U6 after adding each; the best
     first.
 

@@ -49,15 +49,15 @@ class _Axis:
         return " ".join(self.paths)
 
 
-def swept(document: DesignDocument, axis_data: Any, report: Report) -> dict[str, Any]:
-    """Compute a sweep over axes, each with `paths` and `values`: the text of each combination, and
-    the `page`, empty if its modules are not installed.
+def swept(document: DesignDocument, settings: Mapping[str, Any], report: Report) -> dict[str, Any]:
+    """Compute a sweep over `axes`, each with `paths` and `values`: the text of each combination,
+    and the `page`, empty if its modules are not installed.
 
     :raises ActionError: an axis is incomplete, or there are too many combinations.
     :raises ExperimentError: the text is invalid, a path leads nowhere, or a value would run a model
         in Python in a design that the user has not opened by name.
     """
-    axes = _axes(axis_data)
+    axes = _axes(settings.get("axes"))
     tree = experiment_of(document).tree
     with tempfile.TemporaryDirectory() as folder:
         file = _written(document, tree, axes, Path(folder))
@@ -77,15 +77,15 @@ def swept(document: DesignDocument, axis_data: Any, report: Report) -> dict[str,
     }
 
 
-def ensure_possible(document: DesignDocument, axis_data: Any) -> None:
-    """Ensure that a sweep over axes can begin, and that numbers replace texts only with units.
+def ensure_possible(document: DesignDocument, settings: Mapping[str, Any]) -> None:
+    """Ensure that a sweep over `axes` can begin, and that numbers replace texts only with units.
 
     :raises ActionError: an axis is incomplete, there are too many combinations, or a number lacks
         its unit.
     :raises ExperimentError: the text is invalid.
     """
     experiment = experiment_of(document)
-    for axis in _axes(axis_data):
+    for axis in _axes(settings.get("axes")):
         numbers = (value for value in map(value_of, axis.values) if type(value) in (int, float))
         number = next(numbers, None)
         for path in axis.paths:

@@ -62,11 +62,15 @@ def point_map(at: Linearisation, nodes: int) -> ErrorMap:
     """Return the error map's uncertainty for a linearised design, without distances."""
     on_grid = _on_grid(at, nodes)
     values = displacements(on_grid, evaluation_points(on_grid.design)).uncertainties
-    x, y, levels = _sides(at.design, nodes)
-    of_levels = np.sqrt((values**2).mean(axis=1)).reshape(len(levels), len(y), len(x))
+    return in_slices(at.design, np.sqrt((values**2).mean(axis=1)).reshape(-1, nodes, nodes))
+
+
+def in_slices(design: Design, values: Array) -> ErrorMap:
+    """Return a map of values (levels, y, x) at the levels of the volume, without distances."""
+    x, y, levels = _sides(design, values.shape[-1])
     slices = [
         Slice(name, level, slice_values)
-        for (name, level), slice_values in zip(levels, of_levels, strict=True)
+        for (name, level), slice_values in zip(levels, values, strict=True)
     ]
     return ErrorMap(x, y, tuple(slices), None)
 

@@ -519,7 +519,9 @@ def pool_of(experiment: Experiment, seconds: list[float], at_most: tuple[AtMost,
         Candidate(name, Position(name, "plate", pose, low.readings), time, "z", "more", False, {})
         for (name, pose), time in zip(named, seconds, strict=True)
     ]
-    return Pool((*drawn, *more), ChangeTimes(60.0, 600.0), (), at_most, {})
+    return Pool(
+        (*drawn, *more), ChangeTimes(60.0, 600.0), (), at_most, {}, np.zeros((0, 2, 3)), None
+    )
 
 
 def from_pool(experiment: Experiment, pool: Pool) -> list[str]:
@@ -586,7 +588,7 @@ def test_a_set_of_a_pool_is_minimal() -> None:
         for k, one in enumerate(single)
         if one.adds is not None
     ]
-    pool = Pool((*drawn, *more), ChangeTimes(0.0, 0.0), (), (), {})
+    pool = Pool((*drawn, *more), ChangeTimes(0.0, 0.0), (), (), {}, np.zeros((0, 2, 3)), None)
     found = repairs(replace(experiment, pool=pool), most=1)
     assert found is not None
     chosen = found.complete[0].changes

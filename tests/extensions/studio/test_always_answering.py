@@ -13,7 +13,7 @@ pytest.importorskip("starlette", reason="the studio is an extra")
 
 from ballplate.extensions.studio.actions import done
 from ballplate.extensions.studio.document import DesignDocument, experiment_of, opened, undone
-from ballplate.extensions.studio.judging import figures, judgement
+from ballplate.extensions.studio.judging import judgement, previewed
 from ballplate.extensions.studio.session import Session
 
 TEXT = Path(shipped("quickstart.yaml")).read_text(encoding="utf-8")
@@ -137,9 +137,8 @@ def test_positions_are_fitted_to_another_volume(document, sides):
 
 
 def test_a_preview_of_a_plate_outside_says_so_and_has_figures(document):
-    by = [0, 0, 2]
-    moved = done(document, {"do": "move", "position": "z high", "by": by})
-    found = figures(moved)
+    action = {"do": "move", "position": "z high", "by": [0, 0, 2]}
+    found = previewed(document, action)
     assert found["scene"]["positions"][1]["problem"] and u6(found) > 0
 
 
@@ -174,7 +173,7 @@ def test_suggestions_are_for_what_can_be_read(document):
 
     outside = done(document, {"do": "move", "position": "z high", "by": [0, 0, 2]})
     expected = done(document, {"do": "off", "position": "z high"})
-    found, others = next_positions(outside), next_positions(expected)
+    found, others = next_positions(outside, {}), next_positions(expected, {})
     assert [(one["words"], one["average"]) for one in found] == [
         (one["words"], one["average"]) for one in others
     ]

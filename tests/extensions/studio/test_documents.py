@@ -140,14 +140,14 @@ def test_balls_and_probes_are_chosen(design):
 @pytest.mark.parametrize(
     "action, words",
     [
-        ({"do": "fly"}, "no action 'fly'"),
-        ({}, "no action None"),
+        ({"do": "fly"}, 'no action "fly"'),
+        ({}, 'no action "None"'),
         ({"do": "move", "position": "z low"}, "move needs 'by'"),
         ({"do": "move", "position": "nowhere", "by": [0, 0, 0]}, 'no position "nowhere"'),
         ({"do": "move", "position": "z low", "by": [0.1, 0.1]}, "2 co-ordinates in 3 dimensions"),
         ({"do": "move", "position": "z low", "by": [0, 0, "nan"]}, "is no vector"),
         ({"do": "stand", "position": "z low", "across": "w"}, "across is x, y or z"),
-        ({"do": "balls", "position": "z low", "balls": ["r9c9"]}, "no ball r9c9"),
+        ({"do": "balls", "position": "z low", "balls": ["r9c9"]}, 'no ball "r9c9"'),
         ({"do": "balls", "position": "z low", "balls": []}, "reads some ball"),
         ({"do": "set", "path": "title", "value": "x"}, "a path is a list"),
         ({"do": "set", "path": ["title"], "value": "[1, 2"}, "is no value of a file"),

@@ -116,10 +116,10 @@ def test_a_preview_that_is_overtaken_is_refused_and_ends(session):
     text = session.state()["text"]
     slow = {"do": "text", "text": text.replace(POINTS, SLOW)}
     with ThreadPoolExecutor(1) as pool:
-        first = pool.submit(session.preview, slow)
-        while not session._aside.asked:
+        first = pool.submit(session.view, "preview", slow)
+        while not session._workers["preview"].asked:
             time.sleep(0.01)
-        found = session.preview({"do": "set", "path": ["title"], "value": "mine"})
+        found = session.view("preview", {"do": "set", "path": ["title"], "value": "mine"})
         with pytest.raises(RefusedError, match="later request"):
             first.result(60)
     assert found["title"] == "mine"

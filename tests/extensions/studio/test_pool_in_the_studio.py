@@ -79,8 +79,8 @@ def test_a_corner_is_forbidden_and_allowed_again(document):
     ("change", "words"),
     [
         ({"probes": {}}, "no plane to fill"),
-        ({"probes": {"z": ["up"]}}, "no probe up"),
-        ({"probes": {"z": []}}, "no probe reads plane z"),
+        ({"probes": {"z": ["up"]}}, 'no probe "up"'),
+        ({"probes": {"z": []}}, "no plane to fill"),
         ({"count": 0}, "places along an axis 1 to 20"),
         ({"quarter_turns": [4]}, "quarter turns are 0 to 3"),
         ({"probes": 1}, "give probes by plane"),

@@ -316,12 +316,12 @@ def test_no_change_brings_a_model_in_python_into_a_file_that_was_not_named(desig
                 JOBS[name](session._document, work, lambda step: None)
         for name in ("turn", "copy", "stand"):
             with pytest.raises(ExperimentError):
-                session.preview({"do": name, "position": "z low", "across": "x"})
+                session.view("preview", {"do": name, "position": "z low", "across": "x"})
         session.act({"do": "undo"})
         assert session.state()["messages"] == [] and not ran.exists()
     # A position that says so is no position: what else there is, is evaluated.
     session.act({"do": "add", "settings": settings})
-    session.preview({"do": "turn", "position": "z low"})
+    session.view("preview", {"do": "turn", "position": "z low"})
     state = session.state()
     assert state["messages"] and not state["stale"] and not ran.exists()
 
@@ -337,7 +337,7 @@ def test_no_sweep_brings_a_model_in_python_into_a_file_that_was_not_named(design
             {"paths": ["error_model.object"], "values": ["'model:build'"]},
         ],
     ):
-        found = swept(session._document, axes, lambda step: None)
+        found = swept(session._document, {"axes": axes}, lambda step: None)
         assert all(cell["reason"] for cell in found["cells"])
         assert len(axes) > 1 or wording.IS_CODE_IN_PYTHON in found["cells"][0]["reason"]
     assert not ran.exists()

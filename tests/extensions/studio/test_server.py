@@ -290,7 +290,7 @@ def test_a_page_of_an_earlier_studio_changes_nothing(client, session, design):
     with pytest.raises(RefusedError, match="restarted"):
         other.act(turn)
     with pytest.raises(RefusedError, match="restarted"):
-        other.preview(turn)
+        other.view("preview", turn)
     session.act(turn)
 
 
@@ -340,7 +340,7 @@ def test_a_computation_whose_process_is_killed_has_failed_and_may_be_of_an_earli
 ):
     client.post("/api/start", json={"job": "monte carlo", "settings": {"trials": 500_000}})
     state = client.post("/api/do", json={"do": "turn", "position": "z low"}).json()
-    session._jobs[1].process.kill()
+    session._jobs[1].worker._process.kill()
     (job,) = wait(client)
     assert job["state"] == "failed" and "without a result" in job["result"]
     assert job["fingerprint"] != state["fingerprint"]
@@ -425,7 +425,7 @@ def test_a_preview_is_small(tmp_path):
     path.write_text("".join(kept))
     session = Session(path)
     try:
-        found = session.preview({"do": "move", "position": "z low", "by": [0.01, 0.0, 0.0]})
+        found = session.view("preview", {"do": "move", "position": "z low", "by": [0.01, 0.0, 0.0]})
         assert found["rank"]["deficiency"] > 10 and len(found["scene"]["positions"]) == 20
         assert len(json.dumps(found)) <= 20_000
     finally:
@@ -450,7 +450,7 @@ def test_what_is_undetermined_moves_a_plate_in_the_same_way_wherever_it_stands(f
     found = [k for k, one in enumerate(directions) if not one["weak"]]
     assert len(found) == design["rank"]["deficiency"] > 0
     for k in found:
-        motions = session.drawn("", k)["motions"]
+        motions = session.view("drawn", {"map": "", "motion": k})["motions"]
         direction = motions["direction"]
         assert np.linalg.norm(direction["nodes"] + direction["readings"], axis=1).max() <= 1.0002
         seen = {}

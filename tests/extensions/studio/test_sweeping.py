@@ -1,13 +1,14 @@
 """A sweep from the studio over several axes, of the design as it is on the page."""
 
 from pathlib import Path
+from types import SimpleNamespace
 
 import ballplate as bp
 import pytest
 from ballplate.designs import shipped
 from ballplate.extensions.studio.actions import ActionError
 from ballplate.extensions.studio.document import DesignDocument, changed, opened
-from ballplate.extensions.studio.jobs import JOBS, _work
+from ballplate.extensions.studio.jobs import Job
 from ballplate.extensions.studio.sweeping import MOST_CELLS, ensure_possible, swept
 from ballplate.simulator.computing.steps import unreported
 from ballplate.simulator.inputs.messages import ExperimentError
@@ -40,7 +41,7 @@ def test_every_combination_is_what_run_says_of_it(document, tmp_path, monkeypatc
         },
     ]
     before = sorted(one.name for one in tmp_path.iterdir())
-    found = swept(document, axes, steps.append)
+    found = swept(document, {"axes": axes}, steps.append)
     assert sorted(one.name for one in tmp_path.iterdir()) == before
     assert found["headline"].startswith("4 cases, 4 done") and str(steps[-1]).startswith("4 of 4")
     saved = tmp_path / "saved.yaml"
@@ -80,14 +81,14 @@ def test_values_may_name_files_beside_the_design(document, pageless):
     ]
     text = document.text.replace("pairs: corner sides", "pairs: all")
     assert text != document.text
-    found = swept(changed(document, text), axes, unreported)
+    found = swept(changed(document, text), {"axes": axes}, unreported)
     assert [cell["reason"] for cell in found["cells"]] == ["", ""], found
     assert len({cell["average"] for cell in found["cells"]}) == 2 and found["page"] == ""
 
 
 def test_a_cell_that_fails_says_why(document, pageless):
     axes = [{"paths": ["machine.repeatability"], "values": ["0.2 um", "2 furlongs"]}]
-    good, bad = swept(document, axes, unreported)["cells"]
+    good, bad = swept(document, {"axes": axes}, unreported)["cells"]
     assert good["reason"] == "" and "furlongs" in bad["reason"] and bad["average"] is None
     # The file of the sweep is nobody's: the key tells the place.
     assert bad["reason"].startswith("machine.repeatability: ")
@@ -114,14 +115,14 @@ def test_a_cell_that_fails_says_why(document, pageless):
 )
 def test_what_a_sweep_lacks_is_told(document, axes, words):
     with pytest.raises((ActionError, ExperimentError)) as told:
-        swept(document, axes, unreported)
+        swept(document, {"axes": axes}, unreported)
     assert words in str(told.value)
     assert "ballplate-sweep" not in str(told.value)
 
 
 def test_a_number_without_a_unit_is_refused_before_the_start(document):
     def axes(path, *values):
-        return [{"paths": [path], "values": list(values)}]
+        return {"axes": [{"paths": [path], "values": list(values)}]}
 
     for path in ("artefacts.plate.size[0]", "machine.repeatability"):
         with pytest.raises(ActionError, match=wording.HAS_NO_UNIT) as told:
@@ -133,16 +134,11 @@ def test_a_number_without_a_unit_is_refused_before_the_start(document):
         ensure_possible(document, axes("title", "5"))
 
 
-def test_a_page_goes_apart_from_the_figures(document, monkeypatch):
+def test_a_page_goes_apart_from_the_figures():
     """Figures are asked for again and again while others run."""
-    monkeypatch.setitem(JOBS, "sweep", lambda *_: {"cells": [], "page": "<!DOCTYPE html>"})
-
-    class Connection(list):
-        send = list.append
-
-        def close(self):
-            pass
-
-    said = Connection()
-    _work(said, "sweep", document, {})
-    assert said == [("page", "<!DOCTYPE html>"), ("done", {"cells": []})]
+    found = {"cells": [], "page": "<!DOCTYPE html>"}
+    worker = SimpleNamespace(is_busy=False, step="", look=lambda: found, stop=lambda: None)
+    job = Job("sweep", "", worker)
+    job.look()
+    data = job.to_dict(1)
+    assert job.page == "<!DOCTYPE html>" and data["page"] and data["result"] == {"cells": []}

@@ -158,7 +158,7 @@ def test_the_page_of_a_sweep_made_in_the_studio_names_no_file_that_is_gone(tmp_p
     path = tmp_path / "plates.yaml"
     path.write_text(Path(shipped("quickstart.yaml")).read_text(encoding="utf-8"), encoding="utf-8")
     axes = [{"paths": ["machine.repeatability"], "values": ["0.1 um", "0.2 um"]}]
-    found = swept(opened(path), axes, unreported)
+    found = swept(opened(path), {"axes": axes}, unreported)
     texts = assert_accessible(found["page"]).texts
     facts = dict(zip(texts["dt"], texts["dd"], strict=True))
     assert facts["Sweep"] == wording.MADE_IN_THE_STUDIO
