@@ -18,7 +18,6 @@ import pytest
 from ballplate.cli import main
 from ballplate.results.fits import Fit
 from ballplate.simulator.computing.steps import ProgressStep
-from matplotlib.colors import to_hex
 
 from tests.extensions.sweeps.support import small_sweep
 
@@ -348,41 +347,10 @@ def test_residuals_in_space_are_drawn_as_seen() -> None:
     assert len(edges) == 12 and not axes.axison
 
 
-def test_reach_draws_what_was_tried() -> None:
-    found = bp.reach(QUICKSTART, "U6 average 0.2 um", "repeatability")
-    (answer,) = found.answers
-    for value, distance, is_met in answer.tried[:: max(len(answer.tried) // 4, 1)]:
-        again = bp.run(bp.quickstart().with_({"machine.repeatability": f"{value!r} m"}))
-        ratio = again.quantities["U6"].average / 0.2e-6
-        assert distance == pytest.approx(ratio, rel=1e-9) and is_met == (ratio <= 1.0)
-    (axes,) = found.plot().axes
-    drawn = np.concatenate([line.get_xdata() for line in axes.lines[1:3]])
-    assert sorted(drawn) == pytest.approx([1e6 * value for value, _, _ in answer.tried])
-
-
-def test_reliability_draws_every_reading() -> None:
-    found = bp.reliability(QUICKSTART)
-    biases, effects = found.plot().axes
-    drawn = np.concatenate([line.get_xdata() for line in biases.lines])
-    readings = [one for one in found.to_dict()["observations_by_name"] if one["kind"] == "reading"]
-    assert sorted(drawn) == pytest.approx(
-        sorted(1e6 * one["minimal_detectable"] for one in readings)
-    )
-    changed = np.concatenate([line.get_xdata() for line in effects.lines])
-    assert sorted(changed) == pytest.approx(
-        sorted(1e6 * one["effects"]["U6"]["change"] for one in readings)
-    )
-    assert [label.get_text() for label in biases.get_yticklabels()] == [
-        one.name for one in bp.quickstart().positions
-    ]
-    assert len({to_hex(line.get_color()) for line in biases.lines}) == 6
-
-
 def test_other_results_draw_themselves(tmp_path: Path) -> None:
     curve = bp.spline(TABLE, y="finish_error", points="12-32")
     for k, plot in enumerate(
         (
-            bp.lengths(QUICKSTART, "1 um", grid=3).plot,
             bp.map(MACHINE, grid=(2, 2, 2)).plot,
             bp.map(MACHINE, line="y = 300 mm, z = 200 mm").plot,
             bp.map(MACHINE, error="EXX").plot,

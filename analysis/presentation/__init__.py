@@ -63,7 +63,6 @@ if TYPE_CHECKING:
         round_number,
         save,
         scale_bar,
-        scaled_axis,
         sticks,
     )
     from .table import Block, Entry, Row, Table

@@ -188,23 +188,3 @@ def save(figure: Figure, path: str | Path | None, words: str) -> Figure:
         figure.savefig(whole, format=kind[1:], facecolor="white", dpi=200, metadata=metadata)
     write_file(path, whole.getvalue())
     return figure
-
-
-# Ratio of the largest to the smallest value above which an axis is logarithmic.
-WIDE = 20.0
-
-
-def scaled_axis(axes: Axes, values: Array, axis: str) -> None:
-    """Make an axis logarithmic for values of a wide range; otherwise start it at zero."""
-    numbers = values[np.isfinite(values)]
-    if not len(numbers):
-        return
-    if numbers.min() > 0.0 and numbers.max() > WIDE * numbers.min():
-        from matplotlib.ticker import NullLocator
-
-        (axes.set_xscale if axis == "x" else axes.set_yscale)("log")
-        along = axes.xaxis if axis == "x" else axes.yaxis
-        along.set_major_formatter("{x:g}")
-        along.set_minor_locator(NullLocator())
-    elif numbers.min() >= 0.0:
-        (axes.set_xlim if axis == "x" else axes.set_ylim)(0.0, None)

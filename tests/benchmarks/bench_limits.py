@@ -272,18 +272,6 @@ CASES = (
     ),
     Case("lengths, 4913 points", lambda folder: ["run", "--lengths", QUICKSTART, "--grid", "17"]),
     Case(
-        "lengths --pairs, 499,500 lengths",
-        lambda folder: [
-            "run",
-            "--lengths",
-            QUICKSTART,
-            "--grid",
-            "10",
-            "--pairs",
-            folder / "pairs.csv",
-        ],
-    ),
-    Case(
         "simulate, 2,000,000 readings",
         lambda folder: ["simulate", many_readings(folder, 8000), "-o", folder / "r.csv"],
     ),

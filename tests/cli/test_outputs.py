@@ -154,7 +154,7 @@ WALK = {
     ),
     "run --lengths": Walk(
         EXPERIMENT,
-        {"-o": "l.csv", "--pairs": "p.csv", "--plot": "l.svg"},
+        {"-o": "l.csv"},
         ("--grid", "3"),
         ("balls.csv",),
     ),
@@ -206,7 +206,7 @@ KINDS = [
     ("init", "NAME.yaml"),
     ("simulate", "-o"),
     ("fit", "--report"),
-    ("run --lengths", "--plot"),
+    ("map", "--plot"),
 ]
 KINDS += [("correct", "--covariance")]
 # Those that are read only where they are asked for, and not needed to walk through.
@@ -634,8 +634,8 @@ def test_capitals_make_no_other_file(
     files: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """There are disks that take none for different."""
-    paths = {"-o": tmp_path / "all.csv", "--pairs": tmp_path / "ALL.csv"}
-    refused(line("run --lengths", files, paths), capsys, 2, "are the same file; name another")
+    paths = {"-o": tmp_path / "all.csv", "--plot": tmp_path / "ALL.csv"}
+    refused(line("diff", files, paths), capsys, 2, "are the same file; name another")
 
 
 @pytest.mark.usefixtures("idle")
@@ -643,11 +643,11 @@ def test_every_reason_is_told_at_once(
     files: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     (tmp_path / "l.csv").write_text("old")
-    paths = {"-o": tmp_path / "l.csv", "--pairs": tmp_path / "none" / "p.csv"}
-    assert main(line("run --lengths", files, paths)) == 3
+    paths = {"-o": tmp_path / "l.csv", "--covariance": tmp_path / "none" / "p.csv"}
+    assert main(line("correct", files, paths)) == 3
     first, second = capsys.readouterr().err.splitlines()
     assert first.startswith(f"{paths['-o']}: exists already") and second.startswith(
-        f"{paths['--pairs']}: cannot be"
+        f"{paths['--covariance']}: cannot be"
     )
 
 

@@ -11,7 +11,6 @@ from ballplate.extensions.compensation import table_formats
 from ballplate.extensions.judgement import components
 from ballplate.extensions.maps import correction
 from ballplate.extensions.maps import length_map as lengths
-from ballplate.extensions.maps import lengths_command as lengths_command
 from ballplate.extensions.maps import volumetric_errors as volumetric
 from ballplate.extensions.reliability import remainders as leftover
 from ballplate.extensions.requirements import root_search as search
@@ -82,7 +81,6 @@ LIMITS = {
     "`reach`": (search.MOST_POINTS,),
     "`compensation` |": (table_formats.MOST_NODES, table_formats.MOST_GRID_NODES),
     "`run --lengths` |": (lengths.MOST_POINTS,),
-    "`run --lengths --pairs`": (lengths_command.MOST_PAIRS,),
     "`correct --covariance`": (correction.MOST_CO_ORDINATES,),
     "`map`": (volumetric.MOST_POINTS,),
     "`spline`": (read.MOST_POINTS, curve.MOST_COEFFICIENTS, curve_options.MOST_ORDER),

@@ -6,7 +6,6 @@ from collections.abc import Iterator, Sequence
 from math import comb, prod
 
 import numpy as np
-from ballplate.presentation import by_axis, table_csv
 from ballplate.simulator.computing import (
     ProgressStep,
     Report,
@@ -154,23 +153,6 @@ def length_pairs(
     at = linearise(lay_out(experiment))
     points = grid_points(at.design, settings.grid)
     return points, list(_tiles(at, points, settings))
-
-
-def pair_csv(experiment: Experiment, settings: LengthMapSettings) -> Iterator[str]:
-    """Yield one row per length; undetermined cells are empty."""
-    points, tiles = length_pairs(experiment, settings)
-    for k, tile in enumerate(tiles):
-        u = np.where(tile.is_open, np.nan, tile.uncertainties)
-        columns = {
-            **by_axis("{}1, mm", points[tile.first]),
-            **by_axis("{}2, mm", points[tile.second]),
-            "length, mm": tile.lengths,
-            "u, µm": u,
-            "expanded, µm": settings.coverage_factor * u,
-            "target, µm": settings.target.at(tile.lengths),
-        }
-        # The headings stand above the first lengths alone.
-        yield from table_csv(columns)[int(k > 0) :]
 
 
 def _tiles(at: Linearisation, points: Array, settings: LengthMapSettings) -> Iterator[PairTile]:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -25,10 +24,9 @@ from ballplate.simulator.computing import comparable
 from ballplate.simulator.machines import Array
 
 from .length_groups import GroupedLengths, LengthGroups, target_words
-from .length_plots import draw_lengths
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+    pass
 
 # What of a group says of which lengths it is.
 HEADS = ("from", "to", "direction", "point")
@@ -143,16 +141,6 @@ class LengthMap(GroupedLengths, Result):
                 rows.append({"group": group.replace("_", " "), "of": name(row), **cells})
         lengths = {"average": "average, µm", "maximum": "maximum, µm"}
         return {lengths.get(name, name): name for name in rows[0]}, rows
-
-    def plot(self, path: str | Path | None = None) -> Figure:
-        """The largest ratio of u to the target at each point, and u over the length.
-
-        With a path, which ends in .svg, .png or .pdf, the picture is written as well.
-
-        :raises ImportError: matplotlib is missing.
-        :raises ValueError: the path ends in something else.
-        """
-        return draw_lengths(self, path)
 
 
 def _share(groups: LengthGroups, expanded: bool) -> str:

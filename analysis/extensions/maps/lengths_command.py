@@ -2,19 +2,14 @@
 
 from __future__ import annotations
 
-import math
 from argparse import ArgumentParser, ArgumentTypeError, Namespace
-from collections.abc import Iterable
-from pathlib import Path
 
 from ballplate.cli import (
     UsageError,
-    Writer,
     add_file,
     add_force,
     add_json,
     add_output,
-    add_picture,
     coverage_factor,
     grid,
     show,
@@ -22,10 +17,6 @@ from ballplate.cli import (
     text_writer,
     write,
 )
-
-# Lines of a table of all lengths.
-MOST_PAIRS = 500_000
-
 
 DESCRIPTION = (
     "Compute the standard uncertainty u of the length between every two points of a"
@@ -74,8 +65,6 @@ def add_options(parser: ArgumentParser) -> None:
         help="include the repeatability of both readings of a length",
     )
     add_output(parser, "-o", "--output", metavar="FILE", help="write one row per point of the grid")
-    add_output(parser, "--pairs", metavar="FILE", help="write one row per length")
-    add_picture(parser, "--plot", help="draw slices through the volume, and u against the length")
     add_force(parser)
     add_json(parser)
 
@@ -93,7 +82,7 @@ def run(options: Namespace) -> int:
     """Print the tables, write and draw the files; return 1 if the rank is unexpected."""
     from ballplate.cli import progress
 
-    from .length_map import length_map, length_settings, pair_csv
+    from .length_map import length_map, length_settings
     from .length_tables import point_csv
 
     experiment = single(options)
@@ -108,24 +97,16 @@ def run(options: Namespace) -> int:
         )
     except ValueError as error:
         raise UsageError(error) from None
-    count = math.comb(math.prod(settings.grid), 2)
-    if options.pairs is not None and count > MOST_PAIRS:
-        raise UsageError(
-            f"{count} lengths are too many for --pairs; at most {MOST_PAIRS} are possible: make"
-            " --grid coarser"
-        )
     with progress(options) as shown:
         lengths = length_map(experiment, settings, shown.show)
-    contents: dict[Path | None, Writer] = {
-        options.output: _of_lines(point_csv(lengths)),
-        options.pairs: _of_lines(pair_csv(experiment, settings)),
-        options.plot: lengths.plot,
-    }
-    write(options, contents)
+    write(
+        options,
+        {
+            options.output: text_writer(
+                lambda stream: stream.writelines(f"{line}\n" for line in point_csv(lengths))
+            )
+        },
+    )
     show(options, lengths)
     is_missed = options.fail and not lengths.is_met
     return 0 if lengths.as_expected and not is_missed else 1
-
-
-def _of_lines(lines: Iterable[str]) -> Writer:
-    return text_writer(lambda stream: stream.writelines(f"{line}\n" for line in lines))

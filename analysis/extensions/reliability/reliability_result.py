@@ -6,7 +6,6 @@ import math
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from pathlib import Path
 from typing import TYPE_CHECKING, TextIO
 
 import numpy as np
@@ -31,10 +30,9 @@ from ballplate.uncertainty import QUANTITIES
 from .bias_patterns import DRIFTS, Patterns, single_kinds
 from .effects import MOST_PLACES, across_probes
 from .names import name
-from .rows_picture import RowOfPoints, draw_rows
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+    pass
 
 # Effects below this share of the bias, in metres per unit, are neglected.
 NO_EFFECT = 1e-6
@@ -160,36 +158,6 @@ class Reliability(Result):
             names = ("name", "kind", "redundancy", "minimal_detectable", "found_by_fit", "unit")
             rows.append({name.replace("_", " "): bias.get(name) for name in names} | changes)
         return rows
-
-    def plot(self, path: str | Path | None = None) -> Figure:
-        """Plot the minimal detectable biases of readings, and their effects on U6, by position.
-
-        A path, which ends in .svg, .png or .pdf, saves the picture.
-
-        :raises ImportError: matplotlib is missing.
-        :raises ValueError: another ending, or no readings of plates.
-        """
-        readings = self.patterns.of_kind("reading")
-        if not len(readings):
-            raise ValueError("no readings of plates to draw")
-        design = self.design
-        position = design.readings.position[self.patterns.subject[readings]]
-        panels = [
-            (
-                name,
-                [
-                    RowOfPoints(design.positions.names[k], biases_there[np.isfinite(biases_there)])
-                    for k in np.unique(position)
-                    for biases_there in [1e6 * values[readings[position == k]]]
-                ],
-            )
-            for name, values in (
-                ("minimal detectable bias of a reading, µm", self.minimal_detectable),
-                ("its largest effect on U6, µm", _effect(self, "U6")),
-            )
-        ]
-        words = f"{self.title}: minimal detectable biases of readings, and their effects on U6"
-        return draw_rows(panels, words, path)
 
     @cached_property
     def found_by_fit(self) -> Array:

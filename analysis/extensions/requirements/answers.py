@@ -2,19 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-from pathlib import Path
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal
 
-import numpy as np
 from ballplate.presentation import Data, Result, table_lines
 
 from .goals import Goal, Judgement
-from .tried_values_picture import TriedValues, draw_tried
 from .unknowns import UnknownName
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+    pass
 
 
 @dataclass(frozen=True)
@@ -23,10 +20,9 @@ class Answer:
 
     `status`: `found`, with the next value, `beside`, insufficient; `any` value tried suffices;
     `none` does; the rank remains `undetermined` with each; or the unknown cannot be `varied`.
-    `words` and `value` (metres, the `unit` of an uncertainty that is not a length, or a number)
+    `words` and `value` (metres, the unit of an uncertainty that is not a length, or a number)
     are the value needed, otherwise the nearest, or the last tried; `outcome` is its prediction.
-    `remarks` describe the range. `tried` are the values, each with its distance from the goal and
-    whether it meets it.
+    `remarks` describe the range.
     """
 
     name: UnknownName
@@ -39,8 +35,6 @@ class Answer:
     outcome: str = ""
     beside: str = ""
     remarks: tuple[str, ...] = ()
-    tried: tuple[tuple[float, float, bool], ...] = field(default=(), repr=False)
-    unit: str = "m"
 
     @property
     def is_met(self) -> bool:
@@ -108,36 +102,6 @@ class Reach(Result):
     def rows(self) -> list[Data]:
         """One row for each unknown."""
         return [{"unknown": answer.name, **_answer_data(answer)} for answer in self.answers]
-
-    def plot(self, path: str | Path | None = None) -> Figure:
-        """Draw the distance from the goal by the values tried of each unknown.
-
-        With a path, which ends in .svg, .png or .pdf, the picture is written as well.
-
-        :raises ImportError: matplotlib is missing.
-        :raises ValueError: the path has another suffix, or no values were tried.
-        """
-        panels = [_panel(answer) for answer in self.answers if answer.tried]
-        if not panels:
-            raise ValueError("the search tried no value, so there is no curve to draw")
-        goal, limit = self.goal, 1.0
-        axis = "largest of targets" if goal.kind == "tasks" else f"{goal.symbol} over the goal"
-        if goal.kind == "lengths":
-            axis, limit = "share not within", 1.0 - goal.share
-        return draw_tried(panels, axis, limit, f"{self.title}: values tried for {goal}", path)
-
-
-def _panel(answer: Answer) -> TriedValues:
-    """Panel of an unknown: uncertainties in millionths of their unit, sizes of plates in
-    millimetres.
-    """
-    unit, factor = {
-        "repeatability": ("µm", 1e6),
-        "certificate": (f"µ{answer.unit}", 1e6),
-        "size": ("mm", 1e3),
-    }.get(answer.name, ("", 1.0))
-    values, distances, is_met = (np.array(column) for column in zip(*answer.tried, strict=True))
-    return TriedValues(answer.title, unit, factor * values, distances, is_met)
 
 
 def _answer_data(answer: Answer) -> Data:

@@ -137,22 +137,6 @@ class _Trials:
             return Tried(words, None, 0, f"{first.path}: {first.text}")
         return Tried(words, judge(self.searched.goal, uncertainty), uncertainty.deficiency, "")
 
-    @property
-    def tried(self) -> tuple[tuple[float, float, bool], ...]:
-        """Values that have one, in ascending order, with how far from the goal each is and whether
-        it meets it.
-        """
-        judged = ((self.one.value(step), tried.judgement) for step, tried in self.known.items())
-        return tuple(
-            sorted(
-                (value, uncertainty.distance, uncertainty.is_met)
-                for value, uncertainty in judged
-                if value is not None
-                and uncertainty is not None
-                and np.isfinite(uncertainty.distance)
-            )
-        )
-
     def judgement(self, step: int) -> Judgement:
         """Return the judgement with a value for which the file is valid."""
         reached = self.at(step).judgement
@@ -184,8 +168,7 @@ def _answer(unknown: Unknown, searched: _Searched, present: Judgement, deficienc
         reason = f"rank deficiency {deficiency} leaves {subject} undetermined with any value"
         return _without_value(unknown, "undetermined", reason)
     trials = _Trials(unknown, searched)
-    answers = _monotone(trials, deficiency) if unknown.is_monotone else _scanned(trials)
-    return replace(answers, tried=trials.tried, unit=unknown.unit)
+    return _monotone(trials, deficiency) if unknown.is_monotone else _scanned(trials)
 
 
 def _without_value(

@@ -198,11 +198,9 @@ def test_classes() -> None:
 
 def test_the_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     experiment_of(tmp_path)
-    file, points, pairs = (
-        str(tmp_path / name) for name in ("design.yaml", "points.csv", "pairs.csv")
-    )
+    file, points = (str(tmp_path / name) for name in ("design.yaml", "points.csv"))
     limits = ["--target", "0.1 um + L/10000000", "--grid", "3,2,3", "--coverage-factor", "1.5"]
-    assert main(["run", "--lengths", file, *limits, "-o", points, "--pairs", pairs]) == 0
+    assert main(["run", "--lengths", file, *limits, "-o", points]) == 0
     out, err = capsys.readouterr()
     assert err == "" and wording.LENGTHS_BETWEEN_POINTS in out
     assert (
@@ -218,11 +216,6 @@ def test_the_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None
     np.testing.assert_allclose(
         [float(row["share_within"]) for row in rows], found.by_point.share(), rtol=1e-9
     )
-    with open(pairs, encoding="utf-8") as stream:
-        rows = list(csv.DictReader(stream))
-    assert len(rows) == 153
-    within = sum(float(row["u_um"]) <= float(row["target_um"]) for row in rows)
-    assert within == found.whole.within[0]
     assert all(float(row["expanded_um"]) == pytest.approx(1.5 * float(row["u_um"])) for row in rows)
     assert main(["run", "--lengths", file, *limits, "--json"]) == 0
     data = json.loads(capsys.readouterr().out)
@@ -254,35 +247,8 @@ def test_wrong_usage(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None
             "the grid has 2 numbers, but the experiment has 3 dimensions",
         ),
         (["--target", "1 um", "--grid", "20"], "a grid of 8000 points is too fine"),
-        (
-            ["--target", "1 um", "--grid", "11", "--pairs", f"{file}.csv"],
-            "885115 lengths are too many for --pairs",
-        ),
         (["--target", "1 um", "--probe", "dwon"], 'unknown probe "dwon"; did you mean "down"?'),
         (["--target", "1 um", "-o", file], "which is read; name another"),
     ):
         assert main(["run", "--lengths", file, *options]) == 2
         assert told in capsys.readouterr().err
-
-
-@pytest.mark.parametrize("grid", ["4", "3,3,2"])
-def test_the_picture(tmp_path: Path, grid: str) -> None:
-    pytest.importorskip("matplotlib")
-    experiment_of(tmp_path)
-    picture = tmp_path / "lengths.svg"
-    assert (
-        main(
-            [
-                "run",
-                "--lengths",
-                str(tmp_path / "design.yaml"),
-                "--grid",
-                grid,
-                "--plot",
-                str(picture),
-            ]
-        )
-        == 0
-    )
-    text = picture.read_text(encoding="utf-8")
-    assert wording.WITHIN_IT_FOR_OF_THE_LENGTHS in text
