@@ -116,7 +116,7 @@ def add_options(parser: ArgumentParser) -> None:
         "--sheet",
         metavar="FILE",
         type=_sheet_name,
-        help="write the run sheet: .html to print, .md, .csv or .txt",
+        help="write the run sheet: .html to print, or .txt",
     )
     output.add_argument(
         "--curve", action="store_true", help="plan for smaller and larger budgets as well"

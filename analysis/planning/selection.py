@@ -94,7 +94,7 @@ class Campaign(Selection, Result):
         )
 
     def sheet_text(self, form: str = ".txt") -> str:
-        """The run sheet as .html to print, .md, .csv or .txt.
+        """The run sheet as .html to print, or .txt.
 
         :raises ValueError: another form.
         """

@@ -38,7 +38,7 @@ PLAN = (
     "-o",
     "choice.yaml",
     "--sheet",
-    "sheet.csv",
+    "sheet.txt",
 )
 TRIALS = ("run", DESIGNS / "npl/6.2.7.yaml", "--trials", "1000000")
 
@@ -97,7 +97,7 @@ ENDING = {
 }
 OUTPUTS = (
     "choice.yaml",
-    "sheet.csv",
+    "sheet.txt",
     "page.html",
     "table.csv",
     "points.csv",

@@ -22,11 +22,9 @@ from ballplate.simulator.experiment import Candidate, ChangeTimes, Experiment, P
 from ballplate.simulator.inputs import length_text, refused, to_python
 
 from .reading_lists import planned_readings, points_csv, points_dmis, template_csv
-from .sheet_forms import sheet_csv, sheet_markdown, sheet_text
+from .sheet_forms import sheet_text
 from .sheet_head import offsets
 from .sheet_page import sheet_page
-
-FORMS = (".html", ".md", ".csv", ".txt")
 
 
 @dataclass(frozen=True, repr=False, eq=False)
@@ -58,20 +56,16 @@ class Sheet(Result):
         return list(sheet_data(self.sheet)["steps"])
 
     def text(self, form: str = ".txt") -> str:
-        """The run sheet as .html to print, .md, .csv or .txt.
+        """The run sheet as .html to print, or .txt.
 
         :raises ValueError: another form.
         """
         sheet, experiment = self.sheet, self.experiment
         if form == ".html":
             return sheet_page(sheet, experiment, experiment.title)
-        if form == ".md":
-            return sheet_markdown(sheet, experiment, experiment.title)
-        if form == ".csv":
-            return sheet_csv(sheet)
         if form == ".txt":
             return sheet_text(sheet, experiment, experiment.title)
-        raise ValueError(f'"{form}" is no form of a run sheet; give .html, .md, .csv or .txt')
+        raise ValueError(f'"{form}" is no form of a run sheet; give .html or .txt')
 
     def template(self) -> str:
         """Return the CSV file of readings in order with empty cells, for `fit`."""

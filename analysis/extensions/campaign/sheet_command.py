@@ -17,7 +17,7 @@ from ballplate.cli import (
     write_noted,
 )
 
-SHEETS, DMIS, POINTS = (".html", ".md", ".csv", ".txt"), (".dmi", ".dmis"), (".csv",)
+SHEETS, DMIS, POINTS = (".html", ".txt"), (".dmi", ".dmis"), (".csv",)
 
 DESCRIPTION = (
     "Write what goes to the laboratory with a design: a run sheet to print and tick off, a CSV"
@@ -35,7 +35,7 @@ def add_options(parser: ArgumentParser) -> None:
         "--output",
         metavar="FILE",
         type=sheet_name,
-        help="write the run sheet: .html to print, .md, .csv or .txt",
+        help="write the run sheet: .html to print, or .txt",
     )
     add_output(
         parser,

@@ -11,7 +11,6 @@ from .formats.report import Format
 
 POINTS = frozenset(("feature", "nominal_x"))
 CERTIFICATE = frozenset(("item", "first", "second", "value"))
-RUN_SHEET = frozenset(("step", "set_up", "balls", "readings"))
 
 
 def what_it_is(source: GivenText) -> str:
@@ -24,11 +23,6 @@ def what_it_is(source: GivenText) -> str:
         )
     if names >= CERTIFICATE:
         return "these are values of certificates, not readings; give them with --certificate"
-    if names >= RUN_SHEET:
-        return (
-            "this is a run sheet, and has no readings; ballplate sheet --readings writes the table"
-            " to fill in"
-        )
     form = recognised(source.text)
     if form is None:
         return ""

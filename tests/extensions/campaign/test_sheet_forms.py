@@ -1,9 +1,7 @@
-"""Run sheets as text, CSV, Markdown and a page."""
+"""Run sheets as text and as a page."""
 
 from __future__ import annotations
 
-import csv
-import io
 from html.parser import HTMLParser
 from itertools import combinations
 from pathlib import Path
@@ -12,11 +10,6 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 from ballplate.extensions.campaign.drawings import MARGIN, SIZE, place_drawing
-from ballplate.extensions.campaign.sheet_forms import (
-    COLUMNS,
-    sheet_csv,
-    sheet_markdown,
-)
 from ballplate.extensions.campaign.sheet_page import sheet_page
 from ballplate.planning.run_sheet_tables import sheet_data, sheet_lines, summary
 from ballplate.planning.schedule import RunSheet, run_sheet
@@ -59,24 +52,6 @@ def test_lines(sheet: RunSheet) -> None:
     assert lines[-2] == wording.CALIBRATION_BETTER_SIDES
     assert lines[-1] == summary(sheet)
     assert wording.POSITION_DONE_BEFORE in lines[-1]
-
-
-def test_csv_has_minutes_as_numbers(sheet: RunSheet) -> None:
-    rows = list(csv.DictReader(io.StringIO(sheet_csv(sheet))))
-    assert tuple(rows[0]) == COLUMNS
-    assert [row["name"] for row in rows] == [*(step.name for step in sheet.steps), "better sides"]
-    minutes = sum(float(row["minutes"]) + float(row["change_min"]) for row in rows)
-    assert minutes == pytest.approx(60 * sheet.hours, rel=1e-9)
-
-
-def test_markdown_escapes_what_would_break_a_table(sheet: RunSheet, experiment: Experiment) -> None:
-    text = sheet_markdown(sheet, experiment, "a | b\nc")
-    assert text.startswith("# a \\| b\\\\x0ac\n")
-    tables = [block.splitlines() for block in text.split("\n\n") if block.startswith("| ")]
-    for rows in tables:
-        assert len({line.replace("\\|", "").count("|") for line in rows}) == 1
-    # A line of headings and one of dashes.
-    assert 2 + len(sheet.steps) in [len(rows) for rows in tables]
 
 
 def test_data(sheet: RunSheet) -> None:

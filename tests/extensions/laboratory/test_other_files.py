@@ -47,8 +47,8 @@ def test_what_was_done_of_a_plan_is_told_by_tables(
 def test_what_sheet_writes_holds_no_readings(
     capsys: pytest.CaptureFixture[str], tmp_path: Path, separator: str
 ) -> None:
-    made = {name: tmp_path / name for name in ("empty.csv", "points.csv", "run.csv", "p.dmi")}
-    sheet = ["sheet", DESIGN, "-o", str(made["run.csv"]), "--readings", str(made["empty.csv"])]
+    made = {name: tmp_path / name for name in ("empty.csv", "points.csv", "p.dmi")}
+    sheet = ["sheet", DESIGN, "--readings", str(made["empty.csv"])]
     assert main([*sheet, "--points", str(made["points.csv"])]) == 0
     program = ["sheet", DESIGN, "--points", str(made["p.dmi"]), "--ball-diameter", "22 mm"]
     assert main(program) == 0
@@ -56,7 +56,6 @@ def test_what_sheet_writes_holds_no_readings(
         made[name].write_text(made[name].read_text().replace(",", separator))
     assert wording.NOTHING_IS_FILLED in refusal(capsys, made["empty.csv"])
     assert wording.TABLE_OF_THE_NOMINAL_CENTRES in refusal(capsys, made["points.csv"])
-    assert "this is a run sheet" in refusal(capsys, made["run.csv"])
     assert wording.THIS_IS_A_DMIS in refusal(capsys, made["p.dmi"])
 
 
