@@ -58,13 +58,10 @@ class Box:
 
 @dataclass(frozen=True, eq=False)
 class Scene:
-    """A projected design, in metres: the volume, positions, rear first, and the probes' tips about
-    the reference point.
-    """
+    """A projected design, in metres: the volume and positions, rear first."""
 
     box: Box
     places: tuple[DrawnPosition, ...]
-    tips: tuple[tuple[str, Array], ...]
 
     @property
     def is_named(self) -> bool:
@@ -109,11 +106,7 @@ def scene(design: Design) -> Scene:
             )
         )
     places.sort(key=lambda place: -place.depth)
-    tips = tuple(
-        (name, view @ offset)
-        for name, offset in zip(design.probes.names, design.probes.offsets, strict=True)
-    )
-    return Scene(box(volume.lower, volume.upper), tuple(places), tips)
+    return Scene(box(volume.lower, volume.upper), tuple(places))
 
 
 def box(lower: Array, upper: Array) -> Box:

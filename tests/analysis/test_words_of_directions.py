@@ -7,7 +7,7 @@ from itertools import product
 
 import numpy as np
 import pytest
-from ballplate.extensions.repair.proposed_bars import bar_directions
+from ballplate.extensions.repair.placing import bars
 from ballplate.rank.verdicts import deformation, shape
 
 from tests.analysis import wording
@@ -139,9 +139,9 @@ def test_the_shape_of_a_curve_is_the_degree_that_describes_it(degree: int) -> No
 @pytest.mark.parametrize("d", [2, 3])
 def test_bars_lie_along_all_neighbours_in_a_cube(d: int) -> None:
     """Axes and diagonals, each once whatever its sign, and the words say which."""
-    every = list(bar_directions(d))
+    every = list(bars(d))
     found = set()
-    for _, words, (u,) in every:
+    for words, u in every:
         assert np.linalg.norm(u) == pytest.approx(1.0)
         whole = np.round(u / np.abs(u).max())
         np.testing.assert_allclose(whole / np.linalg.norm(whole), u, atol=1e-12)
@@ -155,8 +155,8 @@ def test_bars_lie_along_all_neighbours_in_a_cube(d: int) -> None:
 def in_words(words: str, d: int) -> np.ndarray:
     """The direction (d,) that words give, of length one."""
     axes = np.eye(d)
-    if words in tuple("xyz"):
-        return axes["xyz".index(words)]
+    if words.removeprefix("along ") in tuple("xyz"):
+        return axes["xyz".index(words[-1])]
     if plane := re.fullmatch(r"in the (.)(.) plane at (-?\d+) deg", words):
         angle = np.radians(float(plane[3]))
         first, second = (axes["xyz".index(one)] for one in plane.groups()[:2])

@@ -19,9 +19,11 @@ from ballplate.simulator.geometry import without_rigid_motion
 from ballplate.simulator.inputs import listed
 from ballplate.simulator.machines import Array
 
-from .proposed_bars import MISSING, bars_to_add
-
 AXES = "xyz"
+
+# Singular values below this fraction of the largest: what readings tell of a direction through
+# their own scatter only.
+MISSING = 1e-3
 
 
 def bar_reasons(design: Design, layout: SharedLayout, open_: Array) -> tuple[str, ...]:
@@ -44,11 +46,10 @@ def bar_reasons(design: Design, layout: SharedLayout, open_: Array) -> tuple[str
             " until one is calibrated"
         )
     unseen = _less(strains, overall) if is_free else strains
-    missing = _what_is_missing(design, strains, unseen) if unseen.shape[1] else ""
+    missing = _what_is_missing(design, strains) if unseen.shape[1] else ""
     if missing:
         lines = _told(strains, design.dimension, is_free)
-        cure = bars_to_add(design, strains, overall if is_free else None)
-        reasons.append(f"{missing}: nothing determines {lines}{f'; {cure}' if cure else ''}")
+        reasons.append(f"{missing}: nothing determines {lines}")
     return tuple(reasons)
 
 
@@ -77,12 +78,9 @@ def _open_strains(design: Design, layout: SharedLayout, open_: Array) -> Array:
     return _null_space(unspanned, float(np.linalg.norm(strain, 2)))
 
 
-def _what_is_missing(design: Design, strains: Array, unseen: Array) -> str:
+def _what_is_missing(design: Design, strains: Array) -> str:
     """Return the common property of all directions that leaves strains undetermined, or an empty
     text if there is another reason.
-
-    `unseen` is the undetermined strain space without the overall scale of a machine whose lengths
-    are all unknown.
     """
     lengths, d = design.of(Lengths), design.dimension
     position = design.readings.position[lengths.first]
@@ -108,35 +106,8 @@ def _what_is_missing(design: Design, strains: Array, unseen: Array) -> str:
         return f"{subject} lies along {_axis(np.linalg.svd(directions)[2][0])}"
     if with_plates:
         return ""
-    if unseen.shape[1] == 1:
-        # With an unknown length the form need not be zero, only the same.
-        form = _matrix(unseen[:, 0], d)
-        values = np.einsum("mi,ij,mj->m", lengths.direction, form, lengths.direction)
-        if np.ptp(values) < MISSING:
-            who = "every direction of the bar" if lengths.to_pivot.any() else "every bar"
-            return f"{who} {_quadric(form - values.mean() * np.eye(d))}"
     who = "locations of the ball" if only_gauges else "bars' directions"
     return f"the {who} are too few or too similar"
-
-
-def _quadric(form: Array) -> str:
-    """Words for directions u with u' `form` u = 0."""
-    values, vectors = np.linalg.eigh(form)
-    size = np.abs(values).max()
-    small = np.abs(values) < MISSING * size
-    if small.sum() == 1 and len(values) == 3:
-        high, low = np.argmax(values), np.argmin(values)
-        parts = [np.sqrt(values[high]) * vectors[:, high], np.sqrt(-values[low]) * vectors[:, low]]
-        planes = sorted(
-            _plane(n / np.linalg.norm(n)) for n in (parts[0] + parts[1], parts[0] - parts[1])
-        )
-        return f"lies parallel to {planes[0]} or {planes[1]}"
-    for i in range(len(values)):
-        remaining_values = np.delete(values, i)
-        if len(values) == 3 and abs(remaining_values[0] - remaining_values[1]) < MISSING * size:
-            angle = np.degrees(np.arctan(np.sqrt(-values[i] / remaining_values[0])))
-            return f"is at {angle:.3g} deg to {_axis(vectors[:, i])}"
-    return "lies on one cone"
 
 
 def _told(strains: Array, d: int, without_one: bool) -> str:

@@ -3,18 +3,26 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from itertools import combinations
 
 import numpy as np
 from ballplate.simulator.experiment import Experiment
 from ballplate.simulator.geometry import BallLayout
 from ballplate.simulator.machines import Array
 
-from .proposed_bars import bar_directions
-
 
 def bars(d: int) -> Iterator[tuple[str, Array]]:
-    for kind, description, along in bar_directions(d):
-        yield f"{kind} {description}".strip(), along[0]
+    """Words and directions (d,): along axes, diagonals of planes, diagonals of space."""
+    axes = np.eye(d)
+    for k in range(d):
+        yield f"along {'xyz'[k]}", axes[k]
+    for sign, angle in ((1, "45"), (-1, "-45")):
+        for i, j in combinations(range(d), 2):
+            plane = f"in the {'xyz'[i]}{'xyz'[j]} plane at {angle} deg"
+            yield plane, (axes[i] + sign * axes[j]) / np.sqrt(2.0)
+    for signs in ((1, 1), (-1, 1), (1, -1), (-1, -1)) if d == 3 else ():
+        words = f"along the diagonal ({signs[0]}, {signs[1]}, 1)"
+        yield words, np.array([*signs, 1.0]) / np.sqrt(3.0)
 
 
 def along_rotation(direction: Array) -> Array:

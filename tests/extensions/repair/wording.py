@@ -12,15 +12,9 @@ ESTIMATE_COEFFICIENT_OF_ROTATIONAL = "estimate 1 coefficient of rotational"
 EVEN_ALL_CANDIDATES_TOGETHER_LEAVE_DIRECTIONS = (
     "even all 8 candidates together leave 2 directions undetermined (EAZ, ECZ, EYZ)"
 )
-EVERY_BAR_IS_AT_DEG = "every bar is at 60 deg to z"
-EVERY_BAR_IS_AT_DEG_TO_NOTHING = (
-    "every bar is at 60 deg to z: nothing determines a combination of the scale of X, the "
-    "scale of Y and the scale of Z; add for example a bar along x"
-)
 EVERY_BAR_LIES_PARALLEL = (
     "every bar lies parallel to the xy plane: nothing determines the squareness of Z to X "
-    "and Z to Y; add for example a bar in the xz plane at 45 deg and one in the yz plane "
-    "at 45 deg"
+    "and Z to Y"
 )
 EVERY_BAR_LIES_PARALLEL_TO_THE_PLANE = (
     "every bar lies parallel to the plane perpendicular to (0.707, -0.707, 0): nothing "
@@ -28,19 +22,13 @@ EVERY_BAR_LIES_PARALLEL_TO_THE_PLANE = (
 )
 EVERY_BAR_LIES_PARALLEL_TO_THE_XZ = (
     "every bar lies parallel to the xz plane: nothing determines the scale of Y nor its "
-    "squareness to X and Z; add for"
+    "squareness to X and Z"
 )
-EVERY_DIRECTION_OF_THE_BAR_LIES = "every direction of the bar lies parallel to the "
 FULL_RANK_AND_NOTHING_IS_WEAKLY = "full rank, and no weak direction; average U6 0.2"
 HOLDING_THE_OTHERS_AT_ZERO = "holding the others at zero"
-NOTHING_DETERMINES_THE_SCALE = "nothing determines the scale of Z; add for example a bar along z"
 NOTHING_DETERMINES_THE_SCALE_OF_NOR = (
     "nothing determines the scale of Y nor its squareness to X and Z nor a combination of "
-    "the scale of X and the scale of Z;"
-)
-NOTHING_DETERMINES_THE_SQUARENESS = (
-    ": nothing determines the squareness of Y to X; read the ball for example all round "
-    "at an elevation of"
+    "the scale of X and the scale of Z"
 )
 NO_CHANGES_WERE_FOUND = "no changes were found"
 NO_CHANGES_WERE_FOUND_THAT_DETERMINE = "repair: no changes were found that determine everything; "

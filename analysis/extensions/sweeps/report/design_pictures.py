@@ -1,4 +1,4 @@
-"""Pictures of a design as elements of a sweep's page: positions, tips, error map."""
+"""Pictures of a design as elements of a sweep's page: positions, error map."""
 
 from __future__ import annotations
 
@@ -15,13 +15,11 @@ from ballplate.presentation import (
     SERIES,
     WIDTH,
     Scene,
-    blank_axes,
     drawing,
     number,
     placed_axes,
     scene_figure,
 )
-from ballplate.simulator.machines import Array
 
 from ..error_map_uncertainty import ErrorMap, Slice
 
@@ -83,42 +81,6 @@ def as_svg(figure: Figure, name: str, words: str) -> Html:
 def scene_svg(drawn: Scene, name: str, words: str) -> Html:
     """Return the volume with its positions."""
     with scene_figure(drawn) as figure:
-        return as_svg(figure, name, words)
-
-
-def probes_svg(drawn: Scene, name: str, words: str) -> Html:
-    """Return the tips about the reference point, enlarged."""
-    with drawing(200.0) as figure:
-        axes = blank_axes(figure)
-        size = max(float(np.abs(tip).max()) for _, tip in drawn.tips) or 1.0
-        axes.plot(0.0, 0.0, color=INK, marker="s", markersize=6.0)
-        groups: list[tuple[Array, list[str]]] = []
-        for probe, tip in drawn.tips:
-            names_there = next(
-                (names for centre, names in groups if np.abs(centre - tip).max() < 0.02 * size),
-                None,
-            )
-            if names_there is None:
-                groups.append((tip, [probe]))
-            else:
-                names_there.append(probe)
-        for tip, names in groups:
-            axes.plot([0.0, tip[0]], [0.0, tip[1]], color=INK, linewidth=1.4)
-            axes.plot(*tip, color=INK, marker="o", markersize=8.0, markerfacecolor=PAPER)
-            away = tip / np.linalg.norm(tip) if np.linalg.norm(tip) > 0 else np.array([0.0, 1.0])
-            side = "left" if away[0] > 0.3 else "right" if away[0] < -0.3 else "center"
-            height = "bottom" if away[1] > 0.5 else "top" if away[1] < -0.5 else "center"
-            text = ", ".join(names[:4]) + (f" and {len(names) - 4} more" if len(names) > 4 else "")
-            axes.annotate(
-                text,
-                (tip[0], tip[1]),
-                (9.0 * away[0], 9.0 * away[1]),
-                textcoords="offset points",
-                ha=side,
-                va=height,
-            )
-        axes.set_xlim(-2.2 * size, 2.2 * size)
-        axes.set_ylim(-1.5 * size, 1.3 * size)
         return as_svg(figure, name, words)
 
 

@@ -25,7 +25,6 @@ from ballplate.presentation import (
 )
 from ballplate.simulator.computing import Report, counted, unreported
 from ballplate.simulator.experiment import Experiment, lay_out
-from ballplate.simulator.inputs import listing
 from ballplate.uncertainty import DESCRIPTIONS
 
 from ..error_map_uncertainty import error_map
@@ -33,7 +32,7 @@ from ..store import Store
 from ..store_columns import symbol_column
 from .answer import answer
 from .cells import NoExperimentError, experiments
-from .design_pictures import probes_svg, scene_svg, slice_svg, slice_words
+from .design_pictures import scene_svg, slice_svg, slice_words
 from .heatmaps import heat_maps
 from .page_elements import groups_element, heat_element, table_element
 from .plots import plot_svg
@@ -246,7 +245,7 @@ def _designs(
 
 
 def _drawn_design(experiment: Experiment, cell: int, k: int) -> Html:
-    """Return the picture of a cell's design, its probes, and the positions as a table."""
+    """Return the picture of a cell's design, and the positions as a table."""
     design = lay_out(experiment)
     drawn = scene(design)
     sizes = " x ".join(f"{1000 * size:.6g}" for size in design.machine.volume.size)
@@ -259,14 +258,10 @@ def _drawn_design(experiment: Experiment, cell: int, k: int) -> Html:
         caption += " Positions are numbered as in the table."
     if any(place.read > MOST_BALLS for place in drawn.places):
         caption += " Only some of the balls are drawn."
-    pictures = [figure(caption, scene_svg(drawn, f"scene{k}", words))]
-    if any(tip.any() for _, tip in drawn.tips):
-        words = f"Tips of the probes {listing(experiment.probes)}"
-        caption = "The probes' tips (circles) about the reference point (square), enlarged."
-        pictures.append(figure(caption, probes_svg(drawn, f"probes{k}", words)))
+    picture = figure(caption, scene_svg(drawn, f"scene{k}", words))
     positions = table_element(_positions(drawn, cell))
     is_open = len(drawn.places) <= MOST_POSITIONS
-    return joined([figures(*pictures), folded("List of positions", positions, is_open=is_open)])
+    return joined([figures(picture), folded("List of positions", positions, is_open=is_open)])
 
 
 def _positions(drawn: Scene, cell: int) -> Table:
