@@ -354,20 +354,14 @@ def compare(
     across_probes: bool = False,
     seed: int | None = None,
     points: int = 200,
-    published_rms: str | None = None,
-    published_maximum: str | None = None,
     report: Report = unreported,
 ) -> EstimatorComparison:
     """Return the differences between distances corrected by another estimator and by the full one,
     and of both from the true machine's, on synthetic data sets.
 
-    `published` values, as texts with a unit, are ranked among the differences.
-
     >>> compare(quickstart(), trials=2, points=10).failed
     ()
     """
-    from ballplate.simulator.inputs.quantities import QuantityError, parse_length
-
     from .estimators.distances import MOST_POINTS, compare_estimators
     from .montecarlo.trial_runs import MOST_TRIALS
 
@@ -377,16 +371,7 @@ def compare(
     ensure_whole(1, MOST_TRIALS, trials=trials)
     ensure_whole(0, seed=seed)
     ensure_whole(1, MOST_POINTS, points=points)
-    texts = {"published_rms": published_rms, "published_maximum": published_maximum}
-    ensure_type(str, "a length with a unit, such as '0.35 um'", **texts)
     ensure_report(report)
-    published = {}
-    for key, text in texts.items():
-        try:
-            length = None if text is None else parse_length(text)
-        except QuantityError as error:
-            raise ValueError(f"{key}: {error}") from None
-        published[key.removeprefix("published_")] = length
     return compare_estimators(
         experiment_of(experiment),
         trials,
@@ -395,7 +380,6 @@ def compare(
         across_probes,
         seed,
         points,
-        published,
         report,
     )
 

@@ -38,8 +38,8 @@ def printed(capsys: pytest.CaptureFixture[str], *arguments: str) -> Any:
     ("call", "command"),
     [
         (
-            lambda: bp.compare(QUICKSTART, trials=2, points=10, published_rms="0.3 um"),
-            ("compare", QUICKSTART, "--trials=2", "--points=10", "--published-rms=0.3 um"),
+            lambda: bp.compare(QUICKSTART, trials=2, points=10),
+            ("compare", QUICKSTART, "--trials=2", "--points=10"),
         ),
         (
             lambda: bp.lengths(QUICKSTART, "0.3 um", grid=(3, 2, 4), coverage_factor=3),
@@ -208,7 +208,6 @@ WRONG: list[tuple[Callable[[], object], type[Exception], str]] = [
     ),
     (lambda: bp.compare(QUICKSTART, "full"), ValueError, 'estimator: "full" is unknown'),
     (lambda: bp.compare(QUICKSTART, trials=0), ValueError, "trials=0; give 1 at least"),
-    (lambda: bp.compare(QUICKSTART, published_rms=3e-7), TypeError, "give a length with a unit"),
     (lambda: bp.lengths(QUICKSTART, 0.5), TypeError, "target=0.5; give a text with a unit"),
     (lambda: bp.lengths(QUICKSTART, "1 um", grid=1), ValueError, "grid=1; give 2 at least"),
     (lambda: bp.lengths(QUICKSTART, "1 um", grid=(3, 3)), ValueError, "the grid has 2 numbers"),
@@ -244,12 +243,6 @@ WRONG: list[tuple[Callable[[], object], type[Exception], str]] = [
     (lambda: bp.repair(bp.load(QUICKSTART)), TypeError, "path=<Experiment .*; give the path"),
     (lambda: bp.run(QUICKSTART).plot(5), TypeError, "path=5; give the path"),
     (lambda: bp.run(QUICKSTART).to_csv(5), TypeError, "path=5; give the path"),
-    (lambda: bp.compare(QUICKSTART, published_rms=3), TypeError, "published_rms=3; give a length"),
-    (
-        lambda: bp.compare(QUICKSTART, published_maximum="3"),
-        ValueError,
-        'published_maximum: "3" has no unit',
-    ),
     (
         lambda: bp.reliability(QUICKSTART, power=0),
         ValueError,

@@ -5,7 +5,7 @@ from __future__ import annotations
 from argparse import ArgumentParser, Namespace
 
 from ..estimators.estimator_choice import COMPARED
-from .common import add_file, add_json, argument_type, at_most, count, trial_count, whole
+from .common import add_file, add_json, at_most, count, trial_count, whole
 
 DESCRIPTION = (
     "Estimate synthetic data sets of the file's true machine with the full estimator"
@@ -38,13 +38,6 @@ def add_options(parser: ArgumentParser) -> None:
     parser.add_argument(
         "--points", metavar="N", type=_points, default=200, help="pairs of points; default 200"
     )
-    for key, words in (("rms", "root mean square"), ("maximum", "largest difference")):
-        parser.add_argument(
-            f"--published-{key}",
-            metavar="LENGTH",
-            type=_length,
-            help=f"published {words} to compare with, such as '0.35 um'",
-        )
     add_json(parser)
 
 
@@ -72,13 +65,6 @@ def _points(text: str) -> int:
     return at_most(count(text), MOST_POINTS, "pairs of points")
 
 
-@argument_type
-def _length(text: str) -> float:
-    from ballplate.simulator.inputs.quantities import parse_length
-
-    return parse_length(text)
-
-
 def run(options: Namespace) -> int:
     """Compare the estimators for all experiments of the files; 1 if an estimate did not
     converge.
@@ -87,7 +73,6 @@ def run(options: Namespace) -> int:
     from .common import experiments, print_json, print_lines
     from .progress_bars import progress
 
-    published = {"rms": options.published_rms, "maximum": options.published_maximum}
     results = []
     for experiment in experiments(options):
         with progress(options) as shown:
@@ -99,7 +84,6 @@ def run(options: Namespace) -> int:
                 options.across_probes,
                 options.seed,
                 options.points,
-                published,
                 shown.show,
             )
         results.append(comparison)

@@ -38,7 +38,7 @@ from ballplate.simulator.readings.generate import (
 from ballplate.simulator.readings.observed_readings import ObservedReadings, observe
 from ballplate.simulator.readings.simulated import on_stated_machine, too_large
 
-from ..presentation.formatting import by_name, given, number, picked
+from ..presentation.formatting import by_name, given, picked
 from ..presentation.result import FitResult, Result
 from ..presentation.table_columns import MainTable, table_lines
 from ..results.estimates import ESTIMATE_COLUMNS, ParameterEstimate
@@ -150,7 +150,7 @@ class EstimatorComparison(Result):
 
     For each data set on which both converged: root mean square `rms` and largest absolute value
     `maximum` (m,), in metres, at `points` random pairs of points. `failed` lists the other data
-    sets, from 0. `published` values, by "rms" and "maximum", are located in these distributions.
+    sets, from 0.
     `of_truth` has, by estimator, errors of distances between the same pairs of points in all data
     sets; it is empty if distances are undetermined.
     """
@@ -166,7 +166,6 @@ class EstimatorComparison(Result):
     rms: Array
     maximum: Array
     failed: tuple[int, ...]
-    published: Mapping[str, float | None] = field(default_factory=dict)
     of_truth: Mapping[str, TruthErrors] = field(default_factory=dict)
 
     def headline(self) -> str:
@@ -177,8 +176,7 @@ class EstimatorComparison(Result):
         )
 
     def lines(self) -> list[str]:
-        """The comparison as lines of text: quantiles, with published values."""
-        published = self.published
+        """The comparison as lines of text: quantiles."""
         across = ", across probes" if self.across_probes else ""
         used = f" ({_used(self.pairs, self.lengths)}{across})"
         used = "" if self.estimator == "reversal" else used
@@ -198,18 +196,9 @@ class EstimatorComparison(Result):
         if not len(self.rms):
             return lines
         quantiles = ["least", *(f"{100 * q:.0f} %" for q in QUANTILES[1:-1]), "largest"]
-        spreads = {"rms": self.rms, "maximum": self.maximum}
-        values = np.quantile(list(spreads.values()), QUANTILES, axis=1)
+        values = np.quantile([self.rms, self.maximum], QUANTILES, axis=1)
         columns: dict[str, Any] = {"": ["root mean square", "largest"]}
         columns |= dict(zip(quantiles, 1e6 * values, strict=True))
-        if any(value is not None for value in published.values()):
-            published_values = [published.get(key) for key in spreads]
-            below = [
-                None if value is None else share_below(errors, value)
-                for value, errors in zip(published_values, spreads.values(), strict=True)
-            ]
-            columns["published"] = (published_values, lambda value: number(1e6 * value))
-            columns["below it"] = (below, lambda share: f"{100 * share:.0f} %")
         lines += table_lines(columns)
         if not self.of_truth:
             return lines
@@ -237,12 +226,6 @@ class EstimatorComparison(Result):
                 "quantiles": dict(zip(map(str, QUANTILES), quantiles, strict=False)),
                 "values": values,
             }
-            value = self.published.get(key)
-            if value is not None:
-                data[key] |= {
-                    "published": value,
-                    "share_below_published": share_below(values, value),
-                }
         errors_data = {
             name: {**vars(errors), "unit": "m"} for name, errors in self.of_truth.items()
         }
@@ -428,7 +411,6 @@ def compare_estimators(
     across_probes: bool = False,
     seed: int | None = None,
     points: int = 200,
-    published: Mapping[str, float | None] | None = None,
     report: Report = unreported,
 ) -> EstimatorComparison:
     """Compare an alternative with the full estimator on readings of the file's true machine.
@@ -484,7 +466,6 @@ def compare_estimators(
         np.array(rms),
         np.array(maximum),
         tuple(failed),
-        published or {},
         _of_truth(design, estimator, errors),
     )
 
@@ -560,11 +541,6 @@ def _distances(design: Design, a: Array, ends: Array) -> Array:
     offsets = np.broadcast_to(design.probes.offsets[design.evaluation.probe], ends.shape[1:])
     corrected = [x + design.model.error(x, a, offsets) for x in ends]
     return np.sqrt(((corrected[0] - corrected[1]) ** 2).sum(axis=1))
-
-
-def share_below(values: Array, published: float) -> float:
-    """Return the share of the values that are below a published one."""
-    return float((values < published).mean()) if len(values) else float("nan")
 
 
 def _used(pairs: int, lengths: int) -> str:

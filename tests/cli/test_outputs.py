@@ -105,7 +105,6 @@ WALK = {
         {
             "MAP": "map.yaml",
             "POINTS": "corners.csv",
-            "--lengths": "pairs.csv",
             "--tasks": "design.yaml",
         },
         {"-o": "o.csv", "--covariance": "v.csv"},
@@ -253,7 +252,6 @@ def shelf(tmp_path_factory: pytest.TempPathFactory) -> Path:
     again = ["-o", str(folder / "again.csv"), "--seed", "2"]
     assert main(["simulate", str(folder / "design.yaml"), *again]) == 0
     (folder / "corners.csv").write_text("name,x_mm,y_mm\nA,50,50\nB,450,50\n", encoding="utf-8")
-    (folder / "pairs.csv").write_text("first,second\nA,B\n", encoding="utf-8")
     fit = ["fit", str(folder / "design.yaml"), str(readings), "-o", str(folder / "map.yaml")]
     assert main(fit) == 0
     shutil.copy(folder / "map.yaml", folder / "second-map.yaml")

@@ -66,8 +66,6 @@ ENDING = {
             12,
             "-o",
             "points.csv",
-            "--plot",
-            "u.svg",
         ),
         2.5,
     ),
@@ -101,7 +99,6 @@ OUTPUTS = (
     "page.html",
     "table.csv",
     "points.csv",
-    "u.svg",
     "all.csv",
     "map.png",
 )

@@ -202,7 +202,6 @@ def _make_readings(folder: Path) -> None:
         _ballplate(folder, "fit", "small.yaml", readings, "-o", name, "--date", "2026-11-22")
     points = "name,probe,x_mm,y_mm,z_mm\nA,down,50,200,100\nB,right,450,200,100\n"
     (folder / "to-correct.csv").write_text(points, encoding="utf-8")
-    (folder / "lengths.csv").write_text("first,second\nA,B\n", encoding="utf-8")
 
 
 def _make_stores(folder: Path) -> None:

@@ -73,7 +73,7 @@ RECIPES = (
     "adjust small.yaml small-readings.csv --scale 'x=2 um/m' --uncertainty 2% --json",
     "adjust map.yaml --turn 'y-x=2 arcsec' --after map.npz --force -o out.npz",
     "fit small.yaml small-readings.csv -o new.npz --date 2026-11-22",
-    "correct map.yaml to-correct.csv --length A B --lengths lengths.csv --tasks small.yaml",
+    "correct map.yaml to-correct.csv --length A B --tasks small.yaml",
     "correct map.npz to-correct.csv -o out.csv --covariance covariance.csv --coverage-factor 3 --json",
     "correct map.yaml small-readings.csv --probe right --with-repeatability",
     "diff map.yaml map.npz --grid 2 -o out.csv",
@@ -92,7 +92,7 @@ RECIPES = (
     ),
     "'map --convert' map.yaml --to empirical -o out.yaml",
     "'map --convert' map.npz --to '{kind: kinematic, position_coefficients: 3}' --json",
-    "compare small.yaml --trials 2 --points 5 --pairs braced --seed 2 --published-rms '0.35 um'",
+    "compare small.yaml --trials 2 --points 5 --pairs braced --seed 2",
     (
         "compare bar-bell.yaml --variant 'length known' --trials 2 --points 5 --estimator"
         " length-equations --json"

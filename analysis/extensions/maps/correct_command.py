@@ -93,12 +93,6 @@ def _add_lengths(parser: ArgumentParser) -> None:
         help="also correct the length between two points by their names; may be repeated",
     )
     parser.add_argument(
-        "--lengths",
-        metavar="CSV",
-        type=Path,
-        help="also correct lengths between points named in the columns first and second",
-    )
-    parser.add_argument(
         "--tasks",
         metavar="FILE",
         type=Path,
@@ -143,11 +137,9 @@ def run(options: Namespace) -> int:
 def _wanted(options: Namespace, fitted: FittedMap, scale_points: GivenPoints) -> Tasks:
     from ballplate.simulator.experiment import load
 
-    from .selected_lengths import between_listed, between_named, tasks_of_experiment
+    from .selected_lengths import between_named, tasks_of_experiment
 
     tasks = between_named(scale_points, [(first, second) for first, second in options.length])
-    if options.lengths:
-        tasks = tasks.beside(between_listed(scale_points, options.lengths))
     if options.tasks:
         for experiment in load(options.tasks):
             tasks = tasks.beside(tasks_of_experiment(fitted, experiment))

@@ -1,4 +1,4 @@
-"""Points of a CSV file, which are to be corrected, and lengths between them."""
+"""Points of a CSV file, which are to be corrected."""
 
 from __future__ import annotations
 
@@ -14,7 +14,6 @@ from ballplate.simulator.inputs import (
     MOST_MESSAGES,
     ExperimentError,
     GivenText,
-    Mark,
     Message,
     header_names,
     hint,
@@ -29,14 +28,11 @@ NAMING, PROBE = ("name", "position", "ball"), "probe"
 
 @dataclass(frozen=True, eq=False)
 class GivenPoints:
-    """Scale readings `points` (n, d) in metres, their names (may be empty), probe indices (n,), and
-    `marks`, their lines in the file.
-    """
+    """Scale readings `points` (n, d) in metres, their names, which may be empty, and probes (n,)."""
 
     points: Array
     names: tuple[str, ...]
     probes: Integers
-    marks: tuple[Mark, ...] = ()
 
     def name(self, i: int) -> str:
         """The name of a point, or its number from 1."""
@@ -95,13 +91,4 @@ def read_points(
     indices = np.array([probe_indices[name] for name in probe_names], np.int64)
     if offsets is not None:
         points = points - offsets[indices]
-    return GivenPoints(points, names, indices, tuple(row.mark for row in rows))
-
-
-def read_pairs(source: Path | GivenText) -> tuple[tuple[tuple[str, str], ...], tuple[Mark, ...]]:
-    """Return pairs of names of a CSV file with the columns first and second, and their lines.
-
-    :raises ExperimentError: a wrong table.
-    """
-    rows = read_table(source, ("first", "second"), ())
-    return tuple((row.texts[0], row.texts[1]) for row in rows), tuple(row.mark for row in rows)
+    return GivenPoints(points, names, indices)

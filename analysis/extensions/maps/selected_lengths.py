@@ -3,22 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from pathlib import Path
 
 import numpy as np
 from ballplate.simulator.design import Tasks
 from ballplate.simulator.experiment import Experiment
 from ballplate.simulator.inputs import (
-    MOST_MESSAGES,
-    ExperimentError,
-    GivenText,
     hint,
     listing,
     refused,
 )
 from ballplate.simulator.maps import FittedMap
 
-from .point_files import GivenPoints, read_pairs
+from .point_files import GivenPoints
 
 
 def between_named(points: GivenPoints, pairs: Sequence[Sequence[str | int]]) -> Tasks:
@@ -27,25 +23,6 @@ def between_named(points: GivenPoints, pairs: Sequence[Sequence[str | int]]) -> 
     :raises ValueError: a name that no point has, or several; an index of none.
     """
     return _between(points, [_ends(points, pair) for pair in pairs])
-
-
-def between_listed(points: GivenPoints, source: Path | GivenText) -> Tasks:
-    """Return lengths between the pairs of points of a CSV file.
-
-    :raises ExperimentError: a wrong table, or a name that no point has, or several.
-    """
-    pairs, marks = read_pairs(source)
-    ends, messages = [], []
-    for pair, mark in zip(pairs, marks, strict=True):
-        try:
-            ends.append(_ends(points, pair))
-        except ValueError as error:
-            messages.append(mark.message("", str(error)))
-        if len(messages) >= MOST_MESSAGES:
-            break
-    if messages:
-        raise ExperimentError(messages)
-    return _between(points, ends)
 
 
 def tasks_of_experiment(fitted: FittedMap, experiment: Experiment) -> Tasks:

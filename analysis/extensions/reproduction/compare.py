@@ -11,7 +11,6 @@ import numpy as np
 from ballplate.estimators import (
     EstimatorComparison,
     compare_estimators,
-    share_below,
 )
 from ballplate.simulator.computing import Report, unreported
 from ballplate.uncertainty import Quantity
@@ -233,7 +232,7 @@ class PlacedFigure:
     @property
     def below(self) -> float:
         """Share of the values below the published one."""
-        return share_below(np.array(self.values), self.published)
+        return float((np.array(self.values) < self.published).mean())
 
     @property
     def agrees(self) -> bool:

@@ -182,10 +182,9 @@ def test_the_command_writes_what_python_gives(
         }
     )
     table.to_csv(tmp_path / "points.csv", index=False)
-    (tmp_path / "pairs.csv").write_text("first,second\nA,B\nB,C\n")
     outputs = ["-o", str(tmp_path / "out.csv"), "--covariance", str(tmp_path / "covariance.csv")]
     arguments = ["correct", str(tmp_path / "map.yaml"), str(tmp_path / "points.csv"), *outputs]
-    lengths = ["--lengths", str(tmp_path / "pairs.csv"), "--length", "A", "C"]
+    lengths = ["--length", "A", "C", "--length", "A", "B", "--length", "B", "C"]
     assert main([*arguments, *lengths, "--json"]) == 0
     captured = capsys.readouterr()
     data = json.loads(captured.out)
