@@ -28,7 +28,7 @@ NAMING, PROBE = ("name", "position", "ball"), "probe"
 
 @dataclass(frozen=True, eq=False)
 class GivenPoints:
-    """Scale readings `points` (n, d) in metres, their names, which may be empty, and probes (n,)."""
+    """Scale readings `points` (n, d) in metres, their names, if any, and probe indices (n,)."""
 
     points: Array
     names: tuple[str, ...]
