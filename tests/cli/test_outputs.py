@@ -130,7 +130,7 @@ WALK = {
     "next": Walk(
         EXPERIMENT | {"READINGS": "readings.csv", "--watch": "."}, {}, also=("balls.csv",)
     ),
-    "map --curves": Walk({"MAP": "curved-map.yaml"}, {"--plot": "curves.svg"}),
+    "map --curves": Walk({"MAP": "curved-map.yaml"}, {}),
     "diff": Walk(
         {
             "MAP": "map.yaml",
@@ -632,8 +632,8 @@ def test_capitals_make_no_other_file(
     files: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """There are disks that take none for different."""
-    paths = {"-o": tmp_path / "all.csv", "--plot": tmp_path / "ALL.csv"}
-    refused(line("diff", files, paths), capsys, 2, "are the same file; name another")
+    paths = {"-o": tmp_path / "all.csv", "--covariance": tmp_path / "ALL.csv"}
+    refused(line("correct", files, paths), capsys, 2, "are the same file; name another")
 
 
 @pytest.mark.usefixtures("idle")

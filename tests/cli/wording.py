@@ -71,9 +71,6 @@ GAMMA_DIFFERENCE_OF_THE_SCALES = "gamma (difference of the scales of x and y)"
 GOAL_NOT_MET = "goal not met: average U6"
 HAS_NO_BALL_BAR_OR_BRYAN = "has no ball bar or Bryan gauge whose lengths are read"
 HAS_NO_BALL_BAR_OR_BRYAN_GAUGE = "has no ball bar or Bryan gauge"
-HAS_NO_MEANING_WITH_RANDOM_DIRECTIONS = (
-    '8:57: artefacts.both.directions: "azimuths" has no meaning with random directions; remove it'
-)
 HAS_NO_UNIT = (
     '6:37: artefacts.unit.radius: "300" has no unit; write for example "300 mm" or "300 um"'
 )
@@ -101,10 +98,6 @@ MONOMIALS_APPLIES_TO_ESTIMATOR_FULL = (
 )
 MONTE_CARLO_DATA_SETS = "Monte Carlo: 10 data sets of the true machine"
 MONTE_CARLO_DATA_SETS_OF_THE_TRUE = "Monte Carlo: 100 data sets of the true machine, seed 1"
-NEEDS_EITHER_AZIMUTHS_AND_ELEVATIONS = (
-    "6:54: artefacts.unit.directions: needs either azimuths and elevations, or random; "
-    "write {random: 60, lowest: 20 deg}"
-)
 NO_FILE_WAS_WRITTEN = "no file was written"
 NO_LENGTH_IS_KNOWN = (
     "reason: no length is known (gauge: radius): the overall scale of the machine is undetermined"
@@ -146,10 +139,6 @@ SWAP_THE_NAMES_OF_THE_BALLS_IN_LINES = "swap the names of the balls in lines 5 a
 THE_DESIGN_LEAVES_ERRORS_UNDETERMINED = "the design leaves errors undetermined"
 THE_ESTIMATE_HAS_DIVERGED = "the estimate has diverged; no results are reported"
 THE_EXISTING_FILE_IS_UNCHANGED = "the existing file is unchanged"
-THE_LEAST_ELEVATION_MUST_BE_BELOW = (
-    "14:57: artefacts.zone.directions: the least elevation must be below the largest; "
-    "exchange or correct them"
-)
 THE_PIVOT_IS_THE_CENTRE = (
     "warning: the pivot is the centre of a sphere, as if the machine had no errors"
 )

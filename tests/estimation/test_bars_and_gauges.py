@@ -50,18 +50,26 @@ def truth_of(experiment: Experiment, design: Design) -> tuple[Design, State]:
     return on_true_machine(design, true_machine(experiment.true_machine, design.model, *corners))
 
 
+def scattered(count: int, seed: int, lowest: float = 0.0) -> list[list[str]]:
+    """Azimuths and elevations that are spread evenly over the sphere above the lowest elevation."""
+    turn, height = np.random.default_rng(seed).random((2, count))
+    low = np.sin(np.radians(lowest))
+    elevations = np.degrees(np.arcsin(low + (1.0 - low) * height))
+    return [[f"{a:.6f} deg", f"{e:.6f} deg"] for a, e in zip(360.0 * turn, elevations, strict=True)]
+
+
 BOTH = {
     "artefacts": {
         "bar": {"kind": "two_spheres", "length": "400 mm", "role": "length_standard"},
         "gauge": {
             "kind": "bryan_gauge",
             "radius": "300 mm",
-            "directions": {"random": 12, "lowest": "10 deg"},
+            "directions": scattered(12, 1, 10.0),
         },
         "short": {
             "kind": "bryan_gauge",
             "radius": "200 mm",
-            "directions": {"random": 6, "seed": 2},
+            "directions": scattered(6, 2),
         },
     },
     "probes": {
@@ -233,7 +241,7 @@ def test_where_the_ball_was_to_be_does_not_matter(tmp_path: Path) -> None:
             "gauge": {
                 "kind": "bryan_gauge",
                 "radius": "300 mm",
-                "directions": {"random": 60, "seed": 4},
+                "directions": scattered(60, 4),
             }
         },
         positions=[{"name": "pivot", "pose": {"origin": ["480 mm", "430 mm", "120 mm"]}}],

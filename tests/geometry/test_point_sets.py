@@ -11,10 +11,6 @@ from ballplate.extensions.laboratory.symmetry import turns_onto_itself
 from ballplate.simulator.design.objects import Volume
 from ballplate.simulator.geometry.axes import PlateAxes, plate_axes
 from ballplate.simulator.geometry.ball_layouts import BallLayout
-from ballplate.simulator.geometry.listed_directions import (
-    GeneratedDirectionsSettings,
-    directions,
-)
 from ballplate.simulator.geometry.motions import (
     fit_motion,
     fixes_pose,
@@ -294,14 +290,6 @@ def test_motions_of_places_are_shifts_and_turns_of_them(d: int) -> None:
 def test_nothing_is_taken_from_errors_of_no_places_or_no_errors() -> None:
     for shape in ((0, 3, 2), (4, 3, 0), (0, 2, 0)):
         assert without_rigid_motion(np.zeros(shape[:2]), np.zeros(shape)).shape == shape
-
-
-def test_random_directions_are_those_of_the_seed() -> None:
-    plain, first, second = (
-        directions(GeneratedDirectionsSettings(random=4, seed=seed)) for seed in (None, 1, 2)
-    )
-    np.testing.assert_array_equal(plain, first)
-    assert np.abs(first - second).min(axis=1).max() > 1e-3
 
 
 def test_limits_of_scale_readings_and_of_units() -> None:

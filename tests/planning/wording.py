@@ -10,7 +10,7 @@ KEPT_AS_WELL = "seed: 5   # kept as well"
 LOW_AGAIN_WAS_INTERRUPTED_AFTER_READINGS = (
     "low again was interrupted after 7 readings; 2 more complete it"
 )
-LOW_AS_IT_STANDS = "| low |  | as it stands: flat"
+LOW_AS_IT_STANDS = "as it stands: flat"
 LOW_WAS_INTERRUPTED_AFTER_READINGS = "low was interrupted after 5 readings; 4 more complete it"
 NO_CHOICE_WAS_FOUND_THAT_DETERMINES = "no choice was found that determines every parameter"
 NO_MORE_THAN_OF_THEM = "at most 1 may be chosen"

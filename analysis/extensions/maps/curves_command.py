@@ -8,15 +8,11 @@ from typing import TYPE_CHECKING
 
 from ballplate.cli import (
     UsageError,
-    Writer,
-    add_force,
     add_formats,
-    add_picture,
     complain,
     count,
     print_json,
     print_lines,
-    write_picture,
 )
 
 from .fitted_argument import FITTED, fitted_map
@@ -50,10 +46,8 @@ def add_options(parser: ArgumentParser) -> None:
         "--points",
         metavar="N",
         type=_points,
-        help="positions along each line, in CSV, JSON and the plot; default 41",
+        help="positions along each line, in CSV and JSON; default 41",
     )
-    add_picture(parser, "--plot", help="also draw all functions side by side")
-    add_force(parser)
     add_formats(parser, ("text", "csv", "json"), "csv: all positions; json: metres, radians")
 
 
@@ -65,7 +59,7 @@ def _points(text: str) -> int:
 
 
 def run(options: Namespace) -> int:
-    """Print, and draw, the curves."""
+    """Print the curves."""
     from .error_curves_result import error_curves
     from .error_functions import POSITIONS
 
@@ -74,19 +68,14 @@ def run(options: Namespace) -> int:
         curves = error_curves(fitted, options.file.stem, options.error, options.points or POSITIONS)
     except ValueError as error:
         raise UsageError(error) from None
-    show_errors(options, curves, curves.plot)
+    show_errors(options, curves)
     return 0
 
 
-def show_errors(
-    options: Namespace, errors: MachineErrors | FittedErrorMap | ErrorCurves, draw: Writer
-) -> None:
-    """Print notes, draw the errors, and print them in the chosen format."""
+def show_errors(options: Namespace, errors: MachineErrors | FittedErrorMap | ErrorCurves) -> None:
+    """Print notes and errors, these in the chosen format."""
     for note in errors.notes:
         complain(note)
-    # Before anything is printed that nobody may read to its end.
-    if options.plot is not None:
-        write_picture(options, draw)
     if options.format == "json":
         print_json([errors.to_dict()])
     else:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -31,10 +30,9 @@ from .error_functions import (
 )
 from .fitted_errors_result import map_cautions
 from .fitted_tables import UNDETERMINED, expanded, head_lines, map_data
-from .function_plots import draw_functions
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+    pass
 
 ARCSECOND = np.pi / 180.0 / 3600.0
 
@@ -148,20 +146,6 @@ class ErrorCurves(Result):
     @property
     def warnings(self) -> tuple[str, ...]:
         return map_cautions(self.fitted)
-
-    def plot(self, path: str | Path | None = None) -> Figure:
-        """All curves side by side, each with its band, those in the same unit to the same scale.
-
-        With a path, which ends in .svg, .png or .pdf, the picture is written as well.
-
-        :raises ImportError: matplotlib is missing.
-        :raises ValueError: the path ends in something else, or there is no curve.
-        """
-        if not self.functions.curves:
-            raise ValueError(
-                "there are no curves to draw, only single numbers; leave the picture out"
-            )
-        return draw_functions(self.functions, self.title, self.k, path)
 
 
 def error_curves(

@@ -11,12 +11,10 @@ from ballplate.presentation import (
     Data,
     MainTable,
     Result,
-    by_axis,
     number,
     percent,
     picked,
     records,
-    table_csv,
     table_lines,
     uncertainty_words,
 )
@@ -214,24 +212,6 @@ def _table(
     without = [] if targets else ["target"]
     without += [] if groups.undetermined.any() else ["undetermined"]
     return table_lines({k: v for k, v in columns.items() if k not in without})
-
-
-def point_csv(lengths: LengthMap) -> list[str]:
-    """Return one row per point of the grid: the lengths that start or end there."""
-    groups = lengths.by_point
-    return table_csv(
-        {
-            **by_axis("{}, mm", lengths.points),
-            "lengths": groups.count,
-            "undetermined": groups.undetermined,
-            "u average, µm": groups.average,
-            "u maximum, µm": groups.maximum,
-            "ratio average": groups.average_ratio,
-            "ratio maximum": groups.maximum_ratio,
-            "share within": groups.share(),
-            "share expanded within": groups.share(True),
-        }
-    )
 
 
 def _group_data(heads: list[dict[str, Any]], groups: LengthGroups) -> list[Data]:

@@ -14,7 +14,6 @@ from ballplate.cli import (
     grid,
     show,
     single,
-    text_writer,
     write,
 )
 
@@ -64,7 +63,13 @@ def add_options(parser: ArgumentParser) -> None:
         action="store_true",
         help="include the repeatability of both readings of a length",
     )
-    add_output(parser, "-o", "--output", metavar="FILE", help="write one row per point of the grid")
+    add_output(
+        parser,
+        "-o",
+        "--output",
+        metavar="FILE",
+        help="write a row per length, direction and point",
+    )
     add_force(parser)
     add_json(parser)
 
@@ -83,7 +88,6 @@ def run(options: Namespace) -> int:
     from ballplate.cli import progress
 
     from .length_map import length_map, length_settings
-    from .length_tables import point_csv
 
     experiment = single(options)
     try:
@@ -99,14 +103,7 @@ def run(options: Namespace) -> int:
         raise UsageError(error) from None
     with progress(options) as shown:
         lengths = length_map(experiment, settings, shown.show)
-    write(
-        options,
-        {
-            options.output: text_writer(
-                lambda stream: stream.writelines(f"{line}\n" for line in point_csv(lengths))
-            )
-        },
-    )
+    write(options, {options.output: lengths.to_csv})
     show(options, lengths)
     is_missed = options.fail and not lengths.is_met
     return 0 if lengths.as_expected and not is_missed else 1

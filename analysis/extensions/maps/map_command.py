@@ -18,6 +18,7 @@ from ballplate.cli import (
     count,
     grid,
     whole,
+    write_picture,
 )
 
 from .curves_command import show_errors
@@ -182,5 +183,8 @@ def run(options: Namespace) -> int:
     draw = errors.plot
     if options.magnification is not None and isinstance(errors, VolumetricMap | FittedErrorMap):
         draw = partial(errors.plot, magnification=options.magnification)
-    show_errors(options, errors, draw)
+    # Before anything is printed that nobody may read to its end.
+    if options.plot is not None:
+        write_picture(options, draw)
+    show_errors(options, errors)
     return 0

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from argparse import ArgumentParser, ArgumentTypeError, Namespace
-from functools import partial
 
 from ballplate.cli import (
     UsageError,
@@ -12,7 +11,6 @@ from ballplate.cli import (
     add_json,
     add_output,
     number,
-    text_writer,
     write,
 )
 
@@ -48,10 +46,13 @@ def add_options(parser: ArgumentParser) -> None:
             " the file's choice"
         ),
     )
-    parser.add_argument(
-        "--all", action="store_true", help="list every event, not only the worst of a kind"
+    add_output(
+        parser,
+        "-o",
+        "--output",
+        metavar="FILE",
+        help="write a row for every bias",
     )
-    add_output(parser, "-o", "--output", metavar="FILE", help="write a row for every observation")
     add_force(parser)
     add_json(parser)
 
@@ -72,7 +73,6 @@ def run(options: Namespace) -> int:
     from ballplate.cli import experiments, print_json, print_lines, progress
 
     from .redundancy import reliability
-    from .reliability_result import write_observations
 
     if options.power <= options.false_alarm:
         raise UsageError("--power must be above --false-alarm; any test has at least that power")
@@ -89,13 +89,11 @@ def run(options: Namespace) -> int:
                 experiment, options.false_alarm, options.power, options.sigma, shown.show
             )
         if options.output is not None:
-            write(
-                options, {options.output: text_writer(partial(write_observations, result=result))}
-            )
+            write(options, {options.output: result.to_csv})
         if options.json:
             results.append(result.to_dict())
         else:
-            print_lines([*([""] if k else []), *result.lines(options.all)])
+            print_lines([*([""] if k else []), *result.lines()])
     if options.json:
         print_json(results)
     return 0

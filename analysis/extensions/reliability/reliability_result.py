@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, TextIO
+from typing import TYPE_CHECKING
 
 import numpy as np
 from ballplate.presentation import (
@@ -14,7 +14,6 @@ from ballplate.presentation import (
     Data,
     Result,
     aligned,
-    ascii_units,
     number,
     picked,
     table_lines,
@@ -22,8 +21,7 @@ from ballplate.presentation import (
 from ballplate.simulator.computing import comparable
 from ballplate.simulator.design import Design
 from ballplate.simulator.estimation import Functions, function_name
-from ballplate.simulator.geometry import AXIS_NAMES
-from ballplate.simulator.inputs import CsvWriter, listed
+from ballplate.simulator.inputs import listed
 from ballplate.simulator.machines import Array, Integers
 from ballplate.uncertainty import QUANTITIES
 
@@ -107,10 +105,8 @@ class Reliability(Result):
             f"redundancy {mean:.3g} per observation on average; {len(self.patterns)} biases judged"
         )
 
-    def lines(self, with_all: bool = False) -> list[str]:
-        """Return lines of text; `with_all` lists every event, not only the worst of each
-        position or probe.
-        """
+    def lines(self) -> list[str]:
+        """Return lines of text, with the worst event of each position or probe."""
         lines = [*_heading(self), "", *_positions(self)]
         readings = self.patterns.of_kind("reading")
         items = self.patterns.of_kind(*single_kinds(self.design)[1:])
@@ -122,11 +118,10 @@ class Reliability(Result):
                 ]
         events: list[int] = []
         for kind in EVENTS:
-            candidates = self.patterns.of_kind(kind)
-            events += candidates.tolist() if with_all else _worst_of_each(self, candidates)
+            events += _worst_of_each(self, self.patterns.of_kind(kind))
         if events:
             lines += ["", *_table(self, "events", events, with_redundancy=False)]
-        return lines + _closing(self, with_all)
+        return lines + _closing(self)
 
     def data(self) -> Data:
         """Return plain data in metres, radians and ratios; None if undetectable or undetermined."""
@@ -348,7 +343,7 @@ def _worst_of_each(result: Reliability, chosen: Integers) -> list[int]:
     return [worst[key] for key in sorted(worst)]
 
 
-def _closing(result: Reliability, with_all: bool) -> list[str]:
+def _closing(result: Reliability) -> list[str]:
     """Return notes on undetectable biases and on omissions."""
     lines = []
     hidden = np.flatnonzero(result.information <= 0.0).tolist()
@@ -383,17 +378,16 @@ def _closing(result: Reliability, with_all: bool) -> list[str]:
             "(no ball is read twice in one position: dirt on it is the same as a bias of its"
             " reading)"
         )
-    if not with_all:
-        lines.append(
-            "(the worst ball of each position, and the worst direction of each event; --all lists"
-            " the others)"
-        )
+    lines.append(
+        "(the worst ball of each position, and the worst direction of each event; -o and --json"
+        " have the others)"
+    )
     if result.deficiency:
         lines.append("(functions that the observations leave undetermined are left out)")
     count = len(result.design.evaluation.points)
     if count > MOST_PLACES:
         lines.append(f"(effects on U6 are those on {MOST_PLACES} of {count} evaluation points)")
-    return ["", *lines] if lines else []
+    return ["", *lines]
 
 
 def _probes_of_points(design: Design) -> str:
@@ -453,46 +447,3 @@ def _pattern_data(result: Reliability, k: int) -> Data:
             if result.effects[symbol].first[k] >= 0
         },
     }
-
-
-def write_observations(stream: TextIO, result: Reliability) -> None:
-    """Write a row for every observation: each co-ordinate of each reading, and each item."""
-    writer = CsvWriter(stream)
-    singles = np.flatnonzero(np.isin(result.patterns.kind, single_kinds(result.design)))
-    rows = [_observation_row(result, k) for k in singles.tolist()]
-    writer.writerow(list(rows[0]))
-    for row in rows:
-        writer.writerow(list(row.values()))
-
-
-def _observation_row(result: Reliability, k: int) -> Data:
-    design, subject, data = result.design, result.patterns.subject[k], _pattern_data(result, k)
-    place = ("", "", "", "")
-    if data["kind"] in ("reading", "end"):
-        readings = design.readings
-        place = (
-            design.positions.names[readings.position[subject]],
-            design.ball_label(int(readings.ball[subject])),
-            design.probes.names[readings.probe[subject]],
-            AXIS_NAMES[result.patterns.axis[k]],
-        )
-    row = {
-        "kind": data["kind"],
-        **dict(zip(("position", "ball", "probe", "axis"), place, strict=True)),
-        "name": data["name"],
-        "redundancy": repr(float(result.left[k])),
-        "unit": ascii_units(SHOWN[data["unit"]]),
-        **{name: _digits(data[name]) for name in ("minimal_detectable", "found_by_fit")},
-    }
-    for symbol in result.effects:
-        effect = data["effects"].get(symbol, {})
-        row[f"{symbol}_effect_um"] = _digits(effect.get("change", math.nan))
-        uncertainty = effect.get("standard_uncertainty", math.nan)
-        row[f"{symbol}_standard_uncertainty_um"] = _digits(uncertainty)
-        row[f"{symbol}_at"] = effect.get("at", "")
-    return row
-
-
-def _digits(value: float) -> str:
-    """Return a value in micro-units with all its digits, empty unless finite."""
-    return repr(float(1e6 * value)) if math.isfinite(value) else ""

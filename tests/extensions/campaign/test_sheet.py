@@ -135,20 +135,7 @@ def of_text(text: str) -> list[tuple[str, str, str]]:
     return found
 
 
-def of_markdown(text: str) -> list[tuple[str, str, str]]:
-    found, position = [], ""
-    for line in text.splitlines():
-        if match := re.match(r"## ☐ [0-9]+\. ([^,]+)", line):
-            position = match[1]
-        elif match := re.fullmatch(r"With (.*?): (.*)", line):
-            for boxes, ball in re.findall(r"(☐+) (\S+?)(?:,|$)", match[2]):
-                found += [(position, match[1], ball)] * len(boxes)
-    return found
-
-
-@pytest.mark.parametrize(
-    ("form", "of"), [(".html", of_page), (".txt", of_text), (".md", of_markdown)]
-)
+@pytest.mark.parametrize(("form", "of"), [(".html", of_page), (".txt", of_text)])
 def test_every_reading_is_on_the_sheet_once_and_in_order(
     form: str, of: object, sheet: Sheet
 ) -> None:
@@ -176,7 +163,7 @@ def test_the_page_asks_for_nothing_and_lets_no_text_out(sheet: Sheet) -> None:
         assert part in style
 
 
-@pytest.mark.parametrize("form", [".html", ".txt", ".md"])
+@pytest.mark.parametrize("form", [".html", ".txt"])
 def test_the_head_has_what_is_filled_in_by_hand(form: str, sheet: Sheet) -> None:
     text = sheet.text(form)
     for name in ("machine", "operator", "date", "temperature", "design.yaml", "ballplate ", "page"):
@@ -186,7 +173,7 @@ def test_the_head_has_what_is_filled_in_by_hand(form: str, sheet: Sheet) -> None
     assert re.search(r"right\s+30\s+0\s+-40\s+36\.87°\s+0°", flat)
 
 
-@pytest.mark.parametrize("form", [".html", ".txt", ".md"])
+@pytest.mark.parametrize("form", [".html", ".txt"])
 def test_angles_of_a_head_are_those_of_the_file(form: str, tmp_path: Path) -> None:
     path = tmp_path / "design.yaml"
     # A tip straight down by 30 mm, tilted by 90 deg towards -y and then turned by 90 deg, is at +x.

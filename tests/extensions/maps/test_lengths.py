@@ -210,11 +210,12 @@ def test_the_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None
     found = length_map(load(file)[0], settings(coverage_factor=1.5))
     with open(points, encoding="utf-8") as stream:
         rows = list(csv.DictReader(stream))
+    of_points = [row for row in rows if row["group"] == "by point"]
     np.testing.assert_allclose(
-        [float(row["u_average_um"]) for row in rows], 1e6 * found.by_point.average, rtol=1e-9
+        [float(row["average"]) for row in of_points], found.by_point.average, rtol=1e-9
     )
     np.testing.assert_allclose(
-        [float(row["share_within"]) for row in rows], found.by_point.share(), rtol=1e-9
+        [float(row["share within"]) for row in of_points], found.by_point.share(), rtol=1e-9
     )
     assert main(["run", "--lengths", file, *limits, "--json"]) == 0
     data = json.loads(capsys.readouterr().out)

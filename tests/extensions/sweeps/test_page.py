@@ -109,9 +109,9 @@ def test_figures_of_the_page_are_the_store_s(plate_sizes: Path, plate_sizes_page
         (str(cell), name) for cell in range(12) for name in names if "actual_maximum" not in name
     }
     assert wanted <= told
-    # Two axes with numbers, four quantities; two designs with their probes; three levels of the
+    # Two axes with numbers, four quantities; two designs; three levels of the
     # error map.
-    assert len(found.of("svg")) == 2 * 4 + 2 * 2 + 3
+    assert len(found.of("svg")) == 2 * 4 + 2 + 3
     assert wording.SMALLEST_AVERAGE_OF in found.texts["h3"]
 
 
