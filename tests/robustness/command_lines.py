@@ -203,7 +203,6 @@ LARGE = (
     "calibration",
     "sweep",
     "straight",
-    "magnification",
     "order",
     "every",
     "positions",

@@ -118,7 +118,7 @@ RECIPES = (
     "map machine.yaml --grid 3,3,2",
     "map machine.yaml --line 'y = 300 mm, z = 200 mm' --points 3 --json",
     "map gec-like.yaml --error EXX --format csv",
-    "map gec-like.yaml --grid 2,2,2 --plot out.svg --magnification 1000",
+    "map gec-like.yaml --grid 2,2,2 --plot out.svg",
     "map map.yaml --grid 3,2,2 --budget --draw 3 --seed 4 --tasks small.yaml",
     "map map.npz --plane 'z = 200 mm' --grid 3,3 --probe right --plot out.svg --json",
     "map map.yaml --points to-correct.csv --format csv",
@@ -140,10 +140,7 @@ RECIPES = (
     ),
     "spline curve.csv --knots '50 mm, 100 mm' --order 3 --json --sigma estimated --period '240 mm'",
     "spline table-1.csv --x arc_length --y finish_error --boundary '100 mm' --points 1-30 --json",
-    (
-        "spline table-1.csv --y finish_error --straight 1 --uncertainty '1 um' --whiskers out.svg"
-        " --magnification 500"
-    ),
+    ("spline table-1.csv --y finish_error --straight 1 --uncertainty '1 um' --whiskers out.svg"),
     (
         "spline table-1.csv --y semi_finish_error --points 1-10 --corner '44.704 mm, -114.554 mm'"
         " --straight 1 --straight 2 --knots none --compensated out.csv"

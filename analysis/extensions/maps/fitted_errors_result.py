@@ -177,9 +177,9 @@ class FittedErrorMap(Result):
         words = f"{outside} of {len(points)} points are outside the volume"
         return (*map_cautions(self.fitted), f"{words}, where errors are extrapolated")
 
-    def plot(self, path: str | Path | None = None, magnification: float | None = None) -> Figure:
+    def plot(self, path: str | Path | None = None) -> Figure:
         """Draw magnified errors at points or, along a line, errors with bands of expanded
-        uncertainty; `magnification` is for a grid in three dimensions.
+        uncertainty.
 
         A path in .svg, .png or .pdf saves the plot.
 
@@ -193,7 +193,7 @@ class FittedErrorMap(Result):
             return draw_line(errors_at_points, path, k, f"U, k = {k:g}", "correction")
         if self.places.kind == "grid" and self.fitted.dimension == 3:
             counts = self.places.counts
-            return draw_grid(errors_at_points, self.lengths, counts, magnification, path)
+            return draw_grid(errors_at_points, self.lengths, counts, path)
         title = f"{self.title}: corrections"
         return draw_points(errors_at_points, self.fitted.volume, title, path)
 

@@ -168,10 +168,10 @@ def map(
     seed: int = 1,
     budget: bool = False,
     tasks: Experiment | PathLike | None = None,
-) -> MachineErrors | FittedErrorMap | ErrorCurves:
+) -> MachineErrors | FittedErrorMap:
     """Return volumetric errors of a machine file or of a map, with expanded uncertainties: on a
-    grid over the volume, in a plane, along a line, at points, or one parametric error along its
-    axis.
+    grid over the volume, in a plane, along a line, at points, or one parametric error of a machine
+    file along its axis.
 
     `line` is a text as in `ballplate map --line`, co-ordinates in metres of the two fixed axes, or
     two points; `plane` the co-ordinate of the axis across it. `points` is their number along a

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from argparse import ArgumentParser, ArgumentTypeError, Namespace
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -66,12 +65,6 @@ def add_options(parser: ArgumentParser) -> None:
         help="also draw the errors, in three dimensions or along the line or axis",
     )
     add_force(parser)
-    parser.add_argument(
-        "--magnification",
-        metavar="N",
-        type=count,
-        help="magnification of the errors in the drawing of the grid; default: one that fits",
-    )
     add_formats(parser, ("text", "csv", "json"), "csv: the points alone; json: metres, radians")
 
 
@@ -96,7 +89,9 @@ def _add_places(parser: ArgumentParser) -> None:
         "--plane", metavar="PLANE", type=_plane, help='errors in a plane, as in "z = 200 mm"'
     )
     where.add_argument(
-        "--error", metavar="NAME", help="a parametric error along its axis instead, such as EXX"
+        "--error",
+        metavar="NAME",
+        help="of a machine file: a parametric error along its axis",
     )
     parser.add_argument(
         "--points",
@@ -156,17 +151,11 @@ def run(options: Namespace) -> int:
     """Print, and draw, the errors."""
     from ballplate.simulator.experiment import load
 
-    from .fitted_errors_result import FittedErrorMap
     from .map_files_of_machines import map_errors
     from .map_places import PlacesAsked
     from .realisations import Draws
-    from .volumetric_results import VolumetricMap
 
-    exclusive = (options.line, options.plane, options.error)
     table = options.points if isinstance(options.points, Path) else None
-    is_grid = table is None and all(option is None for option in exclusive)
-    if options.magnification is not None and (options.plot is None or not is_grid):
-        raise UsageError("--magnification is for the plot of the grid; leave it out")
     if options.seed is not None and options.draw is None:
         raise UsageError("--seed needs --draw; leave it out")
     number = None if table is not None else options.points
@@ -180,11 +169,8 @@ def run(options: Namespace) -> int:
         )
     except ValueError as error:
         raise UsageError(error) from None
-    draw = errors.plot
-    if options.magnification is not None and isinstance(errors, VolumetricMap | FittedErrorMap):
-        draw = partial(errors.plot, magnification=options.magnification)
     # Before anything is printed that nobody may read to its end.
     if options.plot is not None:
-        write_picture(options, draw)
+        write_picture(options, errors.plot)
     show_errors(options, errors)
     return 0

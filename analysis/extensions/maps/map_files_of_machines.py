@@ -10,7 +10,6 @@ from ballplate.simulator.design import Tasks
 from ballplate.simulator.experiment import Experiment, is_map_file, read_map
 from ballplate.simulator.maps import FittedMap
 
-from .error_curves_result import ErrorCurves, error_curves
 from .fitted_errors_result import FittedErrorMap, fitted_map_errors
 from .map_places import PlacesAsked
 from .realisations import Draws
@@ -34,9 +33,9 @@ def map_errors(
     draws: Draws | None = None,
     with_budget: bool = False,
     tasks: Sequence[Experiment] = (),
-) -> MachineErrors | FittedErrorMap | ErrorCurves:
+) -> MachineErrors | FittedErrorMap:
     """Return errors of a machine file or of a map at places, and of lengths of an experiment with
-    `tasks`, or one of its error functions.
+    `tasks`, or one parametric error of a machine file.
 
     :raises ExperimentError: the file is wrong.
     :raises ValueError: what does not go together, or is not in the machine.
@@ -53,9 +52,9 @@ def map_errors(
         if tasks:
             raise ValueError("tasks are measured by a map of a fit; leave them out")
         return machine_errors(source, asked, error, draws, with_budget)
-    fitted, label = map_of_source(source)
     if error is not None:
-        return error_curves(fitted, label, (error,))
+        raise ValueError("error functions of a map are those of map --curves, in Python bp.curves")
+    fitted, label = map_of_source(source)
     lengths = [tasks_of_experiment(fitted, task) for task in tasks]
     wanted = reduce(Tasks.beside, lengths) if lengths else None
     return fitted_map_errors(fitted, label, asked, probe, draws, with_budget, wanted)

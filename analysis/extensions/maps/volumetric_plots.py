@@ -67,7 +67,6 @@ def draw_grid(
     errors: VolumetricErrors,
     lengths: LengthErrors,
     counts: tuple[int, ...],
-    magnified: float | None = None,
     path: str | Path | None = None,
 ) -> Figure:
     """A picture of the grid's outside, nominal and displaced, which is written to the path if there
@@ -75,7 +74,7 @@ def draw_grid(
 
     :raises OSError: the file cannot be written.
     """
-    factor = magnified or magnification_of(errors)
+    factor = magnification_of(errors)
     view, away = projection(3)
     nominal = errors.points.reshape(*counts, 3)
     moved = nominal + factor * errors.errors.reshape(*counts, 3)

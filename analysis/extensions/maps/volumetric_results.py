@@ -157,9 +157,9 @@ class ErrorsAtPoints(MachineErrors):
 class VolumetricMap(ErrorsAtPoints):
     """Errors on a grid over the volume, and of the four body diagonals."""
 
-    def plot(self, path: str | Path | None = None, magnification: float | None = None) -> Figure:
+    def plot(self, path: str | Path | None = None) -> Figure:
         """The outside of the grid, nominal and displaced by its magnified errors."""
-        return draw_grid(self.errors, self.lengths, self.places.counts, magnification, path)
+        return draw_grid(self.errors, self.lengths, self.places.counts, path)
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -102,9 +102,7 @@ class FittedCurve(Result):
         """
         return draw_curve(self.curve, path)
 
-    def plot_whiskers(
-        self, path: str | Path | None = None, magnification: float | None = None
-    ) -> Figure:
+    def plot_whiskers(self, path: str | Path | None = None) -> Figure:
         """The errors of all points of the file as bars normal to their profile.
 
         :raises ImportError: matplotlib is missing.
@@ -114,7 +112,7 @@ class FittedCurve(Result):
         if self.everything.places is None:
             raise ValueError("bars need a profile, of the columns nominal_x_mm and nominal_z_mm")
         try:
-            return draw_whiskers(self.curve, self.everything, path, magnification)
+            return draw_whiskers(self.curve, self.everything, path)
         except SplineError as error:
             raise _told(error, self.file, self.everything.x_column) from None
 

@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 
 # Points: of the drawings.
 WIDTH, HEIGHT = 460.0, 300.0
-# The longest bar, where no magnification is stated, as a part of the profile's extent.
+# The longest bar, about, as a part of the profile's extent.
 LONGEST = 0.18
 
 
@@ -116,12 +116,7 @@ def words(curve: ErrorCurve) -> str:
     )
 
 
-def draw_whiskers(
-    curve: ErrorCurve,
-    points: CurvePoints,
-    path: str | Path | None = None,
-    magnification: float | None = None,
-) -> Figure:
+def draw_whiskers(curve: ErrorCurve, points: CurvePoints, path: str | Path | None = None) -> Figure:
     """The errors of all points of the file as bars normal to the profile, those of the fit in
     front; the picture is written to the path, if there is one.
 
@@ -137,8 +132,7 @@ def draw_whiskers(
     unit = points.x_column.unit if points.x is None else "mm"
     extent = np.ptp(line, axis=0)
     largest = float(np.abs(points.y).max())
-    if magnification is None:
-        magnification = round_number(LONGEST * float(extent.max()) / largest) if largest else 1.0
+    magnification = round_number(LONGEST * float(extent.max()) / largest) if largest else 1.0
     tips = start + magnification * points.y[:, None] * normals
     everything = np.concatenate([line, tips])
     low, high = everything.min(axis=0), everything.max(axis=0)

@@ -162,12 +162,6 @@ def add_options(parser: ArgumentParser) -> None:
         output, "--whiskers", help="draw errors as bars normal to the profile (.svg, .png or .pdf)"
     )
     add_force(output)
-    output.add_argument(
-        "--magnification",
-        metavar="N",
-        type=float,
-        help="magnification of the bars; default: one that fits",
-    )
     output.add_argument("--json", action="store_true", help="print JSON in metres and radians")
 
 
@@ -199,7 +193,7 @@ def run(options: Namespace) -> int:
     lines = [] if options.json else curve.lines()
     contents: dict[Path | None, Writer | str] = {
         options.plot: curve.plot,
-        options.whiskers: partial(curve.plot_whiskers, magnification=options.magnification),
+        options.whiskers: curve.plot_whiskers,
     }
     if options.compensated is not None:
         contents[options.compensated] = curve.compensated(options.nominal).csv()
@@ -239,9 +233,5 @@ def _check(options: Namespace, points: CurvePoints) -> None:
         raise UsageError(f"--compensated moves points, but {points.y_column.name} is an angle")
     if options.nominal is not None and options.compensated is None:
         raise UsageError("--nominal is for --compensated; add that, or leave it out")
-    if options.magnification is not None and not 0 < options.magnification < float("inf"):
-        raise UsageError("--magnification should be above 0, such as 200")
-    if options.magnification is not None and options.whiskers is None:
-        raise UsageError("--magnification is that of --whiskers; add that, or leave it out")
     if options.json and str(options.output) == "-":
         raise UsageError("--json and -o - both go to the screen; name a file for one")

@@ -310,7 +310,7 @@ def test_curves_are_the_functions_with_their_bands(fit: Fit, fitted: FittedMap) 
         axis = function.axis
         assert one.positions == pytest.approx(np.linspace(low[axis], high[axis], 9))
         assert one.unit == ("rad" if function.turns else "m")
-    single = bp.map(fitted, error="EXX")
+    single = bp.curves(fitted, "EXX")
     assert [one.name for one in single.functions.curves] == ["EXX"]
     rows = [row for row in found.rows() if row["error"] == "EXX"]
     assert [row["U"] for row in rows] == pytest.approx(2.0 * curves["EXX"].uncertainties)
@@ -475,7 +475,7 @@ def test_commands_print_what_results_say(
         (["--plane", "z = 200 mm", "--grid", "2,2,2"], "a plane has points along two axes"),
         (["--plane", "z = 3 m"], "the plane is outside the volume in z"),
         (["--grid", "2,2"], "give three numbers of points"),
-        (["--error", "EXQ"], 'the map has no error "EXQ"'),
+        (["--error", "EXX"], "error functions of a map are those of map --curves"),
         (["--error", "EXX", "--budget"], "budget and error do not go together"),
         (["--seed", "3"], "--seed needs --draw"),
     ],

@@ -297,12 +297,7 @@ def test_wrong_usage(
             ("--line", "y = 600 mm"),
             "a line keeps two axes fixed; write for example y = 600 mm, z = 600 mm",
         ),
-        (("--magnification", "10"), "--magnification is for the plot of the grid; leave it out"),
         (("--line", "y = 5 m, z = 600 mm"), "the line is outside the volume in y"),
-        (
-            ("--error", "EXX", "--magnification", "10"),
-            "--magnification is for the plot of the grid; leave it out",
-        ),
     ],
 )
 def test_wrong_usage_that_the_file_tells(

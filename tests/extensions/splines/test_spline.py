@@ -221,8 +221,6 @@ def test_drawings(tmp_path: Path) -> None:
                 plot,
                 "--whiskers",
                 bars,
-                "--magnification",
-                "300",
             )
             == 0
         )
@@ -260,11 +258,6 @@ def test_drawings(tmp_path: Path) -> None:
         (("--boundary", "1 mm, 2 mm, 3 mm"), "should be one abscissa, or two nominal co-ordinates"),
         (("--uncertainty", "0 um"), "must be above zero"),
         (("--plot", "a.svg", "--whiskers", "a.svg"), "are the same file; name another"),
-        (("--magnification", "nan"), "--magnification should be above 0"),
-        (
-            ("--magnification", "300"),
-            "--magnification is that of --whiskers; add that, or leave it out",
-        ),
         (("--json", "-o", "-"), "both go to the screen"),
         (("--evaluate", "x mm"), '--evaluate: "x mm" is not a length'),
     ],

@@ -36,7 +36,7 @@ NOMINAL_IS_FOR_COMPENSATED = "--nominal is for --compensated"
 NO_DEGREES_OF_FREEDOM_ARE_LEFT = "no degrees of freedom are left to estimate sigma from"
 NO_ERROR_WRITE = "data.csv:4:5: no error; write a number, or remove the line"
 NO_POINT_DID_YOU_MEAN = 'no point "enf"; did you mean "end"?'
-POINTS_MAGNIFIED_TIMES = "32 points, magnified 300 times; the largest is 94.17 µm"
+POINTS_MAGNIFIED_TIMES = "32 points, magnified 200 times; the largest is 94.17 µm"
 SEMI_FINISH_ERROR_AGAINST_ARC_LENGTH = (
     "table-1.csv: semi finish error against arc length, 21 points"
 )
