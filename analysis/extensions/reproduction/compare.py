@@ -241,14 +241,6 @@ class PlacedFigure:
 
 
 @dataclass(frozen=True)
-class ComputedDesign:
-    """A design without a legible value, and its uncertainties."""
-
-    design: str
-    quantities: dict[str, Quantity]
-
-
-@dataclass(frozen=True)
 class Section:
     """All comparisons of one section; `skipped` names those skipped to save time."""
 
@@ -261,7 +253,6 @@ class Section:
     errata: tuple[ComparedErratum, ...] = ()
     progress: tuple[ComparedProgress, ...] = ()
     differences: tuple[ComparedDifference, ...] = ()
-    told: tuple[ComputedDesign, ...] = ()
     illegible: tuple[Illegible, ...] = ()
     skipped: str = ""
 
@@ -345,7 +336,6 @@ def _section(
 ) -> Section:
     statements = document.statements
     illegible = tuple(block for block in statements.illegible if block.section == name)
-    computed_designs = variants(shipped, name) if any(block.told for block in illegible) else {}
     differences = [
         difference for difference in statements.differences if section_of(difference.design) == name
     ]
@@ -389,7 +379,6 @@ def _section(
             for difference in differences
             if trials is not None
         ),
-        tuple(ComputedDesign(label, tabulated(shipped, label)) for label in computed_designs),
         illegible,
         skipped,
     )

@@ -88,12 +88,11 @@ class Erratum(Settings):
 
 
 class Illegible(Settings):
-    """An illegible block; ballplate's values are `told` if the section has no other values."""
+    """A block without a legible value."""
 
     table: str
     section: str
     what: str
-    told: bool = False
 
 
 class RankStatement(Settings):

@@ -151,12 +151,7 @@ def _section_blocks(document: Document, section: Section, with_assumptions: bool
     if section.skipped:
         blocks.append(f"Left out: {section.skipped}.")
     for block in section.illegible:
-        blocks.append(
-            f"Not legible in the copy at hand: Table {block.table}, {block.what}"
-            + ("; computed values in µm and µrad:" if block.told else ".")
-        )
-    if section.told:
-        blocks.append(_computed_grid(section))
+        blocks.append(f"Not legible in the copy at hand: Table {block.table}, {block.what}.")
     return blocks
 
 
@@ -375,19 +370,6 @@ def _differences(section: Section) -> list[Block]:
     return [*blocks, text, _grid(head, rows, 2)]
 
 
-def _computed_grid(section: Section) -> Grid:
-    rows = [
-        (
-            case_of(computed.design),
-            statistic,
-            *(number(1e6 * getattr(computed.quantities[symbol], statistic)) for symbol in SYMBOLS),
-        )
-        for computed in section.told
-        for statistic in ("maximum", "average")
-    ]
-    return _grid(("case", "statistic", *SYMBOLS), rows, 2)
-
-
 def _excepted(reproduction: Reproduction) -> list[tuple[Reservation, list[ComparedFigure]]]:
     """Return exceptions of the sections' values, open ones first, each with its values."""
     figures = [
@@ -588,16 +570,6 @@ def _section_data(section: Section) -> Data:
                 "agrees": difference.agrees,
             }
             for difference in section.differences
-        ],
-        "computed_only": [
-            {
-                "design": compared.design,
-                "quantities": {
-                    symbol: picked(compared.quantities[symbol], "maximum", "average", "unit")
-                    for symbol in SYMBOLS
-                },
-            }
-            for compared in section.told
         ],
         "illegible": [picked(block, "table", "what") for block in section.illegible],
         "left_out": section.skipped or None,
