@@ -12,7 +12,6 @@ if TYPE_CHECKING:
     from .axes import PlateAxes, axes_words, plate_axes
     from .ball_layouts import ArtefactSettings, BallLayout, Name, frozen, pairs
     from .grids import even_grid, grid_points
-    from .listed_directions import directions
     from .motions import (
         AXIS_NAMES,
         cross_matrices,
