@@ -69,9 +69,9 @@ def summary(experiment: Experiment, moving: bool = False) -> dict[str, Any]:
         },
         "quantities": [_row(quantity) for quantity in quantities.values()],
         "target": target_in_words(experiment),
-        "by": "" if target is None else uncertainty_words(target.coverage_factor),
         "within": lengths and lengths.within_target,
-        "share": "" if target is None or lengths is None else percent(lengths.within_target or 0.0),
+        "shares": _shares(experiment, quantities),
+        "met": _met(quantities, linearisation.deficiency == (expected or 0), judged),
         "worst": None if lengths is None else _worst(linearisation, lengths),
         "doubts": list(experiment.doubts),
         "seconds": perf_counter() - start,
@@ -107,6 +107,33 @@ def scale_and_assumptions(experiment: Experiment) -> dict[str, Any]:
     }
 
 
+def _shares(experiment: Experiment, quantities: Mapping[str, Quantity]) -> list[str]:
+    """Return the share of the distances, and of the measuring tasks, that meet their targets."""
+    return [
+        f"{percent(quantity.within_target)} of "
+        + (
+            f"{quantity.count:,} distances are within the target {target_in_words(experiment)}"
+            if quantity.symbol == "U6"
+            else "the measuring tasks are within their targets"
+        )
+        + f" ({uncertainty_words(quantity.coverage_factor)})"
+        for quantity in quantities.values()
+        if quantity.within_target is not None
+    ]
+
+
+def _met(quantities: Mapping[str, Quantity], is_expected: bool, judged: Verdict | None) -> str:
+    """Return whether targets are met or missed, or undecided since something is undetermined that
+    the file does not expect, or weakly determined; empty without targets.
+    """
+    shares = [quantity.within_target for quantity in quantities.values()]
+    stated = [share for share in shares if share is not None]
+    if not stated or min(stated) < 1.0:
+        return "missed" if stated else ""
+    is_weak = judged is not None and bool(judged.weak)
+    return "met" if is_expected and not is_weak else "undecided"
+
+
 def _directions(judged: Verdict) -> list[Data]:
     undetermined = [{"words": str(direction), "weak": False} for direction in judged.null]
     return undetermined + [{"words": str(direction), "weak": True} for direction in judged.weak]
@@ -125,7 +152,7 @@ def _row(quantity: Quantity) -> Data:
         **picked(quantity, "symbol", "description"),
         "maximum": finite(quantity.maximum),
         "average": finite(quantity.average),
-        **picked(quantity, "unit", "count", "undetermined", "largest"),
+        **picked(quantity, "unit", "count", "undetermined", "largest", "within_target"),
     }
 
 

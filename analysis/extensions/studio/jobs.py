@@ -106,12 +106,13 @@ CHECKS = {"sweep": ensure_possible}
 
 @dataclass
 class Job:
-    """A computation of the design with a `fingerprint`, in a process of its own: `state` is
-    running, done or failed, `result` its outcome or the reason of its failure, and `page` its page,
-    if any. It `is_ending` if it was asked for the best result so far.
+    """A computation of the design with a `fingerprint` in the `file` of that name, in a process of
+    its own: `state` is running, done or failed, `result` its outcome or the reason of its failure,
+    and `page` its page, if any. It `is_ending` if it was asked for the best result so far.
     """
 
     name: str
+    file: str
     fingerprint: str
     worker: Worker
     state: str = "running"
@@ -148,7 +149,7 @@ class Job:
         return {
             "id": number,
             "job": self.name,
-            **picked(self, "fingerprint", "state", "result"),
+            **picked(self, "file", "fingerprint", "state", "result"),
             "step": self.worker.step,
             "page": bool(self.page),
             "ending": self.state == "running" and self.is_ending,
@@ -164,7 +165,7 @@ def started(name: str, document: DesignDocument, settings: Mapping[str, Any]) ->
     """
     if name in CHECKS:
         CHECKS[name](document, settings)
-    job = Job(name, document.fingerprint, Worker())
+    job = Job(name, document.path.name, document.fingerprint, Worker())
     job.worker.begin(JOBS[name], document, settings)
     return job
 

@@ -26,7 +26,7 @@ from .actions import draft_after
 from .answers import quantities_and_pictures, scale_and_assumptions, scene, summary
 from .document import DesignDocument, data_of, variants_of
 from .drafts import draft_of, draft_with, evaluable, evaluable_of, problems
-from .filling import pool_of
+from .filling import hours_of, pool_of
 from .processes import Work
 
 Arguments = Mapping[str, Any]
@@ -79,10 +79,11 @@ def previewed(
 
 
 def _pictures(document: DesignDocument, arguments: Arguments, report: Report) -> dict[str, Any]:
-    """Return all quantities, the `map` of a kind and the `motion` of an index."""
+    """Return all quantities, the `map` of a kind, the `motion` of an index, and the hours."""
     experiment, linearisation = _linearised(document, arguments["revision"])
     kind, motion = arguments.get("map"), arguments.get("motion")
-    return quantities_and_pictures(experiment, linearisation, kind, motion)
+    hours = hours_of(evaluable_of(document, planning=True))
+    return quantities_and_pictures(experiment, linearisation, kind, motion) | hours
 
 
 @lru_cache(maxsize=1)

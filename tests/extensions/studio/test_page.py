@@ -114,9 +114,11 @@ def test_the_answer_comes_first_and_is_said_once_nothing_moves(design: Path) -> 
         first = said.inner_text()
         assert "U6 on average" in first and "100 %" in first and "Full rank" in first
         # Of what is nearly always wanted, nothing needs scrolling.
-        for part in ("#verdict", "#view", "#positions", "[data-job=suggest]"):
+        for part in ("#verdict", "#view", "#positions", "[data-job=next]"):
             box = page.locator(part).bounding_box()
             assert box["y"] + box["height"] <= 900, part
+        # Nothing is undetermined.
+        assert not page.is_visible("[data-job=suggest]")
         page.keyboard.press("Tab")
         assert page.evaluate("document.activeElement.textContent") == "Skip to the answer"
         levels = page.evaluate(

@@ -34,9 +34,9 @@ def page(tmp_path: Path) -> Iterator:
         assert page.errors == []
 
 
-def fields(page, key: str, text: str) -> None:
-    page.fill(f"[data-pool='{key}']", text)
-    page.press(f"[data-pool='{key}']", "Tab")
+def fields(page, field: str, text: str) -> None:
+    page.fill(field, text)
+    page.press(field, "Tab")
 
 
 def test_a_pool_is_filled_limited_and_planned_from(page):
@@ -44,24 +44,24 @@ def test_a_pool_is_filled_limited_and_planned_from(page):
     page.click("#pool summary")
     page.wait_for_selector("#pool-said >> text=No candidates yet")
     for plane in ("x", "y"):
-        page.uncheck(f"[data-pool='plane {plane}']")
-    fields(page, "quarter turns", "0")
-    fields(page, "places along each axis", "4")
+        page.uncheck(f"[aria-label='fill planes across {plane}']")
+    fields(page, "#turns", "0")
+    fields(page, "#count", "4")
     page.click("#fill")
     page.wait_for_selector("#pool-said >> text=64 candidates")
     until(page, f"{DRAWN}.join() === 'LineSegments'")
-    page.select_option("[data-pool='corner']", "x high, y high, z high")
+    page.select_option("#corner", "x high, y high, z high")
     page.click("#forbid")
     page.wait_for_selector("#pool-said >> text=in a forbidden box")
     until(page, f"{DRAWN}.includes('Mesh')")
-    fields(page, "0 z", "0 mm, 400 mm")
+    fields(page, "[aria-label='forbidden box 1, from and to along z']", "0 mm, 400 mm")
     text = settled(page, 3)["text"]
     assert text.count("z: [0 mm, 400 mm]") == 1, text
     page.wait_for_selector("#pool-said >> text=9 in a forbidden box")
-    page.click("[data-pool='Allow box 1 again']")
+    page.click("[aria-label='Allow box 1 again']")
     page.wait_for_selector("#pool-said >> text=64 candidates")
     # Stopped, the plan is the best so far; applied, it is one step.
-    fields(page, "hours at most", "8")
+    fields(page, "#hours", "8")
     page.click("#plan")
     page.wait_for_selector("#jobs .step >> text=best so far", timeout=200_000)
     page.click("#jobs button >> text=stop")

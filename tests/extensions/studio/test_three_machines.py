@@ -21,34 +21,6 @@ pytestmark = [
     pytest.mark.skipif(chromium() is None, reason="no Chromium on this machine"),
 ]
 
-FLAT = """\
-# A plate on a machine of two axes.
-title: plate in two dimensions
-
-machine:
-  volume: [600 mm, 400 mm]
-  repeatability: 0.2 um
-
-error_model: {kind: metric}
-
-probes:
-  tip: [0 mm, 0 mm]
-
-artefacts:
-  plate: {kind: grid, balls: [4, 4], size: [240 mm, 240 mm]}
-
-positions:
-  - {name: left, corner: {x: 20 mm, y: 20 mm}}
-  - {name: turned, corner: {x: 20 mm, y: 40 mm}, quarter_turns: 1}
-  - {name: right, corner: {x: 340 mm, y: 120 mm}}
-  - {name: half, corner: {x: 340 mm, y: 120 mm}, quarter_turns: 2}
-
-calibration:
-  - {kind: distances, pairs: corner sides, standard_uncertainty: 0.2 um}
-
-target_uncertainty: 0.5 um + L/1000000
-"""
-
 STATE = "window.studio.state()"
 
 
@@ -160,19 +132,10 @@ def begin_with_questions(hands: Mouse, kind: str, volume: tuple[int, ...]) -> No
     hands.page.wait_for_selector("#begin", state="hidden")
 
 
-def begin_with_text(hands: Mouse, text: str) -> None:
-    hands.page.wait_for_selector("#begin")
-    hands.press("#begin-example")
+def begin_in_two_dimensions(hands: Mouse) -> None:
+    hands.page.wait_for_selector("#draft dl")
+    hands.press("#begin-flat")
     hands.page.wait_for_selector("#begin", state="hidden")
-    until(hands.page, f"!!{STATE}.design")
-    hands.press("#toggle-text")
-    if isinstance(hands, Keyboard):
-        hands.reach("#text")
-        hands.page.keyboard.press("Control+a")
-        hands.page.keyboard.insert_text(text)
-    else:
-        hands.page.fill("#text", text)
-    hands.press("#apply")
 
 
 @pytest.mark.parametrize("hands_of", [Mouse, Keyboard, Touch])
@@ -196,7 +159,7 @@ def test_from_an_empty_folder(tmp_path: Path, machine: str, hands_of: type[Mouse
             hands = hands_of(page)
             if part == 0:
                 if is_flat:
-                    begin_with_text(hands, FLAT)
+                    begin_in_two_dimensions(hands)
                 else:
                     begin_with_questions(hands, machine, volume)
             state = done(page, 1 if part == 0 else 0)

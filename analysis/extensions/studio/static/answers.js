@@ -1,34 +1,54 @@
 // The verdict, its figures, what is assumed and what is undetermined.
+import { flow, lead } from "./forms.js";
 import { legend } from "./legend.js";
-import { $, act, ask, make, micro, page, refocus } from "./page.js";
+import { $, act, ask_now, button, fill, make, micro, page, share, table } from "./page.js";
 
 const counted = (number) => number.toLocaleString("en");
-const figure = (text, words, ...more) => make("div", { class: "figure" },
-  make("span", { class: "big" }, text), make("span", {}, words, ...more));
+const figure = (look, text, ...words) => make("div", { class: `figure ${look}` },
+  make("span", { class: "big" }, text), make("span", {}, words));
+const lines = (texts) => texts.map((text) => make("p", {}, text));
+const was = (text) => (page.state.kept ? ` (was ${text})` : "");
+const lengths_of = (design) => design?.quantities.find(({ symbol }) => symbol === "U6");
 
-// Figures of U6, or that it is undetermined, and the share of lengths within the target.
-function answered({ rank, quantities, target, by, share, within }) {
-  const lengths = quantities.find((row) => row.symbol === "U6");
-  if (!lengths) return [figure("–", "no evaluation points: no lengths are judged")];
+// Whether targets are met, in words that a person may act on.
+const LOOKS = { met: "good", missed: "warn", undecided: "warn" };
+function target({ met, shares, rank, within }, before, of_rest, is_old) {
+  if (!met) return figure("", "No target", "target_uncertainty is not stated");
+  const head = is_old ? `Before: ${met}` : of_rest ? `By the rest: ${met}` : `Target ${met}`;
+  return figure(rank.deficiency && met !== "met" ? "bad" : LOOKS[met], head, shares.join("; "),
+    met === "undecided" ? ", but not everything is determined" : "",
+    was(share(before?.within_target) || "no target"), within === null ? null
+      : make("progress", { value: within, "aria-label": "share within the target" }));
+}
+
+// Figures of U6, or that it is undetermined, and of the target.
+function answered(design, of_rest, is_old) {
+  const lengths = lengths_of(design);
+  if (!lengths) return figure("", "–", "no evaluation points: no lengths are judged");
   const { average, maximum, count, undetermined } = lengths;
-  const was = (key) => {
-    const row = page.state.kept?.quantities.find((one) => one.symbol === "U6");
-    return row ? ` (was ${micro(row[key])})` : "";
-  };
-  const is_all = undetermined === count;
-  const open = undetermined ? [figure("Undetermined", is_all ? "All distances are undetermined."
-    : `${counted(undetermined)} of ${counted(count)} distances are undetermined.`)] : [];
-  open.forEach((one) => one.classList.add("bad"));
+  const before = lengths_of(page.state.kept);
   const others = undetermined ? " of the others" : "";
-  const amounts = is_all ? [] : [
-    figure(`${micro(average)} µm`, `U6${others} on average${was("average")}`),
-    figure(`${micro(maximum)} µm`, `U6${others} at most${was("maximum")}`)];
-  const compared = !target ? figure("No target", "target_uncertainty is not stated")
-    : figure(share, `of ${counted(count)} distances are within the target ${target} (${by})`,
-      make("progress", { value: within, "aria-label": "share within the target" }));
-  if (target && within < 1) compared.classList.add(rank.deficiency ? "bad" : "warn");
-  if (target && within === 1) compared.classList.add("good");
-  return [...open, ...amounts, ...(is_all ? [] : [compared])];
+  return [
+    undetermined ? figure("bad", "Undetermined", undetermined === count
+      ? "All distances are undetermined."
+      : `${counted(undetermined)} of ${counted(count)} distances are undetermined.`) : [],
+    undetermined === count ? [] : [
+      figure("", `${micro(average)} µm`, `U6${others} on average`, was(micro(before?.average))),
+      figure("", `${micro(maximum)} µm`, `U6${others} at most`, was(micro(before?.maximum)))],
+    target(design, before, of_rest, is_old),
+  ];
+}
+
+// What comes with the map: the time of measuring, and lengths elsewhere that miss the target.
+function late({ met }) {
+  const { hours, usual, map } = page.drawn ?? {};
+  const { largest, unit } = map?.scale ?? {};
+  const time = (value) => (value ? `${Number(value.toFixed(2))} h` : "–");
+  return make("div", { id: "late" }, hours ? figure("", time(hours), "of measuring",
+    usual ? ", with usual times" : "", was(time(page.state.kept?.hours))) : null,
+  met === "met" && unit === "target" && largest > 1 ? make("p", {},
+    `Elsewhere in the volume, lengths reach ${Number(largest.toPrecision(3))} times the target.`)
+    : null);
 }
 
 const rank_words = ({ deficiency, expected, directions }) => {
@@ -42,8 +62,8 @@ export function figures(design, messages, pending = false) {
   const rank = design?.rank;
   const moving = design !== page.state.design;
   const wrong = !moving && (page.state.stale || pending);
-  const left_out = design?.scene.positions.filter((place) => place.problem) ?? [];
-  const is_missed = rank && design.within !== null && design.within < 1;
+  const left_out = (design?.scene.positions ?? []).filter(({ problem }) => problem);
+  const is_missed = Boolean(rank) && !["met", ""].includes(design.met);
   const reason = pending ? "Computing"
     : messages[0]?.line ? "The text is invalid" : "The text cannot be evaluated";
   const notes = [
@@ -52,55 +72,53 @@ export function figures(design, messages, pending = false) {
     left_out.length && !wrong ? `of the positions without ${left_out.map((one) => one.name)
       .join(", ")}, which cannot be read there` : ""].filter(Boolean);
   const box = $("verdict");
-  box.classList.toggle("bad", wrong || rank?.deficiency > 0);
-  box.classList.toggle("old", wrong);
-  box.classList.toggle("open", !design?.target);
-  box.classList.toggle("warn", !wrong && !rank?.deficiency && is_missed);
-  const fit = make("button", { id: "fit", onclick: () => act({ do: "fit" }) },
-    "Fit all positions to the volume");
-  box.replaceChildren(...(rank ? answered(design) : []),
-    make("div", { class: "notes" }, ...notes.map((text) => make("p", {}, text)),
-      left_out.length ? fit : null));
-  const next = rank?.deficiency ? "suggest" : is_missed ? "next" : "";
-  $("next").querySelectorAll("button").forEach((button) =>
-    button.classList.toggle("primary", button.dataset.job === next));
+  const looks = { bad: wrong || rank?.deficiency > 0, old: wrong, open: !design?.met,
+    warn: !wrong && !rank?.deficiency && is_missed };
+  Object.entries(looks).forEach(([look, is]) => box.classList.toggle(look, is));
+  fill(box, rank ? [answered(design, left_out.length > 0, wrong), late(design)] : [],
+    make("div", { class: "notes" }, lines(notes), left_out.length
+      ? button("Fit all positions to the volume", () => act({ do: "fit" }), { id: "fit" }) : null));
+  const [suggest, next] = $("next").children;
+  suggest.classList.toggle("primary", rank?.deficiency > 0);
+  next.classList.toggle("primary", is_missed && !rank.deficiency);
   page.view.lengths?.(rank && design.worst ? [{ ...design.worst,
     label: `${micro(design.worst.uncertainty)} µm` }] : []);
   if (moving) return;
-  $("messages").replaceChildren(...messages.map(message),
-    ...(design?.doubts ?? []).map((text) => make("li", {}, text)));
-  const figured = [...box.querySelectorAll(".figure")].map((one) =>
+  // Only where there is something to determine.
+  suggest.hidden = !rank?.directions.length;
+  fill($("messages"), messages.map(message),
+    (design?.doubts ?? []).map((text) => make("li", {}, text)));
+  const figured = [...box.querySelectorAll(":scope > .figure")].map((one) =>
     [...one.children].map((part) => part.textContent).join(" "));
   const said = [...(wrong ? [] : figured), ...notes].join("; ");
   if (!pending && $("said").textContent !== said) $("said").textContent = said;
-  $("counts").replaceChildren(...(rank ? [
-    `${rank.parameters} parameters from ${rank.observations} observations`, ...rank.reasons,
-  ].map((text) => make("p", {}, text)) : []));
+  fill($("counts"), lines(rank
+    ? [`${rank.parameters} parameters from ${rank.observations} observations`, ...rank.reasons]
+    : []));
   quantities(rank && !wrong ? page.drawn?.quantities ?? [] : []);
   directions(rank?.directions ?? []);
   if (rank && !wrong) ask_later();
   else {
     clearTimeout(waiting);
-    $("scale").replaceChildren();
+    fill($("scale"));
     assumed(null);
   }
 }
 
-function message({ line, path, what, text }) {
-  const where = line ? make("button", { class: "link", "data-focus": `line ${line} ${path}`,
-    title: "show the line", onclick: () => show_line(line) }, `line ${line}`) : null;
-  return make("li", {}, where, `${what ? `, ${what}` : ""}${line ? ": " : ""}${text}`);
+function message({ line, what, text }) {
+  const where = line ? button(`line ${line}`, () => show_line(line),
+    { class: "link", title: "show the line" }) : null;
+  return make("li", {}, where, what ? `, ${what}` : "", line ? ": " : "", text);
 }
 
 function show_line(line) {
   unfold_text(true);
   const text = $("text");
-  const lines = text.value.split("\n");
-  const before = lines.slice(0, line - 1).join("\n").length + (line > 1 ? 1 : 0);
-  const end = text.value.indexOf("\n", before);
+  const all = text.value.split("\n");
+  const before = all.slice(0, line - 1).join("\n").length + (line > 1 ? 1 : 0);
   text.focus();
-  text.setSelectionRange(before, end < 0 ? text.value.length : end);
-  text.scrollTop = (line - 4) * (text.scrollHeight / Math.max(1, lines.length));
+  text.setSelectionRange(before, before + (all[line - 1] ?? "").length);
+  text.scrollTop = (line - 4) * (text.scrollHeight / all.length);
 }
 
 export function unfold_text(open) {
@@ -110,33 +128,20 @@ export function unfold_text(open) {
 
 const MOST_DIRECTIONS = 3; // that are shown before a person asks for the others
 function directions(found) {
-  const unfolded = $("motions").querySelector("details")?.open;
-  $("motions").replaceChildren();
-  if (!found.length) return;
   const swing = (index) => {
-    page.motion = index === page.motion ? null : index;
-    dress(page.state.design);
-    page.view.move(page.motion);
-    directions(found);
-    refocus(`#motions [data-motion="${index}"]`);
-    ask_drawn().catch(() => {});
+    page.stopped = index === page.motion;
+    page.motion = page.stopped ? null : index;
+    page.show();
   };
-  const items = found.map((direction, index) => {
-    const moving = index === page.motion;
-    return make("li", {},
-      make("button", { "aria-pressed": String(moving), "data-motion": String(index),
-        onclick: () => swing(index) }, moving ? "stop" : "move"),
-      make("strong", {}, ` ${direction.weak ? "weak" : "undetermined"} `), direction.words,
-    );
-  });
-  const rest = items.slice(MOST_DIRECTIONS);
-  $("motions").append(make("h2", {}, "What the readings leave undetermined"),
-    make("ol", {}, ...items.slice(0, MOST_DIRECTIONS)));
-  if (!rest.length) return;
-  const more = make("details", {}, make("summary", {}, `${rest.length} more`),
-    make("ol", {}, ...rest));
-  more.open = Boolean(unfolded);
-  $("motions").append(more);
+  const items = found.map((direction, index) => make("li", {},
+    button(index === page.motion ? "stop" : "move", () => swing(index),
+      { "aria-pressed": String(index === page.motion), "data-motion": String(index) }),
+    make("strong", {}, ` ${direction.weak ? "weak" : "undetermined"} `), direction.words));
+  const rest = items.splice(MOST_DIRECTIONS);
+  fill($("motions"),
+    items.length ? make("h2", {}, "What the readings leave undetermined") : null,
+    make("ol", {}, items), rest.length ? make("details", {},
+      make("summary", {}, `${rest.length} more`), make("ol", {}, rest)) : null);
 }
 
 // The map and the motion that were drawn last stay until those of the design have come.
@@ -150,18 +155,20 @@ export function dress(design) {
 }
 
 async function ask_drawn() {
-  const { design } = page.state;
   const { motion } = page;
-  const wanted = { map: $("map").value, motion };
-  const found = await ask("/api/drawn", wanted);
-  if (found.fingerprint !== page.state.fingerprint || motion !== page.motion) return;
+  const found = await ask_now("/api/drawn", { map: $("map").value, motion });
+  if (!found || motion !== page.motion) return;
+  const { design } = page.state;
   page.drawn = { ...found, motion, dimension: design.scene.dimension };
-  dress(page.state.design);
+  dress(design);
   page.view.map();
   page.view.move(motion);
   legend();
   quantities(found.quantities);
-  ["legend", "quantities"].forEach((name) => $(name).classList.remove("stale"));
+  $("late")?.replaceWith(late(design));
+  $("hours").placeholder = `as now: ${Number(found.hours.toFixed(2))}`;
+  $("legend").classList.remove("stale");
+  $("quantities").classList.remove("stale");
 }
 
 let waiting = null;
@@ -169,79 +176,80 @@ let waiting = null;
 // all the rest, after them.
 export function ask_later(after = 100) {
   clearTimeout(waiting);
-  const slow = ["scale", "assumptions", "rests", "quantities", "legend"];
-  const stale = (is) => slow.forEach((name) => $(name).classList.toggle("stale", is));
+  const stale = (is) => ["scale", "assumptions", "rests", "quantities", "legend", "late"]
+    .forEach((name) => $(name)?.classList.toggle("stale", is));
   stale(true);
   waiting = setTimeout(async () => {
     const { fingerprint } = page.state;
     try {
       await ask_drawn();
       const is_known = page.later?.fingerprint === fingerprint;
-      const found = is_known ? page.later : await ask("/api/later");
-      if (fingerprint !== page.state.fingerprint) return;
+      const found = is_known ? page.later : await ask_now("/api/later");
+      if (found?.fingerprint !== page.state.fingerprint) return;
       page.later = found;
-      $("scale").replaceChildren(...found.lines.map((line) => make("p", {}, line)));
+      fill($("scale"), lines(found.lines));
       assumed(found.assumptions);
       stale(false);
     } catch {
       // A later request has replaced this one, or the design has no such figures.
-      if (fingerprint === page.state.fingerprint) $("scale").textContent = "";
+      if (fingerprint === page.state.fingerprint) fill($("scale"));
     }
   }, after);
+}
+
+// A button that leads to where an assumption is stated; an effect of its own is written first.
+function stating({ assumed: what, changes }) {
+  const [section] = Object.keys(changes);
+  const added = section === "influences" ? changes[section].at(-1) : null;
+  const said = "stated with usual values: change them in the form; undo takes them out";
+  const go = async () => {
+    const action = { do: "set", path: [section, "+"], value: flow(added) };
+    if (!added || await act(action, said)) lead(section, "standard_uncertainty");
+  };
+  const words = added ? "state it" : "show where it is stated";
+  return button(words, go, { class: "link", "aria-label": `${words}: ${what}` });
 }
 
 const FEW_ASSUMED = 3; // rows that are shown before a person asks for all
 let all_assumed = false;
 function assumed(found) {
-  const rows = found?.assumptions ?? [];
-  $("assumptions").hidden = !rows.length;
-  $("rests").textContent = found?.warning ?? "";
-  if (!rows.length) return;
+  const all = found?.assumptions ?? [];
+  $("assumptions").hidden = !all.length;
+  fill($("rests"), found?.warning ? [found.warning, " ", stating(all[0])] : []);
   const times = (ratio) => (Number.isFinite(ratio) ? `${Number(ratio.toPrecision(3))}` : "");
-  const row = (words, title, { average, maximum, ratio }) => make("tr", {},
-    make("td", { title }, ...words), make("td", {}, micro(average)),
-    make("td", {}, micro(maximum)), make("td", {}, times(ratio)));
-  const shown = all_assumed ? rows : rows.slice(0, FEW_ASSUMED);
+  const row = (words, { average, maximum, ratio }) =>
+    [words, micro(average), micro(maximum), times(ratio)];
   const toggle = () => {
     all_assumed = !all_assumed;
     assumed(found);
-    $("all-assumed").focus();
   };
-  const heads = ["U6 in µm without what is assumed", "average", "max.", "times"];
-  $("assumptions").querySelector("table").replaceChildren(
-    make("thead", {}, make("tr", {}, ...heads.map((head) => make("th", {}, head)))),
-    make("tbody", {}, row(["all of these"], undefined, { ...found, ratio: 1 }),
-      ...shown.map((one) => row([make("strong", {}, one.assumed), `, instead ${one.instead}`],
-        one.source, one)),
-      rows.length > FEW_ASSUMED ? make("tr", {}, make("td", { colspan: "4" },
-        make("button", { id: "all-assumed", class: "link", onclick: toggle,
-          "aria-expanded": String(all_assumed) }, all_assumed ? "fewer" : `all ${rows.length}`)))
-        : ""),
-  );
+  const more = make("td", { colspan: "4" }, button(all_assumed ? "fewer" : `all ${all.length}`,
+    toggle, { id: "all-assumed", class: "link", "aria-expanded": String(all_assumed) }));
+  const shown = all.slice(0, all_assumed ? all.length : FEW_ASSUMED).map((one) =>
+    row(make("td", { title: one.source }, make("strong", {}, one.assumed),
+      `, instead ${one.instead} `, stating(one)), one));
+  fill($("assumptions").lastElementChild, table(
+    ["U6 in µm without what is assumed", "average", "max.", "times"],
+    [row("all of these", { ...found, ratio: 1 }), ...shown,
+      ...(all.length > FEW_ASSUMED ? [[more]] : [])]));
 }
 
 const SHOWN_UNITS = { m: "µm", rad: "µrad", 1: "ppm" };
 function quantities(found) {
   const { kept } = page.state;
-  const before = new Map((kept?.quantities ?? []).map((row) => [row.symbol, row]));
-  const units = (row) => row.unit.split(", ").map((unit) => SHOWN_UNITS[unit] ?? unit).join(", ");
+  const units = (unit) => unit.split(", ").map((one) => SHOWN_UNITS[one] ?? one).join(", ");
   const cell = (row, key) => {
-    const was = before.get(row.symbol)?.[key];
-    return make("td", {}, micro(row[key]),
-      was !== undefined && kept ? make("span", { class: "was" }, `was ${micro(was)}`) : null);
+    const before = kept?.quantities.find(({ symbol }) => symbol === row.symbol)?.[key];
+    return [micro(row[key]), before === undefined ? null
+      : make("span", { class: "was" }, `was ${micro(before)}`)];
   };
-  const rows = found.map((row) => {
-    const some = row.undetermined && row.undetermined < row.count;
-    return make("tr", {},
-      make("td", { title: row.largest ? `largest at ${row.largest}` : undefined },
-        make("strong", {}, row.symbol), ` ${row.description}`,
-        some ? ` (${row.undetermined} of ${row.count} undetermined)` : ""),
-      ...(row.average === null && !kept ? [make("td", { colspan: "2" }, "undetermined")]
-        : [cell(row, "average"), cell(row, "maximum")]),
-      make("td", {}, units(row)));
-  });
-  const heads = ["standard uncertainty of", "average", "max.", ""];
-  $("quantities").replaceChildren(
-    make("thead", {}, make("tr", {}, ...heads.map((head) => make("th", {}, head)))),
-    make("tbody", {}, ...rows));
+  const row = (one) => [
+    make("td", { title: one.largest ? `largest at ${one.largest}` : undefined },
+      make("strong", {}, one.symbol), ` ${one.description}`,
+      one.undetermined && one.undetermined < one.count
+        ? ` (${one.undetermined} of ${one.count} undetermined)` : ""),
+    ...(one.average === null && !kept ? [make("td", { colspan: "2" }, "undetermined")]
+      : [cell(one, "average"), cell(one, "maximum")]), units(one.unit)];
+  fill($("quantities"),
+    table(["standard uncertainty of", "average", "max.", ""], found.map(row)));
 }

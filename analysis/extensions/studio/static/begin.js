@@ -1,11 +1,11 @@
 // The page on which a design begins: the questions of init, a file of the folder, or an example.
 import { dialog } from "./computations.js";
-import { $, act, ask, make, page, tell } from "./page.js";
+import { $, act, ask, button, make, page, tell } from "./page.js";
 import { picture } from "./paper.js";
 
 const PAUSE = 250; // milliseconds without a key before a draft is asked for
 
-let questions = null; // as the studio asks them
+let questions = null; // as the studio asks them, and the name of the file
 let draft = null; // of the last answers
 let asked = 0; // drafts that were asked for
 let timer = null;
@@ -22,12 +22,15 @@ export async function begin() {
     if (found.missing) return void tell(note);
     ({ questions } = found);
     $("questions").replaceChildren(...questions.map(group));
+    questions.push({ name: "name", label: "Name of the file", box: $("question-name"),
+      read: () => [{ text: $("begin-name").value.trim(), fault: "" }] });
+    questions.forEach(follow);
     restore();
   }
   const others = state.files.filter((name) => name !== state.file);
   $("begin-files").hidden = !others.length;
   $("begin-files").querySelector("ul").replaceChildren(...others.map((name) =>
-    make("li", {}, make("button", { onclick: () => open(name) }, name))));
+    make("li", {}, button(name, async () => { if (await open(name)) close(page.state.note); }))));
   $("begin-example").hidden = !state.untouched;
   $("begin-back").hidden = state.untouched;
   let name = state.untouched ? state.file : "design.yaml";
@@ -58,33 +61,76 @@ function close(said = "") {
 
 // Ask whether changes of the present design may be left.
 async function may_leave() {
-  const { state } = page;
-  if (state.saved || state.untouched) return true;
-  return dialog(`${state.file} has changes that are not saved. Leave them?`, []);
+  const { state, typed } = page;
+  if (!typed && (state.saved || state.untouched)) return true;
+  return dialog(`${state.file} has changes that are not saved. Leave them?`);
 }
 
-async function open(name) {
-  const action = { do: "open", name, discard: true };
-  if (await may_leave() && await act(action)) close(page.state.note);
+// Open another file of the folder, and return whether that was done.
+export async function open(name) {
+  if (!(await may_leave())) return false;
+  page.typed = false;
+  return act({ do: "open", name, discard: true });
 }
 
-function group(question) {
-  const { name } = question;
-  const box = make("fieldset", { id: `question-${name}` },
-    make("legend", {}, question.label),
-    make("p", { class: "hint", id: `hint-${name}` }, question.hint,
-      question.usual ? ` Empty: ${question.usual}.` : ""),
-    make("div", { class: "fields" },
-      ...question.fields.map((field, k) => (field.choices ? choices : number)(question, field, k))),
-    make("p", { class: "field-error", id: `error-${name}` }));
-  const described = `hint-${name} error-${name}`;
-  controls(box).forEach((one) => one.setAttribute("aria-describedby", described));
-  follow(box, name);
-  return box;
+async function begin_with(text, said) {
+  const name = $("begin-name").value.trim();
+  const action = { do: "begin", name, text, discard: true };
+  if (!(await may_leave())) return;
+  page.typed = false;
+  if (await act(action)) close(`${name} ${said}; Save writes it`);
 }
 
 const controls = (box) => [...box.querySelectorAll("input, select")];
 const property = (control) => (control.type === "radio" ? "checked" : "value");
+
+// The fields of a question, which then has its `box` and `read`, each field's text and fault.
+function group(question) {
+  const { name, label, hint, usual } = question;
+  const fields = question.fields.map((field, k) =>
+    (field.choices ? choices : number)(field, `answer-${name}-${k}`));
+  question.read = () => fields.map((field) => field.read());
+  question.box = make("fieldset", { id: `question-${name}` }, make("legend", {}, label),
+    make("p", { class: "hint", id: `hint-${name}` }, hint, usual ? ` Empty: ${usual}.` : ""),
+    make("div", { class: "fields" }, fields.map((field) => field.element)),
+    make("p", { class: "field-error", id: `error-${name}` }));
+  controls(question.box).forEach((one) =>
+    one.setAttribute("aria-describedby", `hint-${name} error-${name}`));
+  return question.box;
+}
+
+function number({ label, units, usual }, id) {
+  const input = make("input", { id, inputmode: "decimal", autocomplete: "off" });
+  const select = make("select", { "aria-label": `unit of ${label}` },
+    units.map((unit, k) => make("option", { value: k }, unit.name)));
+  const unit = () => units[select.value || 0];
+  select.oninput = () => { input.placeholder = unit().default ?? usual ?? ""; };
+  select.oninput();
+  const read = () => {
+    const typed = input.value.trim().replace(",", ".");
+    const value = typed || unit().default || "";
+    return { input, text: value && unit().text.replace("{}", () => value),
+      fault: Number(typed) >= 0 ? "" : `${label}: "${typed}" is no number` };
+  };
+  return { read, element: make("div", { class: "field" }, make("label", { for: id }, label),
+    make("div", { class: "bar" }, input,
+      units.length > 1 ? select : make("span", {}, unit().name))) };
+}
+
+// Choices with pictures first.
+function choices(field, name) {
+  const isDrawn = ({ shapes }) => shapes?.length > 0;
+  const choice = (one) => make("label", { class: isDrawn(one) ? "card" : "" },
+    make("input", { type: "radio", name, value: one.value, checked: one.value === field.default }),
+    isDrawn(one) ? [picture(one.shapes), make("strong", {}, one.value)] : null,
+    make("span", {}, one.words));
+  const cards = field.choices.filter(isDrawn).map(choice);
+  const others = make("div", { class: "choices" },
+    field.choices.filter((one) => !isDrawn(one)).map(choice));
+  return { read: () => ({ text: $("begin-form").elements[name].value, fault: "" }),
+    element: cards.length ? make("div", {}, make("div", { class: "cards" }, cards),
+      make("p", { class: "hint" }, "Or the order of the axes:"), others) : others };
+}
 
 // Answers of this tab outlive a page that is loaded again.
 function restore() {
@@ -95,55 +141,8 @@ function restore() {
   });
 }
 
-function number(question, field, k) {
-  const id = `answer-${question.name}-${k}`;
-  const input = make("input", { id, inputmode: "decimal", autocomplete: "off" });
-  const units = make("select", { "aria-label": `unit of ${field.label}` },
-    ...field.units.map((unit, number) => make("option", { value: number }, unit.name)));
-  const hint = () => {
-    const { default: usual } = field.units[units.value || 0];
-    input.placeholder = usual ?? field.usual ?? "";
-  };
-  units.addEventListener("input", hint);
-  hint();
-  return make("div", { class: "field" }, make("label", { for: id }, field.label),
-    make("div", { class: "bar" }, input,
-      field.units.length > 1 ? units : make("span", {}, field.units[0].name)));
-}
-
-// Choices with pictures first; where there are any, those without are folded.
-function choices(question, field, k) {
-  const isDrawn = ({ shapes }) => shapes?.length > 0;
-  const choice = (one) => make("label", { class: isDrawn(one) ? "card" : "" },
-    make("input", { type: "radio", name: `answer-${question.name}-${k}`, value: one.value,
-      checked: one.value === field.default }),
-    ...(isDrawn(one) ? [picture(one.shapes), make("strong", {}, one.value)] : []),
-    make("span", {}, one.words));
-  const drawn = field.choices.filter(isDrawn);
-  const others = field.choices.filter((one) => !isDrawn(one)).map(choice);
-  if (!drawn.length) return make("div", { class: "choices" }, ...others);
-  return make("div", {}, make("div", { class: "cards" }, ...drawn.map(choice)),
-    make("details", {}, make("summary", {}, "another chain of axes"),
-      make("div", { class: "choices" }, ...others)));
-}
-
-// The text of an entry as init takes it, and whether it was stated.
-function entry(question) {
-  let isStated = false;
-  const texts = question.fields.map((field, k) => {
-    const id = `answer-${question.name}-${k}`;
-    const typed = field.choices ? $("begin-form").elements[id].value : $(id).value.trim();
-    if (typed) isStated = true;
-    if (field.choices) return typed;
-    const unit = field.units[$(id).parentElement.querySelector("select")?.value ?? 0];
-    const value = typed || unit.default || "";
-    return value && unit.text.replace("{}", () => value);
-  });
-  return { text: texts.join(""), isStated };
-}
-
 // Follow what is typed, and report faults once its question is left.
-function follow(box, name) {
+function follow({ box, name }) {
   box.addEventListener("input", () => {
     clearTimeout(timer);
     timer = setTimeout(update, PAUSE);
@@ -161,13 +160,14 @@ async function update() {
   const mine = asked;
   const kept = controls($("questions")).map((one) => one[property(one)]);
   sessionStorage.setItem("answers", JSON.stringify(kept));
-  const answers = Object.fromEntries(questions.map((one) => [one.name, entry(one).text]));
+  const answers = Object.fromEntries(questions.map((one) =>
+    [one.name, one.read().map(({ text }) => text).join("")]));
   try {
-    const found = await ask("/api/draft", { ...answers, name: $("begin-name").value.trim() });
+    const found = await ask("/api/draft", answers);
     if (mine !== asked) return;
     draft = found;
     messages();
-    if (draft.text) summary();
+    if (draft.text) summary(answers);
     $("draft").classList.toggle("stale", !draft.text);
   } catch (error) {
     tell(error.message, true);
@@ -176,50 +176,43 @@ async function update() {
 
 // What is wrong at its field, but not while it is typed for the first time.
 function messages() {
-  const said = [];
-  for (const { name, label } of [...questions, { name: "name", label: "Name of the file" }]) {
-    const box = $(`question-${name}`);
+  const said = questions.flatMap(({ box, label, name, read }) => {
     const isTyped = box.contains(document.activeElement) && !left.has(name);
-    const message = (!isTyped && draft.messages[name]) || "";
+    const wrong = isTyped ? [] : read().filter(({ fault }) => fault);
+    const message = isTyped ? ""
+      : wrong.map(({ fault }) => fault).join("; ") || draft.messages[name] || "";
     $(`error-${name}`).textContent = message;
-    controls(box).forEach((one) => one.setAttribute("aria-invalid", String(!!message)));
-    if (message) said.push(`${label}: ${message}`);
-  }
+    controls(box).forEach((one) => one.setAttribute("aria-invalid", String(Boolean(message)
+      && (!wrong.length || wrong.some(({ input }) => input === one)))));
+    return message ? `${label}: ${message}` : [];
+  });
   const status = said.join(". ");
   if ($("begin-status").textContent !== status) $("begin-status").textContent = status;
 }
 
-function summary() {
-  const rows = questions.flatMap((question) => {
-    const usual = entry(question).isStated ? "" : question.usual ?? "as shown in grey";
-    const words = draft.words[question.name];
-    if (!words && !question.usual) return [];
-    return [make("dt", {}, question.label), make("dd", {}, words ?? (usual || entry(question).text),
-      words && usual ? make("small", {}, ` (${usual})`) : null)];
-  });
+function summary(answers) {
+  const rows = questions.filter(({ name, usual }) => usual ?? draft.words[name])
+    .map(({ label, name, usual }) => [make("dt", {}, label),
+      make("dd", {}, draft.words[name] ?? (answers[name] || usual))]);
   $("draft").replaceChildren(make("h2", {}, "The draft"),
     picture(draft.shapes, "The volume with the plate where the design begins"),
-    make("dl", {}, ...rows));
+    make("dl", {}, ...rows.flat()));
 }
 
 async function make_design(event) {
   event.preventDefault();
   questions.forEach((one) => left.add(one.name));
-  left.add("name");
   await update();
-  if (!draft?.text || Object.keys(draft.messages).length) {
-    $("begin").querySelector("[aria-invalid=true]")?.focus();
-    return;
-  }
-  const name = $("begin-name").value.trim();
-  const action = { do: "begin", name, text: draft.text, discard: true };
-  if (await may_leave() && await act(action)) {
-    close(`${name} is a draft of your answers, and not saved yet; Save writes it`);
-  }
+  if (draft?.text && !Object.keys(draft.messages).length) {
+    await begin_with(draft.text, "is a draft of your answers, and not saved yet");
+  } else $("begin").querySelector("[aria-invalid=true]")?.focus();
 }
 
 $("begin-form").addEventListener("submit", make_design);
-follow($("question-name"), "name");
 $("begin-example").onclick = () => close(page.state.note);
+$("begin-flat").onclick = async () => {
+  const example = await fetch("/static/two-axes.yaml");
+  await begin_with(await example.text(), "is an example of two axes, and not saved yet");
+};
 $("begin-back").onclick = () => close();
 $("new").onclick = begin;

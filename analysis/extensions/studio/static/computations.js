@@ -1,25 +1,43 @@
 // Computations beside the page: suggestions, sweeps, plans, fits.
-import { $, act, ask, make, micro, page, share, tell } from "./page.js";
+import { $, act, ask, button, fill, make, micro, page, share, table, tell } from "./page.js";
 
-let suggestions = [];
-let fits = null;
+const OFFERING = ["suggest", "next", "plan"]; // what is drawn and applied
 let running = []; // computations as they were when they were asked after last
+const shown = new Map(); // by the number of a computation and of a suggestion
 
-// What is drawn of them in the view.
-export function drawn() {
-  page.view.ghost(current().filter((one) => one.shown).flatMap((one) => one.places));
-  if (fits?.fingerprint !== page.state.fingerprint) fits = null;
-  page.view.residuals(fits, fits?.scale);
-  suggested();
-  computations(running);
-}
+const is_current = ({ fingerprint, state }) =>
+  fingerprint === page.state.fingerprint && state === "done";
 
-export function forget_suggestions() {
-  suggestions = [];
-}
-
+// What is suggested for the present design: what was computed last.
 function current() {
-  return suggestions.filter((one) => one.fingerprint === page.state.fingerprint);
+  const last = running.findLast((one) => is_current(one) && OFFERING.includes(one.job));
+  return [last?.result ?? []].flat().map((one, k) => ({ ...one, key: `${last.id} ${k}`,
+    shown: shown.get(`${last.id} ${k}`) ?? k === 0, places: one.places ?? [one.place] }));
+}
+
+// Everything of them, in the view and beside it.
+export function drawn() {
+  const { view } = page;
+  view.ghost(current().filter((one) => one.shown).flatMap((one) => one.places));
+  const fitted = running.findLast((one) => is_current(one) && one.result?.residuals);
+  view.residuals(fitted?.result.residuals, fitted && magnified(fitted));
+  lists();
+}
+
+// Of this file, what was suggested as suggestions; what failed of an earlier text nowhere.
+function lists() {
+  const { file, fingerprint } = page.state;
+  fill($("suggestions"), current().map(suggestion));
+  fill($("jobs"), running.filter((job) => job.file === file && (job.state === "failed"
+    ? job.fingerprint === fingerprint
+    : job.state === "running" || job.job === "plan" || !OFFERING.includes(job.job)
+      || !job.result.length)).map(computation));
+}
+
+// How many times their size residuals are drawn.
+function magnified({ result }) {
+  const sizes = result.residuals.value.map((one) => Math.hypot(...one));
+  return Number(((0.06 * page.view.size) / Math.max(...sizes, 1e-12)).toPrecision(2));
 }
 
 // The settings of the next position that lowers U6 most for each reading, if it was asked for.
@@ -30,41 +48,27 @@ export function candidate() {
   return added.sort((one, other) => gain(other) - gain(one) || 0)[0]?.settings;
 }
 
-function suggested() {
-  const shown = current();
-  $("suggestions").replaceChildren(...shown.map(suggestion));
-  if (suggestions.length && !shown.length) {
-    $("suggestions").append(
-      make("p", {}, "The design has changed since these were asked for; ask again."));
-  }
-}
-
-function suggestion(one, k) {
-  const is_open = one.average === null || one.average === undefined;
-  const figure = !is_open
-    ? `U6 ${micro(one.average)} µm on average, ${micro(one.maximum)} µm at most`
-    : one.deficiency ? `rank deficiency ${one.deficiency} left` : "";
-  const weak = one.weak
-    ? `; ${one.weak} ${one.weak > 1 ? "directions stay" : "direction stays"} weak` : "";
+function suggestion(one) {
+  const { average, maximum, deficiency, weak, faint, key } = one;
+  const figure = Number.isFinite(average)
+    ? `U6 ${micro(average)} µm on average, ${micro(maximum)} µm at most`
+    : deficiency ? `rank deficiency ${deficiency} left` : "";
   const toggle = () => {
-    one.shown = !one.shown;
+    shown.set(key, !one.shown);
     page.show();
   };
-  return make("li", {}, make("div", {}, one.words),
-    make("div", {}, figure, weak, one.faint ? "; barely determined" : ""),
-    make("div", { class: "bar" },
-      make("button", { "aria-pressed": String(!!one.shown), "data-focus": `show ${k}`,
-        onclick: toggle }, one.shown ? "hide" : "show"),
-      make("button", { "data-apply": "", "data-focus": `apply ${k}`, onclick: () => apply(one) },
-        "apply")));
+  return make("li", {}, make("div", {}, one.words), make("div", {}, figure,
+    weak ? `; ${weak} ${weak > 1 ? "directions stay" : "direction stays"} weak` : "",
+    faint ? "; barely determined" : ""),
+  make("div", { class: "bar" },
+    button(one.shown ? "hide" : "show", toggle, { "aria-pressed": String(one.shown) }),
+    button("apply", () => apply(one), { "data-apply": "" })));
 }
 
-function apply(one) {
-  suggestions = suggestions.filter((other) => other !== one);
-  if (one.settings) act({ do: "add", settings: one.settings }, "position added");
-  else if (one.plan) act(
-    { do: "plan", positions: one.plan, calibration: one.calibration }, "planned; undo leads back");
-  else act({ do: "repair", edits: one.edits }, "applied");
+function apply({ settings, plan: positions, calibration, edits }) {
+  if (settings) act({ do: "add", settings }, "position added");
+  else if (positions) act({ do: "plan", positions, calibration }, "planned; undo leads back");
+  else act({ do: "repair", edits }, "applied");
 }
 
 const BESIDE = "computing beside the studio …";
@@ -82,142 +86,106 @@ export async function start(job, settings = {}) {
   return refused;
 }
 
-const taken = new Set();
+// A plan within the hours that are stated, or else those of the present positions.
+export function plan() {
+  const typed = $("hours").value.trim().replace(",", ".");
+  const is_read = page.state.design?.scene.positions.some((place) => place.enabled);
+  if (typed ? Number(typed) > 0 : is_read) {
+    return start("plan", typed ? { hours: Number(typed) } : {});
+  }
+  $("hours").focus();
+  return tell(typed ? `"${typed}" is no number of hours`
+    : "There are no positions that hours could be taken from: state the hours.", true);
+}
+
 let polling = null;
 export async function poll() {
   clearTimeout(polling);
-  let list;
+  const before = new Map(running.map((job) => [job.id, job.state]));
   try {
-    list = await ask("/api/jobs");
+    running = await ask("/api/jobs");
   } catch (error) {
     tell(error.message, true);
     return;
   }
-  for (const job of list.filter(({ id, state }) => state === "done" && !taken.has(id))) {
-    taken.add(job.id);
-    take(job);
-  }
-  running = list;
-  computations(running);
-  if (list.some((job) => job.state === "running")) polling = setTimeout(poll, 300);
+  const is_new = running.some((job) => is_current(job) && before.get(job.id) === "running"
+    && ["suggest", "next"].includes(job.job));
+  // A plan of positions, or a fit, is drawn.
+  if (running.some(({ id, state }) => before.get(id) !== state)) page.show();
+  else lists();
+  if (is_new) $("suggested").scrollIntoView({ block: "nearest" });
+  if (running.some((job) => job.state === "running")) polling = setTimeout(poll, 300);
   else if ($("notice").textContent === BESIDE) tell("");
 }
 
-function take({ job, result, fingerprint }) {
-  if (job === "suggest" || job === "next") {
-    suggestions = result.map((one, k) =>
-      ({ ...one, places: one.places ?? [one.place], fingerprint, shown: k === 0 }));
-    const none = job === "suggest"
-      ? "nothing is undetermined or weak, or nothing was found that helps"
-      : "no further position fits";
-    tell(suggestions.length ? "" : none);
-    page.show();
-    $("suggested").scrollIntoView({ block: "nearest" });
-  }
-  if (job === "plan") {
-    suggestions = [{ ...result, fingerprint, shown: true }];
-    page.show();
-  }
-  if (job === "fit" && result.residuals) {
-    const sizes = result.residuals.value.map((one) => Math.hypot(...one));
-    const scale = (0.06 * page.view.size) / Math.max(...sizes, 1e-12);
-    fits = { ...result.residuals, fingerprint, scale };
-    page.show();
-    const times = Number(scale.toPrecision(2)).toLocaleString("en");
-    tell(`residuals are drawn ${times} times their size`);
-  }
-}
+const NOTHING = { suggest: "nothing was found that determines more",
+  next: "no further position fits" };
 
-function computations(list) {
-  // What was suggested is shown with the suggestions.
-  const told = list.filter((job) =>
-    job.state !== "done" || !["suggest", "next"].includes(job.job));
-  // An item is made anew only where it has changed: nobody can press a button that is replaced
-  // all the time.
-  const there = new Map([...$("jobs").children].map((item) => [item.dataset.said, item]));
-  const items = told.map((job) => {
-    const is_current = job.fingerprint === page.state.fingerprint;
-    const said = JSON.stringify([page.state.session, job.id, job.state, job.page, is_current,
-      job.ending]);
-    const item = there.get(said) ?? computation(job, said, is_current);
-    const step = job.state === "running" && job.step ? `: ${job.step}` : "";
-    item.querySelector(".step").textContent = step;
-    return item;
-  });
-  const { children } = $("jobs");
-  if (items.length !== children.length || items.some((item, k) => item !== children[k])) {
-    $("jobs").replaceChildren(...items);
-  }
-}
-
-function computation(job, said, is_current) {
+function computation(job) {
+  const { id, state, result, step } = job;
+  const isDone = state === "done";
+  const is_old = job.fingerprint !== page.state.fingerprint;
   const stop = async () => {
-    await ask("/api/stop", { id: job.id });
+    await ask("/api/stop", { id });
     poll();
   };
-  const lines = job.state === "done" && job.result?.lines
-    ? [...(job.result.notes ?? []), ...job.result.lines].join("\n") : null;
-  return make("li", { "data-state": job.state, "data-said": said },
-    make("strong", {}, job.job), ` ${job.state}`, make("span", { class: "step" }), " ",
-    make("button", { "data-focus": `job ${job.id}`, onclick: stop },
-      job.state !== "running" ? "close" : job.ending ? "stop without a plan" : "stop"),
-    job.ending ? make("small", {}, " ends with the best so far") : null,
-    " ",
-    job.page ? make("a", { href: `/pages/${job.id}`, target: "_blank", rel: "noopener",
+  const fitted = isDone && result?.residuals
+    ? [`residuals are drawn ${magnified(job).toLocaleString("en")} times their size`] : [];
+  const text = state === "failed" ? String(result) : isDone && NOTHING[job.job]
+    ? NOTHING[job.job] : isDone && result?.lines
+      ? [...fitted, ...(result.notes ?? []), ...result.lines].join("\n") : null;
+  return make("li", { "data-state": state, id: `job-${id}` },
+    make("strong", {}, job.job), ` ${state}`,
+    make("span", { class: "step" }, state === "running" && step ? `: ${step}` : ""), " ",
+    button(state !== "running" ? "close" : job.ending ? "stop without a plan" : "stop", stop), " ",
+    job.ending ? make("small", {}, "ends with the best so far ") : null,
+    job.page ? make("a", { href: `/pages/${id}`, target: "_blank", rel: "noopener",
       "data-page": "" }, "open its page") : null,
-    is_current ? null : make("small", {}, " of an earlier design"),
-    job.state === "failed" ? make("pre", {}, String(job.result)) : null,
-    lines === null ? null : make("pre", { tabindex: "0" }, lines),
-    job.state === "done" && job.job === "sweep" ? table(job.result, job.page) : null,
+    text ? button("read it whole", () => opened(job.job, make("pre", {}, text))) : null,
+    is_old ? make("small", {}, " of an earlier design") : null,
+    // What is of an earlier design is read on request alone.
+    text && !is_old ? make("pre", { tabindex: "0" }, text) : null,
+    isDone && job.job === "sweep" ? cells(result, job.page) : null,
   );
 }
 
 const MOST_ROWS = 60; // of a sweep's cells in its table here
-const FIGURES = ["rank deficiency", "U6 average µm", "U6 max. µm", "lengths within target"];
-function table(found, has_page) {
+function cells(found, has_page) {
   // The last keys of paths, which tell enough where there is little room.
   const short = (paths) => paths.map((path) => path.split(".").at(-1)).join(", ");
-  const heads = [
-    ...found.axes.map((paths) => make("th", { title: paths.join(", ") }, short(paths))),
-    ...FIGURES.map((head) => make("th", {}, head))];
-  const figures = (cell) => [
-    String(cell.deficiency), micro(cell.average), micro(cell.maximum),
-    share(cell.within) || "no target"].map((text) => make("td", {}, text));
-  const rows = found.cells.slice(0, MOST_ROWS).map((cell) => make("tr", {},
-    ...cell.values.map((value) => make("td", {}, value)),
-    ...(cell.reason ? [make("td", { colspan: "4" }, cell.reason)] : figures(cell))));
+  const heads = found.axes.map((paths) =>
+    make("th", { scope: "col", title: paths.join(", ") }, short(paths)));
+  const rows = found.cells.slice(0, MOST_ROWS).map((cell) => [...cell.values,
+    ...(cell.reason ? [make("td", { colspan: "4" }, cell.reason)] : [cell.deficiency,
+      micro(cell.average), micro(cell.maximum), share(cell.within) || "no target"])]);
   const rest = found.cells.length - MOST_ROWS;
-  return make("div", { class: "scrolled", tabindex: "0" },
-    make("table", {}, make("thead", {}, make("tr", {}, ...heads)), make("tbody", {}, ...rows)),
-    rest > 0 ? make("p", {}, `${rest} more cases are on the page`) : null,
-    has_page ? null
-      : make("p", {}, "its page needs the extra report: python -m pip install 'ballplate[report]'"),
-  );
+  return make("div", { class: "scrolled", tabindex: "0" }, make("table", {}, table(
+    [...heads, "rank deficiency", "U6 average µm", "U6 max. µm", "lengths within target"], rows)),
+  rest > 0 ? make("p", {}, `${rest} more cases are on the page`) : null,
+  has_page ? null
+    : make("p", {}, "its page needs the extra report: python -m pip install 'ballplate[report]'"));
 }
 
 // A dialogue with some fields, true if it was confirmed.
-function opened(question, fields) {
+function opened(question, ...fields) {
   $("question").textContent = question;
   $("fields").replaceChildren(...fields);
   $("dialog").returnValue = "";
   $("dialog").showModal();
   return new Promise((resolve) => {
-    const done = () => resolve($("dialog").returnValue === "ok");
-    $("dialog").addEventListener("close", done, { once: true });
+    $("dialog").onclose = () => resolve($("dialog").returnValue === "ok");
   });
 }
 
-export async function dialog(question, fields) {
-  const inputs = fields.map(([name, value]) => [name, make("input", { name, value })]);
-  const labels = inputs.map(([name, input]) => make("label", {}, name, input));
-  return (await opened(question, labels)) ? inputs.map(([, input]) => input.value) : null;
+export async function dialog(question, ...fields) {
+  const inputs = fields.map(([name, value]) => make("input", { name, value }));
+  const labels = inputs.map((input) => make("label", {}, input.name, input));
+  return (await opened(question, ...labels)) ? inputs.map((input) => input.value) : null;
 }
 
 // Paths of all values of a design, entries of lists by their names where they have any.
-function keys(data, path) {
-  if (Array.isArray(data)) {
-    return data.flatMap((one, k) => keys(one, `${path}[${one?.name ?? k}]`));
-  }
+function keys(data, path = "") {
+  if (Array.isArray(data)) return data.flatMap((one, k) => keys(one, `${path}[${one?.name ?? k}]`));
   if (data === null || typeof data !== "object") return [path];
   const below = Object.entries(data)
     .flatMap(([key, one]) => keys(one, path ? `${path}.${key}` : key));
@@ -225,44 +193,40 @@ function keys(data, path) {
 }
 
 export async function sweep() {
-  const paths = keys(page.state.data, "").map((path) => new Option(path, path));
-  const list = make("datalist", { id: "paths" }, ...paths);
+  const list = make("datalist", { id: "paths" },
+    keys(page.state.data ?? {}).map((path) => make("option", { value: path })));
   const field = (words, axis, value) =>
     make("label", {}, words, make("input", { value, "data-axis": axis, autocomplete: "off",
       list: axis === "paths" ? "paths" : undefined }));
-  const row = (path, values) => make("fieldset", {},
+  const error = () => make("p", { class: "field-error", role: "alert" });
+  const axis = (path, values) => make("fieldset", {},
     field("keys, separated by commas", "paths", path),
-    field("values, separated by semicolons", "values", values));
-  const rows = make("div", {}, row("machine.repeatability", "0.1 um; 0.2 um; 0.4 um"));
+    field("values, separated by semicolons", "values", values), error());
+  const rows = make("div", {}, axis("machine.repeatability", "0.1 um; 0.2 um; 0.4 um"));
   const add = () => {
-    rows.append(row("", ""));
+    rows.append(axis("", ""));
     rows.lastElementChild.querySelector("input").focus();
   };
-  const more = make("button", { type: "button", id: "more-axes", onclick: add }, "Another axis");
+  const more = button("Another axis", add, { id: "more-axes" });
+  const below = error();
   const part = (one, key, mark) => one.querySelector(`[data-axis=${key}]`).value.split(mark)
     .map((text) => text.trim()).filter(Boolean);
-  const error = make("p", { class: "field-error", role: "alert" });
   const question = "Compute every combination of some values";
-  while (await opened(question, [rows, list, more, ...(rows.contains(error) ? [] : [error])])) {
-    const axes = [...rows.children]
-      .map((one) => ({ paths: part(one, "paths", ","), values: part(one, "values", ";") }))
-      .filter((one) => one.paths.length);
-    const refused = await start("sweep", { axes });
+  while (await opened(question, rows, list, more, below)) {
+    const axes = [...rows.children].map((one) =>
+      ({ paths: part(one, "paths", ","), values: part(one, "values", ";"), one }));
+    const refused = await start("sweep", { axes: axes.filter(({ paths }) => paths.length)
+      .map(({ paths, values }) => ({ paths, values })) });
     if (!refused) return;
     // Beside the axis that is meant, whose key the words begin with, or below all.
-    const meant = [...rows.children].find((one) =>
-      part(one, "paths", ",").some((path) => refused.startsWith(`${path}: `)));
-    error.textContent = refused;
-    if (meant) meant.append(error);
-    else error.remove();
+    [...$("fields").querySelectorAll(".field-error")].forEach((one) => { one.textContent = ""; });
+    const meant = axes.find(({ paths }) => paths.some((path) => refused.startsWith(`${path}: `)));
+    (meant?.one.lastElementChild ?? below).textContent = refused;
   }
 }
 
-export async function fit(file) {
-  const bytes = new Uint8Array(await file.arrayBuffer());
-  let text = "";
-  for (let k = 0; k < bytes.length; k += 32768) {
-    text += String.fromCharCode(...bytes.subarray(k, k + 32768));
-  }
-  start("fit", { name: file.name, content: btoa(text) });
+export function fit(file) {
+  const reader = new FileReader();
+  reader.onload = () => start("fit", { name: file.name, content: reader.result.split(",")[1] });
+  reader.readAsDataURL(file);
 }

@@ -1,184 +1,203 @@
 // Forms for the sections of a design, made from the schema of its file.
-import { make } from "./page.js";
+import { $, act, button, fill, make, options, page, table } from "./page.js";
 
 const SECTIONS = [
   "title", "machine", "error_model", "probes", "artefacts", "positions", "calibration",
   "influences", "evaluation", "target_uncertainty", "coverage_factor", "expected_rank_deficiency",
 ];
+const isMapping = (one) => one !== null && typeof one === "object" && !Array.isArray(one);
+const spaced = (key) => String(key).replaceAll("_", " ");
 
-function resolve(schema, root) {
+// A schema that others refer to.
+function resolve(schema) {
   let found = schema;
-  while (found?.$ref) found = found.$ref.split("/").slice(1).reduce((at, key) => at[key], root);
+  while (found?.$ref) {
+    found = found.$ref.split("/").slice(1).reduce((at, key) => at[key], page.schema);
+  }
   return found ?? {};
 }
 
 // The forms that data may have there: alternatives are narrowed to those whose constants fit.
-function forms(schema, data, root) {
-  const found = resolve(schema, root);
-  const alternatives = found.anyOf ?? found.oneOf;
-  if (!alternatives) return [found];
-  const every = alternatives.flatMap((one) => forms(one, data, root));
-  const fitting = every.filter((one) => fits(one, data, root));
+function forms(schema, data) {
+  const found = resolve(schema);
+  const every = (found.anyOf ?? found.oneOf)?.flatMap((one) => forms(one, data)) ?? [found];
+  const fitting = every.filter((one) => fits(one, data));
   return fitting.length ? fitting : every;
 }
 
-function fits(schema, data, root) {
+function fits({ type, properties, additionalProperties }, data) {
   if (data === undefined) return true;
-  if (Array.isArray(data)) return schema.type === "array";
-  if (data !== null && typeof data === "object") {
-    const { type, properties, additionalProperties } = schema;
-    if (type !== "object" && !properties && !additionalProperties) return false;
-    return Object.entries(schema.properties ?? {}).every(([key, value]) => {
-      const part = resolve(value, root);
-      return part.const === undefined || data[key] === part.const;
-    });
-  }
-  return schema.type !== "object" && schema.type !== "array";
+  if (!isMapping(data)) return Array.isArray(data) === (type === "array") && type !== "object";
+  return [type === "object", properties, additionalProperties].some(Boolean)
+    && Object.entries(properties ?? {}).every(([key, value]) =>
+      [undefined, data[key]].includes(resolve(value).const));
 }
 
-function choices(schemas, root) {
-  const found = new Set();
-  for (const one of schemas) {
-    if (one.const !== undefined) found.add(String(one.const));
-    (one.enum ?? []).forEach((value) => found.add(String(value)));
-    if (one.type === "boolean") ["true", "false"].forEach((value) => found.add(value));
-  }
-  const free = schemas.some((one) =>
-    one.enum === undefined && one.const === undefined && !["boolean", "null"].includes(one.type));
-  return free ? null : [...found];
+// The schema of a key in one of some forms.
+const property = (possible, key) => possible.flatMap(({ properties, additionalProperties }) =>
+  properties?.[key] ?? (isMapping(additionalProperties) ? additionalProperties : []))[0] ?? {};
+
+// All that a value can be, or null if it is free.
+function choices(schemas) {
+  const listed = schemas.map((one) => (one.const !== undefined ? [one.const] : one.enum
+    ?? { boolean: [true, false], null: [] }[one.type]));
+  return listed.includes(undefined) ? null : [...new Set(listed.flat().map(String))];
 }
+
+// All kinds of an entry that there are, not the present one alone.
+const kinds = (part) => forms(part).map((one) => one.properties?.kind).filter(Boolean);
 
 // A value as the file would state it, in one line.
 export function flow(value) {
   if (value === null || value === undefined) return "";
   if (Array.isArray(value)) return `[${value.map(flow).join(", ")}]`;
-  if (typeof value === "object") {
-    const entries = Object.entries(value).map(([key, one]) => `${key}: ${flow(one)}`);
-    return `{${entries.join(", ")}}`;
-  }
-  return String(value);
+  if (!isMapping(value)) return String(value);
+  return `{${Object.entries(value).map(([key, one]) => `${key}: ${flow(one)}`).join(", ")}}`;
 }
 
-// Only sections that are open have fields, and only those whose data have changed are made anew.
-export function build(container, data, schema, messages, onSet) {
-  for (const section of SECTIONS) {
-    const part = schema.properties?.[section];
-    if (!part) continue;
-    let details = container.querySelector(`:scope > [data-section="${section}"]`);
-    if (!details) {
-      details = make("details", { "data-section": section });
-      const description = resolve(part, schema).description ?? part.description ?? "";
-      const heading = section.replaceAll("_", " ");
-      details.append(make("summary", { title: description }, heading), make("div"));
-      details.addEventListener("toggle", () => details.fill());
-      container.append(details);
-    }
-    const wrong = messages.filter((one) => one.path.split(/[.[]/)[0] === section);
-    details.classList.toggle("wrong", wrong.length > 0);
-    const said = JSON.stringify([data?.[section], wrong]);
-    details.fill = () => {
-      if (!details.open || details.said === said) return;
-      details.said = said;
-      const unfolded = [...details.querySelectorAll("details[open]")];
-      const open = new Set(unfolded.map((one) => one.dataset.of));
-      const box = make("div");
-      const form = { schema, messages, onSet };
-      fields(box, [section], data?.[section], part, form, section);
-      box.querySelectorAll("details").forEach((one) => {
-        one.open = open.has(one.dataset.of);
-      });
-      details.lastElementChild.replaceWith(box);
-    };
-    details.fill();
+const set = (path, value) => act({ do: "set", path, value });
+
+// Make the sections, and the fields of those that are open.
+export function build() {
+  const { data, messages } = page.state;
+  const container = $("forms");
+  if (!container.children.length) container.replaceChildren(...SECTIONS.map(section));
+  for (const details of container.children) {
+    const { section: key } = details.dataset;
+    details.classList.toggle("wrong",
+      messages.some(({ path }) => path.split(/[.[]/)[0] === key));
+    const part = page.schema.properties[key];
+    if (details.open) fill(details.lastElementChild, fields([key], data?.[key], part, "value"));
   }
 }
 
-const isMapping = (one) => one !== null && typeof one === "object" && !Array.isArray(one);
+const section = (key) => make("details", { "data-section": key, ontoggle: build },
+  make("summary", { title: resolve(page.schema.properties[key]).description }, spaced(key)),
+  make("div", {}));
 
-// `form` has the schema, the messages and what sets a value.
-function fields(into, path, data, part, form, label) {
-  const possible = forms(part, data, form.schema);
-  const deep = path.length > 1;
+// Unfold a section, and go to the last field of a key in it, or else to its first field.
+export function lead(key, last) {
+  const details = $("forms").querySelector(`[data-section="${key}"]`);
+  details.open = true;
+  build();
+  const found = [...details.querySelectorAll("div :is(input, select)")];
+  details.scrollIntoView({ block: "start" });
+  (found.findLast((one) => one.dataset.path?.includes(last)) ?? found[0])?.focus();
+}
+
+// Fields of a value and of what is below it.
+function fields(path, data, part, label) {
+  const possible = forms(part, data);
+  const items = possible.find((one) => one.items)?.items;
   if (isMapping(data)) {
-    for (const [key, value] of Object.entries(data)) {
-      const name = deep ? `${label}.${key}` : key;
-      const { schema } = form;
-      const below = key === "kind" ? kinds(part, schema) : property(possible, key, schema);
-      fields(into, [...path, key], value, below, form, name);
-    }
-    adding(into, path, data, possible, form, label);
-  } else if (Array.isArray(data) && data.some(isMapping)) {
-    into.append(table(path, data, possible.find((one) => one.items)?.items ?? {}, form));
-  } else {
-    const title = description(part, possible, form);
-    const handle = make("span", { title }, deep ? label : "value");
-    const [input, ...errors] = control(path, data, possible, form, handle);
-    into.append(make("label", {}, handle, input, ...errors));
+    return [Object.entries(data).map(([key, value]) => {
+      const below = key === "kind" ? { anyOf: kinds(part) } : property(possible, key);
+      return fields([...path, key], value, below, path.length > 1 ? `${label} ${key}` : key);
+    }), adding(path, data, possible, path.length > 1 ? label : path[0])];
   }
-}
-
-// All kinds that there are, not the present one alone.
-function kinds(part, schema) {
-  const every = forms(part, undefined, schema).map((one) => one.properties?.kind);
-  return { anyOf: every.filter(Boolean) };
-}
-
-function description(part, possible, { schema }) {
-  return part.description ?? resolve(part, schema).description ?? possible[0]?.description ?? "";
+  if (items && kinds(items).length && (!data || data.some(isMapping))) {
+    return entries(path, data ?? [], items);
+  }
+  if (Array.isArray(data) && data.some(isMapping)) return rows(path, data, items ?? {});
+  const [input, errors] = control(path, data, possible);
+  return make("label", {}, make("span", { class: NUMBER.test(input.value) ? "handle" : "",
+    title: part.description ?? resolve(part).description ?? possible[0]?.description },
+  spaced(label)), input, errors);
 }
 
 // The field of a value, and what is wrong with it.
-function control(path, data, possible, form, handle) {
-  const options = data === undefined ? null : choices(possible, form.schema);
+function control(path, data, possible, label) {
+  const listed = data === undefined ? null : choices(possible);
   const said = flow(data);
-  let input;
-  if (options && options.length > 1) {
-    input = make("select", {}, ...[...new Set([said, ...options])].map((one) =>
-      new Option(one, one, one === said, one === said)));
-  } else {
-    input = make("input", { value: said, placeholder: data === undefined ? "not stated" : "" });
-    draggable(input, handle, () => form.onSet(path, input.value, input));
-  }
-  input.dataset.path = JSON.stringify(path);
-  input.addEventListener("change", () => form.onSet(path, input.value, input));
-  const joined = (text, step) =>
-    (typeof step === "number" ? `${text}[${step}]` : text ? `${text}.${step}` : step);
-  const steps = path.reduce(joined, "");
-  const errors = form.messages.filter((one) => one.path === steps)
-    .map((message) => make("span", { class: "field-error" }, message.text));
-  if (errors.length) input.classList.add("bad-field");
-  return [input, ...errors];
+  const steps = path.reduce((text, step) =>
+    (typeof step === "number" ? `${text}[${step}]` : `${text}.${step}`));
+  const wrong = page.state.messages.filter((one) => one.path === steps);
+  const attributes = { "data-path": JSON.stringify(path), "aria-label": label,
+    class: wrong.length ? "bad-field" : "" };
+  const input = listed?.length > 1 ? make("select", attributes)
+    : make("input", { value: said, placeholder: data === undefined ? "not stated" : "",
+      ...attributes });
+  if (listed?.length > 1) options(input, [...new Set([said, ...listed])], said);
+  return [input, wrong.map(({ text }) => make("span", { class: "field-error" }, text))];
+}
+
+// What is usual of a kind that needs more than its uncertainty.
+const STEEL = { value: "11.5 um/m/K", standard_uncertainty: "0 um/m/K" };
+const AIR = { value: "20 degC", standard_uncertainty: "0.1 K", sensor_uncertainty: "0.1 K" };
+const USUAL = {
+  temperature: { artefact_expansion: STEEL, artefact_temperature: AIR,
+    scale_expansion: STEEL, scale_temperature: AIR },
+  drift: { axes: { standard_uncertainty: "0.3 um/h" } },
+  reproducibility: { each: ["position", "ball"] },
+  distances: { pairs: "corners" },
+};
+
+// An entry of a kind, with examples of what it needs.
+function usual(kind, items) {
+  const { properties, required = [] } = forms(items, { kind })[0];
+  const example = (key) =>
+    forms(properties[key])[0].examples?.find((one) => /um|ppm/.test(one)) ?? "";
+  const needed = Object.keys(properties).filter((key) =>
+    required.includes(key) || key === "standard_uncertainty");
+  return flow({ ...Object.fromEntries(needed.map((key) => [key, example(key)])), kind,
+    ...USUAL[kind] });
+}
+
+// A list of entries of several kinds, one below the other, to which one of a kind is added.
+function entries(path, data, items) {
+  const add = ({ currentTarget: { previousElementSibling } }) =>
+    set([...path, "+"], usual(previousElementSibling.value, items));
+  return [data.map((value, k) => make("fieldset", {},
+    make("legend", {}, value.kind, " ", button("×", () => set([...path, k], ""),
+      { title: "remove", "aria-label": `remove ${value.kind} ${k + 1}` })),
+    Object.entries(value).filter(([key]) => key !== "kind").map(([key, one]) =>
+      fields([...path, k, key], one, property(forms(items, value), key), key)),
+    adding([...path, k], value, forms(items, value), value.kind))),
+  make("div", { class: "bar" },
+    make("select", { "aria-label": `kind of another entry of ${path.at(-1)}`, "data-own": "" },
+      choices(kinds(items)).map((kind) => make("option", {}, kind))),
+    button("Add", add, { "aria-label": `add to ${path.at(-1)}` }))];
 }
 
 // A list of entries, each a row; keys that only some have are columns too.
-function table(path, data, part, form) {
+function rows(path, data, part) {
   const leaves = (value, steps) => (!isMapping(value) ? [steps]
     : Object.entries(value).flatMap(([key, one]) => leaves(one, [...steps, key])));
-  const columns = new Map(data.flatMap((entry) => leaves(entry, []))
-    .map((steps) => [steps.join("."), steps]));
+  const columns = new Map(data.flatMap((one) => leaves(one, []))
+    .map((steps) => [steps.join(" "), steps]));
   const below = (value, steps) => steps.reduce((found, step) => found?.[step], value);
-  const cell = (entry, k, steps) => {
-    const { schema } = form;
-    const parts = steps[0] === "kind" ? forms(kinds(part, schema), undefined, schema)
-      : steps.reduce((schemas, step, depth) =>
-        forms(property(schemas, step, schema), below(entry, steps.slice(0, depth + 1)), schema),
-      forms(part, entry, schema));
-    const found = control([...path, k, ...steps], below(entry, steps), parts, form);
-    found[0].setAttribute("aria-label", `${steps.join(" ")} of ${entry?.name ?? k + 1}`);
-    return make("td", {}, ...found);
+  const cell = (one, k, [words, steps]) => {
+    const possible = steps.reduce((schemas, step, depth) =>
+      forms(property(schemas, step), below(one, steps.slice(0, depth + 1))), forms(part, one));
+    return control([...path, k, ...steps], below(one, steps), possible,
+      `${words} of ${one?.name ?? k + 1}`);
   };
-  const rows = data.map((entry, k) => make("tr", {},
-    ...[...columns.values()].map((steps) => cell(entry, k, steps)),
-    make("td", {}, make("button", { title: "remove", "aria-label": `remove ${entry?.name ?? k + 1}`,
-      onclick: () => form.onSet([...path, k], "") }, "×"))));
-  const again = data.at(-1);
-  const add = make("button", { onclick: () => form.onSet([...path, "+"], flow(again)) },
-    "Add one like the last");
+  const body = data.map((one, k) => [...[...columns].map((column) => cell(one, k, column)),
+    button("×", () => set([...path, k], ""),
+      { title: "remove", "aria-label": `remove ${one?.name ?? k + 1}` })]);
   return make("div", { class: "scrolled", tabindex: "0" },
-    make("table", {},
-      make("thead", {}, make("tr", {}, ...[...columns.keys()].map((name) =>
-        make("th", { scope: "col" }, name)), make("th", {}))),
-      make("tbody", {}, ...rows)), path[0] === "positions" ? "" : add);
+    make("table", {}, table([...columns.keys(), ""].map(spaced), body)),
+    path[0] === "positions" ? null
+      : button("Add one like the last", () => set([...path, "+"], flow(data.at(-1)))));
+}
+
+// A key that is not there yet: one of the schema's, or a name of the user's own.
+function adding(path, data, possible, label) {
+  const keys = new Set(possible.flatMap((one) => Object.keys(one.properties ?? {})));
+  const known = [...keys].filter((key) => !(key in data));
+  if (!known.length && !possible.some((one) => one.additionalProperties)) return [];
+  const list = `keys-${path.join("-")}`;
+  const add = ({ currentTarget: { parentElement, value } }) => {
+    const name = parentElement.querySelector("input").value.trim();
+    if (name && value.trim()) set([...path, name], value);
+  };
+  return make("details", { id: `add-${path.join("-")}` },
+    make("summary", {}, `add to ${spaced(label)}`),
+    make("input", { list, placeholder: "another key", "aria-label": `another key of ${label}` }),
+    make("datalist", { id: list }, known.map((one) =>
+      make("option", { value: one }, property(possible, one).description ?? ""))),
+    make("input", { placeholder: "value", "aria-label": `value of another key of ${label}`,
+      onchange: add }));
 }
 
 const NUMBER = /^(-?\d+(?:\.\d+)?)(\s*[^\d\s]*)$/;
@@ -191,68 +210,41 @@ function stepped(text, steps) {
   return `${Number(value.toFixed(Math.max(0, digits)))}${unit}`;
 }
 
+async function state({ target: { dataset, value }, target }) {
+  if (!dataset.path) return;
+  if (!(await set(JSON.parse(dataset.path), value))) target.classList.add("bad-field");
+}
+
+let waiting = null;
+$("forms").onchange = state;
 // A number with its unit is changed by the arrow keys, and by dragging its name.
-function draggable(input, handle, onDone) {
-  if (!NUMBER.test(input.value)) return;
-  let waiting = null;
-  input.addEventListener("keydown", (event) => {
-    const sign = { ArrowUp: 1, ArrowDown: -1 }[event.key];
-    const next = sign && stepped(input.value, sign);
-    if (!next) return;
-    event.preventDefault();
-    input.value = next;
-    clearTimeout(waiting);
-    waiting = setTimeout(onDone, 400);
-  });
-  if (!handle) return;
-  handle.classList.add("handle");
-  handle.addEventListener("pointerdown", (event) => {
-    const before = input.value;
-    handle.setPointerCapture(event.pointerId);
-    const move = (next) => {
-      input.value = stepped(before, Math.round((next.clientX - event.clientX) / 8)) ?? before;
-    };
-    const end = (last) => {
-      handle.removeEventListener("pointermove", move);
-      document.removeEventListener("keydown", cancel);
-      if (last.type !== "pointerup") input.value = before;
-      else if (input.value !== before) onDone();
-    };
-    const cancel = (key) => { if (key.key === "Escape") end(key); };
-    handle.addEventListener("pointermove", move);
-    handle.addEventListener("pointerup", end, { once: true });
-    handle.addEventListener("pointercancel", end, { once: true });
-    document.addEventListener("keydown", cancel);
-  });
-}
-
-function property(possible, key, root) {
-  for (const one of possible) {
-    if (one.properties?.[key]) return one.properties[key];
-    if (typeof (one.additionalProperties ?? false) === "object") return one.additionalProperties;
-  }
-  return {};
-}
-
-// A key that is not there yet: one of the schema's, or a name of the user's own.
-function adding(into, path, data, possible, { schema, onSet }, label) {
-  const keys = new Set(possible.flatMap((one) => Object.keys(one.properties ?? {})));
-  const known = [...keys].filter((key) => !(key in data));
-  const isOpen = possible.some((one) => one.additionalProperties);
-  if (!known.length && !isOpen) return;
-  const list = `keys-${path.join("-")}`;
-  const names = make("datalist", { id: list });
-  known.forEach((key) =>
-    names.append(new Option(property(possible, key, schema).description ?? "", key)));
-  const key = make("input", { list, placeholder: "another key",
-    "aria-label": `another key of ${label}`, "data-key": path.join(".") });
-  const value = make("input", { placeholder: "value",
-    "aria-label": `value of another key of ${label}` });
-  const set = () => {
-    const name = key.value.trim();
-    if (name && value.value.trim()) onSet([...path, name], value.value, value);
+$("forms").onkeydown = (event) => {
+  const { target } = event;
+  const sign = { ArrowUp: 1, ArrowDown: -1 }[event.key];
+  const next = sign && target.dataset.path && stepped(target.value, sign);
+  if (!next) return;
+  event.preventDefault();
+  target.value = next;
+  clearTimeout(waiting);
+  waiting = setTimeout(state, 400, { target });
+};
+$("forms").onpointerdown = (event) => {
+  const { target: handle } = event;
+  if (!handle.matches(".handle")) return;
+  const target = handle.parentElement.querySelector("input");
+  const before = target.value;
+  const until = new AbortController();
+  const end = ({ type }) => {
+    until.abort();
+    if (type !== "pointerup") target.value = before;
+    else if (target.value !== before) state({ target });
   };
-  value.addEventListener("change", set);
-  into.append(make("details", { "data-of": path.join(".") },
-    make("summary", {}, `add to ${label.replaceAll("_", " ")}`), key, names, value));
-}
+  const drag = ({ clientX }) => {
+    target.value = stepped(before, Math.round((clientX - event.clientX) / 8)) ?? before;
+  };
+  const cancel = (key) => { if (key.key === "Escape") end(key); };
+  handle.setPointerCapture(event.pointerId);
+  const follow = { pointermove: drag, pointerup: end, pointercancel: end, keydown: cancel };
+  Object.entries(follow).forEach(([type, does]) =>
+    document.addEventListener(type, does, { signal: until.signal }));
+};

@@ -7,6 +7,7 @@ export const page = {
   schema: null,
   selected: null, // the name of the chosen position
   motion: null, // the number of the direction that swings
+  stopped: false, // nothing swings unless it is asked for
   typed: false, // the text beside the design has changes that are not applied
   view: null,
   show: () => {}, // draws everything anew
@@ -18,22 +19,70 @@ export const micro = (value) =>
 export const share = (value) =>
   value === null || value === undefined ? "" : `${Math.floor(1000 * value) / 10} %`;
 
+// An element; of its children, lists are taken apart and what is absent is left out.
 export function make(name, attributes = {}, ...children) {
   const made = document.createElement(name);
   Object.entries(attributes).forEach(([key, value]) => {
-    if (key === "class") made.className = value;
-    else if (key.startsWith("on")) made.addEventListener(key.slice(2), value);
+    if (key.startsWith("on")) made[key] = value;
     else if (value !== undefined && value !== false) {
       made.setAttribute(key, value === true ? "" : value);
     }
   });
-  made.append(...children.filter((child) => child !== null && child !== undefined));
+  made.handlers = Object.keys(attributes).filter((key) => key.startsWith("on"));
+  const absent = [null, undefined, false];
+  made.append(...children.flat(Infinity).filter((child) => !absent.includes(child)));
   return made;
 }
 
+export const button = (words, onclick, attributes = {}) =>
+  make("button", { type: "button", ...attributes, onclick }, words);
+
+// Head and body of a table; cells are contents, or elements of their own.
+export const table = (heads, rows) => {
+  const cell = (name, content) => (/^T[DH]$/.test(content?.tagName) ? content
+    : make(name, name === "th" ? { scope: "col" } : {}, content));
+  const row = (name) => (cells) => make("tr", {}, cells.map((content) => cell(name, content)));
+  return [make("thead", {}, row("th")(heads)), make("tbody", {}, rows.map(row("td")))];
+};
+
+// Give a container other children. What is alike stays, with focus, scroll and folds, and with
+// what was typed: so handlers find their element in the event.
+export function fill(container, ...children) {
+  become(container, make("div", {}, children));
+}
+
+function become(old, made) {
+  const [there, wanted] = [[...old.childNodes], [...made.childNodes]];
+  wanted.forEach((node, k) => {
+    const { value } = node;
+    const present = there[k];
+    if (!present) old.append(node);
+    else if (present.nodeName !== node.nodeName || present.id !== node.id) {
+      present.replaceWith(node);
+    } else if (node.nodeType === Node.TEXT_NODE) present.data = node.data;
+    else {
+      dress(present, node);
+      become(present, node);
+      if (node.localName === "select" && !("own" in node.dataset)) present.value = value;
+    }
+  });
+  there.slice(wanted.length).forEach((node) => node.remove());
+}
+
+function dress(old, made) {
+  if (old.getAttribute("value") !== made.getAttribute("value")) old.value = made.value;
+  if (made.type === "checkbox" && !("own" in made.dataset)) old.checked = made.checked;
+  [...old.attributes].filter(({ name }) => name !== "open" && !made.hasAttribute(name))
+    .forEach(({ name }) => old.removeAttribute(name));
+  [...made.attributes].forEach(({ name, value }) => old.setAttribute(name, value));
+  old.handlers?.forEach((name) => { old[name] = null; });
+  old.handlers = made.handlers;
+  old.handlers?.forEach((name) => { old[name] = made[name]; });
+}
+
 export function options(select, names, chosen) {
-  select.replaceChildren(
-    ...names.map((name) => new Option(name, name, name === chosen, name === chosen)));
+  fill(select, names.map((name) => new Option(name, name, name === chosen)));
+  select.value = chosen;
 }
 
 export function tell(text, bad = false) {
@@ -41,82 +90,57 @@ export function tell(text, bad = false) {
   $("notice").classList.toggle("bad", bad);
 }
 
-// Parts of the page are made anew; whoever works with the keyboard stays where he was.
-export function focus() {
-  const active = document.activeElement;
-  if (!active || active === document.body) return null;
-  if (active.id) return `#${CSS.escape(active.id)}`;
-  const owner = active.closest("[id]");
-  const name = ["data-path", "data-key", "data-motion", "data-focus", "aria-label"]
-    .find((key) => active.hasAttribute(key));
-  return owner && name
-    ? `#${CSS.escape(owner.id)} [${name}="${CSS.escape(active.getAttribute(name))}"]` : null;
-}
-
-export function refocus(selector) {
-  const found = selector && document.querySelector(selector);
-  if (found && found !== document.activeElement) found.focus({ preventScroll: true });
-}
-
 const KEPT = "Start it again with the same command: changes that are not saved are there again.";
 const UNKEPT = "Changes are not saved, and could not be kept in the folder of the file: copy the"
   + " text of the file before you leave this page.";
 
 export async function ask(path, body) {
-  const options = body === undefined ? {} : {
+  const request = body === undefined ? {} : {
     method: "POST", headers: { "Content-Type": "application/json" }, body: JSON.stringify(body),
   };
   let response;
   try {
-    response = await fetch(path, options);
+    response = await fetch(path, request);
   } catch {
     await_studio();
     const isKept = !page.state || page.state.recoverable;
     throw new Error(`The studio does not answer. ${isKept ? KEPT : UNKEPT}`);
   }
   const text = await response.text();
-  let data;
-  try {
-    data = JSON.parse(text);
-  } catch {
-    throw new Error(text.trim());
-  }
-  if (!response.ok || data.error !== undefined) {
-    throw Object.assign(new Error(data.error), { outdated: data.outdated });
-  }
+  const data = /^[[{]/.test(text) ? JSON.parse(text) : { error: text.trim() };
+  if (data.error !== undefined) throw Object.assign(new Error(data.error), data);
   return data;
+}
+
+// The answer to a question of the present design, or nothing if that has changed meanwhile.
+export async function ask_now(path, body) {
+  const found = await ask(path, body);
+  return found.fingerprint === page.state.fingerprint ? found : null;
 }
 
 let lost = null; // waits for a studio that does not answer
 function await_studio() {
   clearTimeout(lost);
   lost = setTimeout(async () => {
-    lost = null;
-    try {
-      page.state = await ask("/api/state");
-      page.show();
-      tell("the studio answers again");
-    } catch (error) {
-      tell(error.message, true);
-    }
+    if (await refresh()) tell("the studio answers again");
   }, 2000);
 }
 
 // What another window did, or a studio that was started anew, is shown instead of what was here.
 export async function refresh() {
   try {
-    const { state } = page;
     const found = await ask("/api/state");
+    const { session, revision, pending } = page.state ?? {};
     // What was asked for before the last change and answered after it is not shown.
-    const isNew = found.session !== state.session || found.revision > page.state.revision;
-    const isComputed =
-      found.revision === page.state.revision && found.pending !== page.state.pending;
-    if (isNew || isComputed) {
+    const isNew = found.session !== session || found.revision > revision;
+    if (isNew || (found.revision === revision && found.pending !== pending)) {
       page.state = found;
       page.show();
     } else watch();
+    return true;
   } catch (error) {
     tell(error.message, true);
+    return false;
   }
 }
 
@@ -127,7 +151,6 @@ export function watch() {
   if (page.state.pending) watching = setTimeout(() => (acting ? watch() : refresh()), 500);
 }
 
-export const latency = [];
 let queue = Promise.resolve();
 let acting = 0;
 // Change the design. Changes come one after the other: each goes on from the answer before.
@@ -135,18 +158,14 @@ export function act(action, said = "") {
   acting += 1;
   const next = queue.then(async () => {
     const slow = setTimeout(() => tell("computing …"), 400);
-    const started = performance.now();
     try {
       const { revision, session } = page.state;
-      page.state = await ask("/api/do", { ...action, revision, session });
-      const answered = performance.now();
-      clearTimeout(slow);
+      page.state = await ask("/api/do", { ...action, revision, session })
+        .finally(() => clearTimeout(slow));
       tell(said);
       page.show();
-      latency.push({ answered: answered - started, shown: performance.now() - started });
       return true;
     } catch (error) {
-      clearTimeout(slow);
       tell(error.message, true);
       if (error.outdated) await refresh();
       else page.show();
@@ -171,9 +190,10 @@ export async function preview(action, onFigures) {
     waiting = null;
     try {
       const design = isMeant() ? await ask("/api/preview", next) : null;
-      if (!design || !isMeant()) continue;
-      tell("");
-      onFigures(design);
+      if (design && isMeant()) {
+        tell("");
+        onFigures(design);
+      }
     } catch (error) {
       if (isMeant()) tell(error.message, true);
     }

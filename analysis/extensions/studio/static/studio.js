@@ -1,16 +1,12 @@
 // The page of the studio: it asks, the engine answers, and everything that is shown comes from
 // there.
 import { ask_later, dress, figures, unfold_text } from "./answers.js";
-import { begin, begins } from "./begin.js";
-import {
-  candidate, dialog, drawn, fit, forget_suggestions, poll, start, sweep,
-} from "./computations.js";
+import { begin, begins, open } from "./begin.js";
+import { candidate, dialog, drawn, fit, plan, poll, start, sweep } from "./computations.js";
 import { build, flow } from "./forms.js";
 import { legend } from "./legend.js";
 import { errors } from "./matrix.js";
-import {
-  $, act, ask, focus, latency, options, page, preview, refocus, refresh, tell, watch,
-} from "./page.js";
+import { $, act, ask, options, page, preview, refresh, tell, watch } from "./page.js";
 import { pool } from "./pool.js";
 import { choose, positions } from "./positions.js";
 import { View } from "./view.js";
@@ -27,20 +23,19 @@ page.show = show;
 
 function show() {
   const { state } = page;
-  const { design } = state;
-  const focused = focus();
-  const title = `${state.file}${state.saved ? "" : " (not saved)"}`;
+  const { design, file } = state;
+  const title = `${file}${state.saved ? "" : " (not saved)"}`;
   const heading = `${title}${design ? ` — ${design.title}` : ""}`;
   $("title").textContent = begins() ? "ballplate studio" : heading;
-  document.title = `${state.saved ? "" : "• "}${state.file} – ballplate studio`;
-  const is_listed = state.files.includes(state.file);
-  options($("files"), is_listed ? state.files : [state.file, ...state.files], state.file);
+  document.title = `${state.saved ? "" : "• "}${file} – ballplate studio`;
+  options($("files"), [...new Set([...state.files, file])].sort(), file);
   $("variant-label").hidden = !state.variants.length;
   options($("variants"), state.variants, state.variant);
   $("undo").disabled = !state.back;
   $("redo").disabled = !state.forward;
   $("save").disabled = state.saved;
   $("keep").textContent = state.kept ? "Stop comparing" : "Keep to compare";
+  state_hours();
   if (!page.typed && $("text").value !== state.text) $("text").value = state.text;
   $("apply").disabled = !page.typed;
   if (design) draw(design);
@@ -48,11 +43,19 @@ function show() {
   figures(design, state.messages, state.pending);
   watch();
   positions();
-  if (page.schema) build($("forms"), state.data, page.schema, state.messages, set);
+  build();
   drawn();
   pool();
   informed();
-  refocus(focused);
+}
+
+let stated = "";
+// The hours of a plan are those of the data sheet that the file was drafted from, until changed.
+function state_hours() {
+  const { file, text } = page.state;
+  const hours = /^#.* --hours ([\d.]+)/m.exec(text)?.[1] ?? "";
+  if (stated !== `${file} ${hours}`) $("hours").value = hours;
+  stated = `${file} ${hours}`;
 }
 
 // Errors by positions; what hides one swings.
@@ -68,100 +71,93 @@ function informed() {
 }
 
 function draw(design) {
-  const directions = design.rank?.directions ?? [];
-  const { selected, motion } = page;
-  if (!design.scene.positions.some((place) => place.name === selected)) page.selected = null;
-  if (motion !== null && motion >= directions.length) page.motion = null;
-  if (page.motion === null && design.rank?.deficiency) page.motion = 0;
-  if (page.motion !== null && !directions.length) page.motion = null;
+  const { positions: places, dimension } = design.scene;
+  const count = design.rank?.directions.length ?? 0;
+  if (!places.some(({ name }) => name === page.selected)) page.selected = null;
+  if (page.motion >= count) page.motion = null;
+  if (page.motion === null && design.rank?.deficiency && !page.stopped) page.motion = 0;
   dress(design);
   view.motion = page.motion;
   view.show(design, page.selected);
-  const [along, does] = design.scene.dimension === 3
-    ? [", with Shift along its normal", "turn"] : ["", "move"];
+  const [along, does] = dimension === 3 ? [", with Shift along its normal", "turn"] : ["", "move"];
   $("hint").textContent = `Drag a plate along its plane${along}; Escape puts it back, Alt lets it`
     + ` through walls. Drag elsewhere to ${does} the view; double-click the floor to add a plate.`;
   legend();
 }
 
-async function set(path, value, input) {
-  if (!(await act({ do: "set", path, value }))) input?.classList.add("bad-field");
-}
-
-$("undo").onclick = () => act({ do: "undo" });
-$("redo").onclick = () => act({ do: "redo" });
-$("keep").onclick = () => act({ do: "keep", off: !!page.state.kept });
-$("save").onclick = () => act({ do: "save" }, "saved");
-$("save-as").onclick = async () => {
-  const question = "Save under another name, in the same folder";
-  const answer = await dialog(question, [["name", page.state.file]]);
-  if (answer) act({ do: "save", name: answer[0] }, "saved");
+const CLICKS = {
+  undo: () => act({ do: "undo" }),
+  redo: () => act({ do: "redo" }),
+  save: () => act({ do: "save" }, "saved"),
+  keep: () => {
+    const off = Boolean(page.state.kept);
+    $("details").open ||= !off;
+    act({ do: "keep", off });
+  },
+  "save-as": async () => {
+    const question = "Save under another name, in the same folder";
+    const answer = await dialog(question, ["name", page.state.file]);
+    if (answer) act({ do: "save", name: answer[0] }, "saved");
+  },
+  apply: async () => {
+    const text = $("text").value;
+    page.typed = false;
+    if (await act({ do: "text", text })) return;
+    $("text").value = text;
+    page.typed = true;
+    $("apply").disabled = false;
+  },
+  reopen: () => {
+    page.typed = false;
+    act({ do: "reopen" }, "read again; undo leads back to the text that was here");
+  },
+  "toggle-text": () => unfold_text($("text-box").hidden),
+  home: () => view.home(),
+  sweep,
+  plan,
 };
-$("files").onchange = async (event) => {
-  const name = event.target.value;
-  const discard = !page.state.saved;
-  const question = `${page.state.file} has changes that are not saved. Leave them?`;
-  if (discard && !(await dialog(question, []))) {
-    show();
-    return;
-  }
-  forget_suggestions();
-  await act({ do: "open", name, discard });
-  view.home();
+Object.entries(CLICKS).forEach(([id, does]) => { $(id).onclick = does; });
+document.querySelectorAll("[data-job]").forEach((one) => {
+  one.onclick = () => start(one.dataset.job);
+});
+$("files").onchange = async ({ target: { value } }) => {
+  if (await open(value)) view.home();
+  else show();
 };
-$("variants").onchange = (event) => act({ do: "variant", name: event.target.value });
-$("text").addEventListener("input", () => {
+$("variants").onchange = ({ target: { value } }) => act({ do: "variant", name: value });
+$("text").oninput = () => {
   page.typed = $("text").value !== page.state.text;
   $("apply").disabled = !page.typed;
-});
-$("apply").onclick = async () => {
-  const text = $("text").value;
-  page.typed = false;
-  if (await act({ do: "text", text })) return;
-  $("text").value = text;
-  page.typed = true;
-  $("apply").disabled = false;
 };
-$("reopen").onclick = () => {
-  page.typed = false;
-  act({ do: "reopen" }, "read again; undo leads back to the text that was here");
-};
-$("toggle-text").onclick = () => unfold_text($("text-box").hidden);
-$("step").onchange = (event) => { view.step = Number(event.target.value); };
+$("step").onchange = ({ target: { value } }) => { view.step = Number(value); };
 $("errors").ontoggle = informed;
 $("pool").ontoggle = $("show-pool").onchange = pool;
 $("map").onchange = () => {
   show();
   ask_later(0);
 };
-$("home").onclick = () => view.home();
-$("sweep").onclick = sweep;
-document.querySelectorAll("[data-job]").forEach((button) => {
-  button.onclick = () => start(button.dataset.job);
-});
-$("readings").onchange = (event) => {
-  if (event.target.files[0]) fit(event.target.files[0]);
-  event.target.value = "";
+$("readings").onchange = ({ target }) => {
+  if (target.files[0]) fit(target.files[0]);
+  target.value = "";
 };
-const drop = $("drop");
-drop.addEventListener("dragover", (event) => {
-  event.preventDefault();
-  drop.classList.add("over-it");
+// A message of what was refused ends with the next attempt.
+document.addEventListener("input", () => {
+  if ($("notice").classList.contains("bad")) tell("");
 });
-drop.addEventListener("dragleave", () => drop.classList.remove("over-it"));
-document.addEventListener("dragover", (event) => event.preventDefault());
-document.addEventListener("drop", (event) => {
-  event.preventDefault();
-  drop.classList.remove("over-it");
-  if (event.dataTransfer.files[0]) fit(event.dataTransfer.files[0]);
-});
+for (const type of ["dragover", "dragleave", "drop"]) {
+  document.addEventListener(type, (event) => {
+    event.preventDefault();
+    $("drop").classList.toggle("over-it", type === "dragover" && $("drop").contains(event.target));
+    if (event.dataTransfer?.files[0] && type === "drop") fit(event.dataTransfer.files[0]);
+  });
+}
 document.addEventListener("keydown", (event) => {
   if (!(event.ctrlKey || event.metaKey) || event.target === $("text") || begins()) return;
   const key = event.key.toLowerCase();
   const does = { z: event.shiftKey ? "redo" : "undo", y: "redo", s: "save" }[key];
   if (!does) return;
   event.preventDefault();
-  act({ do: does }, does === "save" ? "saved" : "");
+  CLICKS[does]();
 });
 // Axes of a plate and directions along them.
 const ARROWS = {
@@ -188,10 +184,9 @@ $("view").addEventListener("keydown", (event) => {
 window.addEventListener("beforeunload", (event) => { if (page.typed) event.preventDefault(); });
 window.addEventListener("focus", () => { if (page.state) refresh(); });
 
-window.studio = { view, latency, state: () => page.state, act, flow };
+window.studio = { view, state: () => page.state, act, flow };
 try {
   [page.state, page.schema] = await Promise.all([ask("/api/state"), ask("/api/schema")]);
-  page.motion = page.state.design?.rank?.deficiency ? 0 : null;
   show();
   if (page.state.note) tell(page.state.note);
   if (page.state.untouched) await begin();
