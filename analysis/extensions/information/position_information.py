@@ -9,11 +9,10 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
-from itertools import chain
 
 import numpy as np
 from ballplate.presentation import Data, MainTable, Result, number, picked, shown_unit, table_lines
-from ballplate.rank import Direction, Verdict, moved_positions
+from ballplate.rank import Direction, moved_positions
 from ballplate.results import Prediction, estimated_curves
 from ballplate.simulator.computing import single_threaded
 from ballplate.simulator.design import Design, Flags, Lengths
@@ -157,12 +156,19 @@ def position_information(
     design, experiment = prediction.design, prediction.experiment
     assert experiment is not None
     minutes, names = _minutes(experiment), design.positions.names
-    counts = np.bincount(design.readings.position, design.readings.repeats, len(names))
-    cases = [(name, int(count), False) for name, count in zip(names, counts, strict=True)]
-    cases += [(more.positions[-1].name, more.positions[-1].count, True) for more in added]
-    designs = chain((_unread(design, k) for k in range(len(names))), map(lay_out, added))
+    counts = np.bincount(design.readings.position, design.readings.repeats, len(names)).astype(int)
+    cases = [
+        *(
+            (name, count, False, _unread(design, k))
+            for k, (name, count) in enumerate(zip(names, counts.tolist(), strict=True))
+        ),
+        *(
+            (more.positions[-1].name, more.positions[-1].count, True, lay_out(more))
+            for more in added
+        ),
+    ]
     positions, variances = [], []
-    for (name, count, is_added), changed in zip(cases, designs, strict=True):
+    for name, count, is_added, changed in cases:
         at = linearise(changed)
         average = _average(uncertainties(at, symbols=("U6",)).get("U6"))
         positions.append(InformingPosition(name, count, minutes.get(name), average, is_added))
@@ -170,25 +176,22 @@ def position_information(
     whole = _variances(linearise(design))
     others = np.array(variances).reshape(-1, len(whole)).T
     with_all = np.broadcast_to(np.array([*whole.values()])[:, None], others.shape)
-    are_added = [is_added for _, _, is_added in cases]
+    are_added = [position.is_added for position in positions]
     more_known, less_known = np.where(are_added, (others, with_all), (with_all, others))
     ratio = np.divide(more_known, less_known, out=np.ones(others.shape), where=less_known > 0.0)
     information = np.where(np.isnan(less_known), 1.0, np.maximum(1.0 - ratio, 0.0))
+    directions = (*prediction.verdict.null, *prediction.verdict.weak)
     return PositionInformation(
         prediction.label,
         prediction.title,
         _average(prediction.lengths),
         tuple(positions),
-        tuple(_errors(design.model, whole, prediction.verdict)),
+        tuple(_errors(design.model, whole, directions)),
         np.sqrt(others),
         np.where(np.isnan(more_known), np.nan, information),
         np.isnan(less_known) & ~np.isnan(more_known),
-        tuple(_motions(direction) for direction in _directions(prediction.verdict)),
+        tuple(map(_motions, directions)),
     )
-
-
-def _directions(judged: Verdict) -> tuple[Direction, ...]:
-    return (*judged.null, *judged.weak)
 
 
 def _motions(direction: Direction) -> str:
@@ -198,19 +201,21 @@ def _motions(direction: Direction) -> str:
 
 
 def _errors(
-    model: ErrorModel, variances: Mapping[str, float], judged: Verdict
+    model: ErrorModel, variances: Mapping[str, float], directions: Sequence[Direction]
 ) -> Iterator[InformedError]:
-    """Yield the errors of a model, each with the directions that hide it."""
+    """Yield the errors of a model, each with the directions that hide it: undetermined ones hide
+    undetermined errors.
+    """
     first = {parameter.function: parameter for parameter in reversed(model.parameters)}
-    for name, variance in variances.items():
-        u, hidden_by = float(np.sqrt(variance)), []
-        for k, direction in enumerate(_directions(judged)):
-            is_null = np.isinf(direction.standard_deviation)
-            limit = HIDING * (0.0 if is_null else u)
-            peaks = [abs(part.peak) for part in direction.functions if part.name == name]
-            if is_null == np.isnan(u) and max(peaks, default=0.0) > limit:
-                hidden_by.append(k)
-        yield InformedError(name, first[name].meaning, first[name].unit, u, tuple(hidden_by))
+    for name, u in zip(variances, np.sqrt([*variances.values()]).tolist(), strict=True):
+        limit = 0.0 if np.isnan(u) else HIDING * u
+        hidden_by = tuple(
+            k
+            for k, direction in enumerate(directions)
+            if np.isinf(direction.standard_deviation) == np.isnan(u)
+            and any(part.name == name and abs(part.peak) > limit for part in direction.functions)
+        )
+        yield InformedError(name, first[name].meaning, first[name].unit, u, hidden_by)
 
 
 def _unread(design: Design, position: int) -> Design:

@@ -58,7 +58,7 @@ def summary(experiment: Experiment, moving: bool = False) -> dict[str, Any]:
     expected, lengths = experiment.expected_rank_deficiency, quantities.get("U6")
     judged = None if moving else verdict(linearisation, expected, target)
     return {
-        **picked(experiment, "title", "label"),
+        "title": experiment.title,
         "rank": {
             "deficiency": linearisation.deficiency,
             "expected": expected,
@@ -188,7 +188,6 @@ def place_data(experiment: Experiment, place: Position) -> Data:
         "groups": len(place.readings),
         "readings": place.count,
         "plane": None if plane is None else plane[0],
-        "quarter_turns": None if plane is None else plane[1],
         "origin": place.pose.origin.tolist(),
         "rotation": place.pose.rotation.tolist(),
         "balls": ball_coordinates(place.pose, layout).tolist(),

@@ -13,13 +13,9 @@ from typing import Any
 
 from ballplate.presentation import Data, picked
 from ballplate.simulator.inputs import (
-    OPENED,
-    UNKNOWN,
     ExperimentError,
     Message,
-    Trust,
     format_path,
-    refused,
     service,
 )
 
@@ -29,26 +25,20 @@ from .document import (
     DesignDocument,
     changed,
     data_of,
-    opened,
     redone,
     reopened,
     saved,
     undone,
     variants_of,
 )
+from .folder import DesignFolder, RefusedError
 from .jobs import JOBS, MOST_RUNNING, Job, started
 from .judging import VIEWS, DesignJudgement, judgement
 from .processes import Worker
-from .recovery import give_up, keep, kept_in, name_of_kept, recovered
-
-ENDINGS = (".yaml", ".yml")
+from .recovery import give_up, keep, kept_in, recovered
 
 # Seconds that a page waits for figures before it is answered without them, and between looks.
 PATIENCE, INTERVAL = 2.0, 0.005
-
-
-class RefusedError(Exception):
-    """A request is not permitted, or not possible now; the text states why."""
 
 
 class OutdatedError(RefusedError):
@@ -72,20 +62,16 @@ class Session:
             or its folder cannot be read.
         """
         self._lock = RLock()
-        self._first = path.resolve()
-        if not self._first.parent.is_dir():
-            raise refused(path, "there is no such folder; make it, or name another")
-        self._example = beginning
-        document = self._found(path, variant) if beginning else opened(path, variant)
+        self._folder = DesignFolder(path, beginning)
         self.name = secrets.token_hex(4)
+        document = self._folder.document(path, variant, new=bool(beginning))
         document, self.note = recovered(document, self.name)
         if document.is_untouched and not self.note:
             self.note = f"{path.name} is new, and begins with an example; Save writes it"
-        if variant is None:
-            document = _with_first_variant(document)
+        self._document = document if variant else _with_first_variant(document)
+        self.revision = 0
         self._kept: dict[str, Any] | None = None
         self._jobs: dict[int, Job] = {}
-        self.revision = 0
         self._judge, moving = Worker(), Worker()
         # What is asked for once nothing moves gives way to what moves.
         self._workers = {"preview": moving, "drawn": moving, "later": moving}
@@ -94,7 +80,6 @@ class Session:
         self._scene: dict[str, Any] | None = None
         self._burst: tuple[Any, ...] = ()
         self._judgement = DesignJudgement(None, None, (), None, ())
-        self._document = document
         self._begin()
 
     def state(self) -> dict[str, Any]:
@@ -104,8 +89,8 @@ class Session:
         """
         self._await()
         with self._lock:
-            document, answer, judged = self._document, self._answer, self._judgement
-            pending = self._judge.is_busy
+            document, judged, pending = self._document, self._judgement, self._judge.is_busy
+            messages = () if pending else judged.messages
             return {
                 "session": self.name,
                 "revision": self.revision,
@@ -119,15 +104,12 @@ class Session:
                 "untouched": document.is_untouched,
                 "back": len(document.back),
                 "forward": len(document.forward),
-                "messages": []
-                if pending
-                else [_message_data(message, judged.data) for message in judged.messages],
+                "messages": [_message_data(message, judged.data) for message in messages],
                 "pending": pending,
-                "design": self._scene and {**(answer or {}), "scene": self._scene},
+                "design": self._scene and {**(self._answer or {}), "scene": self._scene},
                 "stale": judged.answer is None,
                 "kept": self._kept,
-                "files": self._files(),
-                "jobs": list(JOBS),
+                "files": self._folder.names(),
                 "recoverable": self.is_recoverable,
                 "note": self.note,
             }
@@ -204,10 +186,11 @@ class Session:
 
         :raises UnusableError: the extension that drafts is not installed.
         """
+        path, message = Path("design.yaml"), {}
         try:
-            path, message = Path(self._free(answers).name), {}
+            path = Path(self._free(answers).name)
         except RefusedError as error:
-            path, message = Path("design.yaml"), {"name": str(error)}
+            message = {"name": str(error)}
         draft: dict[str, Any] = service("sheet_draft")(path, answers)
         return draft | {"messages": draft["messages"] | message}
 
@@ -220,9 +203,7 @@ class Session:
         with self._lock:
             if name not in JOBS:
                 raise RefusedError(f"no computation {name!r}; there are {', '.join(JOBS)}")
-            for job in self._jobs.values():
-                job.look()
-            if sum(job.state == "running" for job in self._jobs.values()) >= MOST_RUNNING:
+            if [job["state"] for job in self.jobs()].count("running") >= MOST_RUNNING:
                 raise RefusedError(f"{MOST_RUNNING} computations are running; stop one")
             number = max(self._jobs, default=0) + 1
             self._jobs[number] = started(name, self._document, settings)
@@ -271,11 +252,11 @@ class Session:
         return {
             "undo": lambda action: self._become(undone(self._document)),
             "redo": lambda action: self._become(redone(self._document)),
+            "reopen": lambda action: self._become(reopened(self._document)),
             "variant": self._choose,
             "save": self._save,
             "open": self._open,
             "begin": self._begin_new,
-            "reopen": lambda action: self._become(reopened(self._document)),
         }
 
     def _ensure_seen(self, action: Mapping[str, Any]) -> None:
@@ -352,30 +333,25 @@ class Session:
             self.revision += 1
 
     def _save(self, action: Mapping[str, Any]) -> None:
-        name = action.get("name")
-        path = None if name is None else self._inside(str(name))
-        before = self._document
+        before, name = self._document, action.get("name")
+        path = None if name is None else self._folder.inside(str(name))
         try:
-            document = saved(before, path)
+            self._document = saved(before, path)
         except ChangedOnDiskError as error:
             raise RefusedError(str(error)) from None
         except OSError as error:
-            reason = error.strerror or str(error)
-            raise RefusedError(
-                f"{(path or before.path).name} cannot be written: {reason}"
-            ) from None
-        self._document = document
+            file, reason = path or before.path, error.strerror or str(error)
+            raise RefusedError(f"{file.name} cannot be written: {reason}") from None
         self.revision += 1
         give_up(before, self.name)
 
     def _open(self, action: Mapping[str, Any]) -> None:
-        path, before = self._inside(str(action.get("name", ""))), self._document
+        path = self._folder.inside(str(action.get("name", "")))
         self._ensure_left(action)
-        document = self._found(path) if kept_in(path).exists() else opened(path)
-        document = replace(document, trust=self._trust(path))
+        document, note = self._folder.document(path, new=kept_in(path).exists()), ""
         # What is left on purpose is not taken up again.
-        is_left = document.path.name == before.path.name
-        document, note = (document, "") if is_left else recovered(document, self.name)
+        if path.name != self._document.path.name:
+            document, note = recovered(document, self.name)
         self._leave_for(_with_first_variant(document), note)
 
     def _begin_new(self, action: Mapping[str, Any]) -> None:
@@ -385,8 +361,10 @@ class Session:
             self._become(changed(document, str(action["text"])))
             return
         self._ensure_left(action)
-        document = DesignDocument(path, None, self._example, None, self._trust(path))
-        self._leave_for(changed(document, str(action["text"])))
+        self._leave_for(changed(self._folder.document(path), str(action["text"])))
+
+    def _free(self, action: Mapping[str, Any]) -> Path:
+        return self._folder.free(str(action.get("name", "")), self._document.path.name)
 
     def _ensure_left(self, action: Mapping[str, Any]) -> None:
         """Ensure that changes are discarded only on request."""
@@ -399,52 +377,6 @@ class Session:
         self._kept, self.note = None, note
         if document.path.name != before.path.name:
             give_up(before, self.name)
-
-    def _found(self, path: Path, variant: str | None = None) -> DesignDocument:
-        """Return the document of a file, or of a new one that begins with the example."""
-        if path.exists():
-            return opened(path, variant)
-        return DesignDocument(path, variant, self._example, None)
-
-    def _trust(self, path: Path) -> Trust:
-        return OPENED if path.resolve() == self._first else UNKNOWN
-
-    def _free(self, action: Mapping[str, Any]) -> Path:
-        """Return the path of a design that may be begun.
-
-        :raises RefusedError: as for `_inside`, or there is one already, saved or not.
-        """
-        path = self._inside(str(action.get("name", "")))
-        if path.exists():
-            raise RefusedError(f"{path.name} is there already; choose another name")
-        if kept_in(path).exists() and path.name != self._document.path.name:
-            raise RefusedError(f"{path.name} has changes that are not saved; open it")
-        return path
-
-    def _inside(self, name: str) -> Path:
-        """Return the path of a design in the folder.
-
-        :raises RefusedError: it would be outside, or is not the name of a design.
-        """
-        folder = self._first.parent
-        path = folder / name
-        is_plain = name == Path(name).name and name.isprintable()
-        is_plain &= name.lower().endswith(ENDINGS) and not name.startswith(".")
-        if not is_plain or path.resolve().parent != folder:
-            raise RefusedError(f'"{name}" is not the name of a design in the folder {folder.name}')
-        return path
-
-    def _files(self) -> list[str]:
-        """Return the names of designs in the folder, those of unsaved new ones too."""
-        try:
-            files = [file for file in self._first.parent.iterdir() if file.is_file()]
-        except OSError:
-            # The folder is gone, or may not be read any more.
-            return []
-        names = {name_of_kept(file) or file.name for file in files}
-        return sorted(
-            name for name in names if name.lower().endswith(ENDINGS) and not name.startswith(".")
-        )
 
 
 def _with_first_variant(document: DesignDocument) -> DesignDocument:

@@ -7,28 +7,19 @@ import os
 import re
 import tempfile
 from collections.abc import Mapping, Sequence
-from contextlib import nullcontext
-from dataclasses import dataclass
+from contextlib import suppress
 from itertools import product
 from pathlib import Path
 from typing import Any
 
 from ballplate.extensions.repair.yamltext import flow
-from ballplate.extensions.sweeps.bundle import Bundle, bundle_of, names_of, unpack
+from ballplate.extensions.sweeps.bundle import Bundle, names_of, unpack
 from ballplate.extensions.sweeps.load import load_sweep
-from ballplate.extensions.sweeps.local import local_runner
-from ballplate.extensions.sweeps.running import (
-    SweepResult,
-    compute_sweep,
-    enter,
-    result_of,
-    writable_store,
-)
-from ballplate.extensions.sweeps.store import Store
+from ballplate.extensions.sweeps.running import computed
 from ballplate.presentation import finite
-from ballplate.simulator.computing import Report
+from ballplate.simulator.computing import Report, unreported
 from ballplate.simulator.experiment import named_in, node_at, node_of
-from ballplate.simulator.inputs import ExperimentError, Mark, Node, Scalar, Trust
+from ballplate.simulator.inputs import ExperimentError, Mark, Scalar
 
 from .actions import ActionError, value_of
 from .document import DesignDocument, encoded, experiment_of
@@ -37,16 +28,8 @@ from .document import DesignDocument, encoded, experiment_of
 MOST_CELLS = 2000
 
 
-@dataclass(frozen=True)
-class _Axis:
-    """Paths that take the same values, as a person has typed them."""
-
-    paths: tuple[str, ...]
-    values: tuple[str, ...]
-
-    @property
-    def name(self) -> str:
-        return " ".join(self.paths)
+Axes = Mapping[tuple[str, ...], tuple[str, ...]]
+"""Values as a person has typed them, by the paths that take them."""
 
 
 def swept(document: DesignDocument, settings: Mapping[str, Any], report: Report) -> dict[str, Any]:
@@ -57,21 +40,26 @@ def swept(document: DesignDocument, settings: Mapping[str, Any], report: Report)
     :raises ExperimentError: the text is invalid, a path leads nowhere, or a value would run a model
         in Python in a design that the user has not opened by name.
     """
-    axes = _axes(settings.get("axes"))
-    tree = experiment_of(document).tree
+    axes, page = _axes(settings.get("axes")), ""
     with tempfile.TemporaryDirectory() as folder:
-        file = _written(document, tree, axes, Path(folder))
-        with writable_store(file.with_suffix(".sqlite")) as store:
-            result = _computed(file, store, document.trust, report)
-            page = _page(store, document.trust.modules)
+        file = _written(document, axes, Path(folder))
+        try:
+            sweep = load_sweep(file, trust=document.trust)
+        except ExperimentError as error:
+            # Nobody has seen the file; its words begin with the axis' key.
+            raise ActionError("; ".join(message.text for message in error.messages)) from None
+        store = file.with_suffix(".sqlite")
+        result = computed(sweep, store, report=report)
+        with suppress(ImportError):
+            from ballplate.extensions.sweeps.report import sweep_page
+
+            page = sweep_page.sweep_page(store, None, document.trust.modules, None, unreported)
     return {
         "headline": result.headline(),
-        "axes": [list(axis.paths) for axis in axes],
+        "axes": [list(paths) for paths in axes],
         "cells": [
             _cell(row, values, f"{file.name}:")
-            for row, values in zip(
-                result.rows(), product(*(sweep_axis.values for sweep_axis in axes)), strict=True
-            )
+            for row, values in zip(result.rows(), product(*axes.values()), strict=True)
         ],
         "page": page,
     }
@@ -85,59 +73,37 @@ def ensure_possible(document: DesignDocument, settings: Mapping[str, Any]) -> No
     :raises ExperimentError: the text is invalid.
     """
     experiment = experiment_of(document)
-    for axis in _axes(settings.get("axes")):
-        numbers = (value for value in map(value_of, axis.values) if type(value) in (int, float))
-        number = next(numbers, None)
-        for path in axis.paths:
+    for paths, values in _axes(settings.get("axes")).items():
+        numbers = [value for value in map(value_of, values) if type(value) in (int, float)]
+        for path, number in product(paths, numbers[:1]):
             present = node_at(experiment.tree, path)
-            if number is None or not isinstance(present, Scalar):
-                continue
-            if isinstance(present.value, str):
+            if isinstance(present, Scalar) and isinstance(present.value, str):
                 try:
                     experiment.with_({path: number})
                 except ExperimentError as error:
                     raise ActionError(f"{path}: {error.messages[0].text}") from None
 
 
-def _axes(axes_data: Any) -> list[_Axis]:
-    if not isinstance(axes_data, list) or not all(
-        isinstance(axis_entry, Mapping) for axis_entry in axes_data
-    ):
+def _axes(data: Any) -> Axes:
+    axes: dict[tuple[str, ...], tuple[str, ...]] = {}
+    if not isinstance(data, list) or not all(isinstance(axis, Mapping) for axis in data):
         raise ActionError("a sweep needs a list of axes, each with its paths and values")
-    axes = [_axis(axis_entry) for axis_entry in axes_data]
-    cells = math.prod(len(axis_entry.values) for axis_entry in axes)
+    for axis in data:
+        if not all(isinstance(axis.get(key), list) for key in ("paths", "values")):
+            raise ActionError("an axis needs its paths and values, each a list")
+        paths, values = (
+            tuple(str(text).strip() for text in axis[key]) for key in ("paths", "values")
+        )
+        if not paths or not all(paths) or not values:
+            raise ActionError("an axis needs a key and its values")
+        if paths in axes:
+            raise ActionError(f"two axes vary {' '.join(paths)}; list their values in one")
+        axes[paths] = values
+    cells = math.prod(map(len, axes.values()))
     if not axes or cells > MOST_CELLS:
-        some = f"{cells} combinations; at most {MOST_CELLS} are possible here"
-        raise ActionError(some if axes else "a sweep needs a key")
-    names = [axis.name for axis in axes]
-    for name in names:
-        if names.count(name) > 1:
-            raise ActionError(f"two axes vary {name}; list their values in one")
+        text = f"{cells} combinations; at most {MOST_CELLS} are possible here"
+        raise ActionError(text if axes else "a sweep needs a key")
     return axes
-
-
-def _computed(file: Path, store: Store, trust: Trust, report: Report) -> SweepResult:
-    try:
-        sweep = load_sweep(file, trust=trust)
-    except ExperimentError as error:
-        # Nobody has seen the file; its words begin with the axis' key.
-        raise ActionError("; ".join(message.text for message in error.messages)) from None
-    bundle = bundle_of(sweep)
-    entered = enter(store, sweep, bundle, beside=False)
-    runner = nullcontext(local_runner(sweep, bundle, workers=1))
-    summary = compute_sweep(store, sweep, entered, runner, report=report)
-    return result_of(store, sweep, entered, summary)
-
-
-def _page(store: Store, with_modules: bool) -> str:
-    from ballplate.extensions.sweeps.report.results import read_results
-
-    try:
-        from ballplate.extensions.sweeps.report.page import page
-
-        return page(store, read_results(store, None), with_modules)
-    except ImportError:
-        return ""
 
 
 def _cell(row: Mapping[str, Any], values: Sequence[str], file: str) -> dict[str, Any]:
@@ -154,48 +120,37 @@ def _cell(row: Mapping[str, Any], values: Sequence[str], file: str) -> dict[str,
     }
 
 
-def _axis(axis_data: Mapping[str, Any]) -> _Axis:
-    lists = [axis_data.get(key) for key in ("paths", "values")]
-    if not all(isinstance(value_list, list) for value_list in lists):
-        raise ActionError("an axis needs its paths and values, each a list")
-    paths, values = (
-        tuple(str(value_list).strip() for value_list in some) for some in lists if some is not None
-    )
-    if not all(paths) or not paths or not values:
-        raise ActionError("an axis needs a key and its values")
-    return _Axis(paths, values)
-
-
-def _written(document: DesignDocument, tree: Node, axes: Sequence[_Axis], folder: Path) -> Path:
+def _written(document: DesignDocument, axes: Axes, folder: Path) -> Path:
     """Write the sweep's file in a folder, with the present design and copies of the files that it
     names.
     """
-    mark = Mark("sweep", 0, 0)
-    nodes = [("", tree)] + [
+    experiment, mark = experiment_of(document), Mark("sweep", 0, 0)
+    named = [
         (path, node_of(value_of(value), mark))
-        for axis in axes
-        for path in axis.paths
-        for value in axis.values
+        for paths, values in axes.items()
+        for path, value in product(paths, values)
     ]
     source = Path(os.path.abspath(document.path))
     try:
-        names = names_of(sorted({source, *named_in(nodes, source.parent)}))
+        names = names_of(
+            sorted({source, *named_in([("", experiment.tree), *named], source.parent)})
+        )
         contents = ((name, path) for path, name in names.items() if path != source)
         files = tuple((name, Path(path).read_bytes()) for name, path in contents)
     except (OSError, ValueError) as error:
         raise ActionError(f"the files that the design names cannot be copied: {error}") from None
     name = names[source]
     design = unpack(Bundle(name, name, (*files, (name, encoded(document)))), folder)
-    lines = [f"title: {flow(experiment_of(document).title)}", f"base: {flow(design.name)}"]
-    if document.variant is not None:
-        lines.append(f"variant: {flow(document.variant)}")
-    lines.append("axes:")
-    for axis in axes:
-        data = {
-            "paths": list(axis.paths),
-            "values": [value_of(axis_value) for axis_value in axis.values],
-        }
-        lines.append(f"  {flow(axis.name)}: {flow(data)}")
+    variant = {} if document.variant is None else {"variant": document.variant}
+    sweep = {
+        "title": experiment.title,
+        "base": design.name,
+        **variant,
+        "axes": {
+            " ".join(paths): {"paths": list(paths), "values": [*map(value_of, values)]}
+            for paths, values in axes.items()
+        },
+    }
     file = design.with_name(".ballplate-sweep.yaml")
-    file.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    file.write_text(f"{flow(sweep)}\n", encoding="utf-8")
     return file

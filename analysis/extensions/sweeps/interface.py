@@ -52,12 +52,8 @@ def sweep(
     ...     sweep("designs/sweeps/plate-size.yaml", f"{folder}/plates.sqlite")
     <SweepResult of plate-size: 12 cases, 12 done, 0 failed>
     """
-    from contextlib import nullcontext
-
-    from .bundle import bundle_of
     from .load import load_sweep
-    from .local import local_runner
-    from .running import compute_sweep, enter, result_of, writable_store
+    from .running import computed
 
     ensure_path("path", path)
     ensure_whole(1, workers=workers)
@@ -65,14 +61,8 @@ def sweep(
     ensure_type(bool, "True or False", fail_fast=fail_fast)
     ensure_report(report)
     loaded = load_sweep(path, folders=tuple(Path(os.path.abspath(folder)) for folder in folders))
-    bundle = bundle_of(loaded)
-    with writable_store(
-        Path(path).with_suffix(".sqlite") if store is None else Path(store)
-    ) as opened:
-        entered = enter(opened, loaded, bundle, beside)
-        runner = nullcontext(local_runner(loaded, bundle, workers))
-        summary = compute_sweep(opened, loaded, entered, runner, retry_failed, fail_fast, report)
-        return result_of(opened, loaded, entered, summary)
+    into = Path(path).with_suffix(".sqlite") if store is None else Path(store)
+    return computed(loaded, into, workers, retry_failed, beside, fail_fast, report)
 
 
 def stored(store: PathLike, sweep: int | None = None) -> SweepResult:

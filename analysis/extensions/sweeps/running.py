@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Sequence
-from contextlib import AbstractContextManager, contextmanager
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -14,9 +14,10 @@ from ballplate.simulator.computing import Report, unreported
 from ballplate.simulator.inputs import UnusableError, in_one_line
 from filelock import FileLock, Timeout
 
-from .bundle import Bundle, changes, definition
+from .bundle import Bundle, bundle_of, changes, definition
 from .execute import Runner, Summary, run_sweep
 from .frame import frame_of
+from .local import local_runner
 from .model import Sweep
 from .store import (
     Store,
@@ -190,6 +191,24 @@ def compute_sweep(
         summary = run_sweep(store, entered.number, sweep, working, retry_failed, fail_fast, report)
     ensure_in_place(store)
     return summary
+
+
+def computed(
+    sweep: Sweep,
+    path: Path,
+    workers: int = 1,
+    retry_failed: bool = False,
+    beside: bool = False,
+    fail_fast: bool = False,
+    report: Report = unreported,
+) -> SweepResult:
+    """Compute a sweep into the store at a path on this machine; see `ballplate.sweep`."""
+    bundle = bundle_of(sweep)
+    with writable_store(path) as store:
+        entered = enter(store, sweep, bundle, beside)
+        runner = nullcontext(local_runner(sweep, bundle, workers))
+        summary = compute_sweep(store, sweep, entered, runner, retry_failed, fail_fast, report)
+        return result_of(store, sweep, entered, summary)
 
 
 def shortcomings(path: Path, rows: Sequence[StoredRow]) -> tuple[str, ...]:

@@ -229,7 +229,7 @@ def test_a_file_that_cannot_be_opened_costs_nothing_of_what_is_not_saved(design,
     def fail(*_):
         raise MemoryError
 
-    monkeypatch.setattr("ballplate.extensions.studio.session.opened", fail)
+    monkeypatch.setattr("ballplate.extensions.studio.folder.opened", fail)
     with pytest.raises(MemoryError):
         session.act({"do": "open", "name": "other.yaml", "discard": True})
     assert session.state()["text"] == text

@@ -32,7 +32,9 @@ def document(tmp_path: Path) -> DesignDocument:
 
 def test_every_combination_is_what_run_says_of_it(document, tmp_path, monkeypatch):
     steps = []
-    monkeypatch.setattr("ballplate.extensions.sweeps.report.page.page", lambda *_: "the page")
+    monkeypatch.setattr(
+        "ballplate.extensions.sweeps.report.sweep_page.sweep_page", lambda *_: "the page"
+    )
     axes = [
         {"paths": ["machine.repeatability"], "values": ["0.1 um", "0.4 um"]},
         {
@@ -69,7 +71,7 @@ def pageless(monkeypatch):
     def fail(*_, **__):
         raise ImportError("matplotlib")
 
-    monkeypatch.setattr("ballplate.extensions.sweeps.report.page.page", fail)
+    monkeypatch.setattr("ballplate.extensions.sweeps.report.sweep_page.sweep_page", fail)
 
 
 def test_values_may_name_files_beside_the_design(document, pageless):
