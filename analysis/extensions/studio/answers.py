@@ -241,11 +241,9 @@ def _length_map(experiment: Experiment, linearisation: Linearisation) -> Data:
     groups = lengths.by_point
     values = settings.target_factor * groups.maximum_ratio if target else groups.maximum
     values = np.where(groups.undetermined > 0, np.nan, values)
-    largest = float(np.nanmax(values, initial=0.0))
-    high, unit = (max(1.0, largest), "target") if target else (largest, "m")
-    scale = {"low": 0.0, "high": high, "largest": largest, "unit": unit}
     of_levels = values.reshape(LENGTH_NODES, LENGTH_NODES, -1).T
-    return _map_data(in_slices(linearisation.design, of_levels)) | {"scale": scale}
+    unit = "target" if target else "m"
+    return _map_data(in_slices(linearisation.design, of_levels)) | {"unit": unit}
 
 
 def _point_map(experiment: Experiment, linearisation: Linearisation) -> Data:

@@ -64,7 +64,7 @@ def swung(page, seconds: float) -> Image.Image:
     share = SHARE * sin(2.0 * pi * seconds / PERIOD)
     page.evaluate(
         f"() => {{ const {{ view }} = window.studio; view.amplitude = {share} * view.size;"
-        " view.swing(); view.draw(); }"
+        " view.draw(); }"
     )
     page.wait_for_timeout(60)
     return shot(page)

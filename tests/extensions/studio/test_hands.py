@@ -24,12 +24,12 @@ pytestmark = [
 
 CALLS = """(() => { const { handlers } = window.studio.view; window.calls = [];
 for (const name of ['onDrag', 'onDrop', 'onPlace']) { const before = handlers[name];
-handlers[name] = (...sent) => { window.calls.push([name, ...sent]); before(...sent); }; } })()"""
+handlers[name] = (...sent) => { window.calls.push([name, ...sent]); return before(...sent); }; } })()"""
 # Where a plate is drawn, and how.
-PLACE = "(() => { const { group, look } = window.studio.view.named('z low');"
-PLACE += " return [group.position.toArray(), look]; })()"
-EYE = "(() => { const { camera } = window.studio.view;"
-EYE += " return [camera.zoom, camera.position.toArray()]; })()"
+PLACE = "(() => { const { view } = window.studio;"
+PLACE += " return [view.hands.offset('z low'), view.named('z low').look]; })()"
+EYE = "(() => { const { zoom, turn, rise, shift } = window.studio.view;"
+EYE += " return [zoom, [turn, rise, ...shift]]; })()"
 
 
 @pytest.fixture
@@ -57,7 +57,7 @@ def spot(page, point: list[float] | str) -> tuple[float, float]:
 
 
 def middle(page) -> list[float]:
-    found: list[float] = page.evaluate("window.studio.view.named('z low').middle.toArray()")
+    found: list[float] = page.evaluate("window.studio.view.named('z low').middle")
     return found
 
 
@@ -111,7 +111,7 @@ def test_a_plate_stops_at_the_wall_and_is_red_beyond_it(page) -> None:
     # Its balls are from 0 to 700 mm along y and from 0 along x, less the probe's offset.
     extent = page.evaluate(
         "(() => { const { min, max } = window.studio.view.named('z low').extent;"
-        " return [min.toArray(), max.toArray()]; })()"
+        " return [min, max]; })()"
     )
     room = round(1.0 - extent[1][0], 6)
     pulled(page, (room + 0.2, 0.0, 0.0))
@@ -138,7 +138,7 @@ def test_a_plate_stops_at_the_wall_and_is_red_beyond_it(page) -> None:
 
 def test_near_a_wall_a_plate_goes_to_it(page) -> None:
     page.evaluate("(() => { window.studio.view.step = 0.001; })()")
-    extent = page.evaluate("window.studio.view.named('z low').extent.max.toArray()")
+    extent = page.evaluate("window.studio.view.named('z low').extent.max")
     room = round(1.0 - extent[0], 6)
     pulled(page, (room - 0.002, 0.0, 0.0))
     assert page.evaluate(PLACE)[0][0] == pytest.approx(room, abs=1e-6)
@@ -189,7 +189,7 @@ def test_a_cancelled_pointer_leaves_the_plate(page) -> None:
     fingers("touchMove", (x + 40, y + 12))
     assert page.evaluate(PLACE)[0] != [0, 0, 0]
     fingers("touchCancel")
-    until(page, "window.studio.view.named('z low').group.position.length() === 0")
+    until(page, "window.studio.view.hands.offset('z low').every((one) => one === 0)")
     assert calls(page, "onDrop") == []
     # And the next one drags as before.
     fingers("touchStart", (x, y))
@@ -230,15 +230,50 @@ def test_a_place_is_asked_for_on_the_floor(page) -> None:
     assert len(calls(page, "onPlace")) == 2
 
 
-def test_an_answer_builds_only_what_has_changed(page) -> None:
-    # The map comes after the answer, for the design that is shown already.
-    until(page, "window.studio.view.sheets.children.length === 3")
-    built = "window.studio.view.plates.map(({ group }) => group.uuid)"
-    memory = "({ ...window.studio.view.renderer.info.memory })"
-    before, used = page.evaluate(built), page.evaluate(memory)
-    page.evaluate("window.studio.act({ do: 'move', position: 'z low', by: [0.01, 0, 0] })")
-    settled(page, 1)
-    page.wait_for_timeout(300)
-    after = page.evaluate(built)
-    assert after[1:] == before[1:] and after[0] != before[0]
-    assert page.evaluate(memory) == used
+def test_a_drop_stays_until_it_is_answered_and_goes_back_if_it_is_refused(page) -> None:
+    held: list = []
+    page.route("**/api/do", lambda route: route.continue_() if held else held.append(route))
+    pulled(page, (0.1, 0.0, 0.0))
+    page.mouse.up()
+    first = page.evaluate(PLACE)[0]
+    assert first[0] == pytest.approx(0.1, abs=0.011)
+    # It is taken again where it is drawn, before the answer.
+    once, twice = ([middle(page)[0] + k * first[0], *middle(page)[1:]] for k in (1, 2))
+    page.mouse.move(*spot(page, once))
+    page.mouse.down()
+    page.mouse.move(*spot(page, twice), steps=3)
+    page.mouse.up()
+    assert page.evaluate(PLACE)[0][0] == pytest.approx(2 * first[0], abs=0.011)
+    held[0].continue_()
+    origin = settled(page, 2)["design"]["scene"]["positions"][0]["origin"]
+    assert origin[0] == pytest.approx(2 * first[0], abs=0.011)
+    assert page.evaluate(PLACE)[0] == [0, 0, 0]
+    page.unroute("**/api/do")
+    page.route("**/api/do", lambda route: route.fulfill(json={"error": "refused"}))
+    pulled(page, (-0.1, 0.0, 0.0))
+    assert page.evaluate(PLACE)[0] != [0, 0, 0]
+    page.mouse.up()
+    until(page, "window.studio.view.hands.offset('z low').every((one) => one === 0)")
+
+
+def test_the_mouse_turns_moves_and_enlarges_the_view(page) -> None:
+    corner = [1.0, 0.0, 0.0]
+    x, y = spot(page, corner)
+    page.mouse.move(x, y + 4)
+    page.mouse.down()
+    page.mouse.move(x + 40, y + 14, steps=3)
+    page.mouse.up()
+    (zoom, [turn, rise, *shift]) = page.evaluate(EYE)
+    assert (zoom, shift) == (1, [0, 0]) and turn > -35 and rise > 24
+    # What is below the pointer stays there when the wheel turns.
+    x, y = spot(page, corner)
+    page.mouse.move(x, y)
+    page.mouse.wheel(0, -400)
+    until(page, "window.studio.view.zoom > 1.3")
+    assert spot(page, corner) == pytest.approx((x, y), abs=0.5)
+    page.mouse.down(button="right")
+    page.mouse.move(x + 30, y - 20, steps=3)
+    page.mouse.up(button="right")
+    assert spot(page, corner) == pytest.approx((x + 30, y - 20), abs=0.5)
+    page.click("#home")
+    assert page.evaluate(EYE) == [1, [-35, 24, 0, 0]]

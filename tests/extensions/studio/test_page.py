@@ -54,6 +54,9 @@ FAINT = """() => {
   }).map((one) => one.outerHTML.slice(0, 90));
 }"""
 
+CORNER = """window.studio.view.sheets[0]?.image.getContext('2d').getImageData(0, 0, 1, 1).data
+.join()""".replace("\n", "")
+
 SERIOUS = """async () => (await axe.run(document)).violations
 .filter((one) => ['serious', 'critical'].includes(one.impact))
 .map((one) => [one.id, one.nodes.map((node) => node.html.slice(0, 90))])"""
@@ -145,8 +148,20 @@ def test_the_map_is_of_lengths_and_of_points_on_request(design: Path) -> None:
     with Studio(design) as studio, tab(1440) as page:
         page.goto(studio.address)
         until(page, "!!window.studio?.state()?.design?.map")
-        assert "ratio to the target" in page.inner_text("#legend")
-        assert "1 = target" in page.inner_text("#legend")
+        legend = page.inner_text("#legend")
+        assert "ratio to the target 0.5 µm" in legend and "here 0.2 to 0.48" in legend
+        bands = page.locator("#legend li")
+        steps = ["0", "0.25", "0.5", "0.75", "1 = target", "1.5", "2 or more"]
+        assert bands.all_inner_texts() == steps
+        corner = page.evaluate(CORNER)
+        # The same steps for another target, where the same map has other colours.
+        act(page, do="set", path=["target_uncertainty"], value="0.15 um")
+        page.wait_for_selector("#legend >> text=here 0.")
+        until(page, "document.querySelector('#legend').innerText.includes('0.15 µm')")
+        assert bands.all_inner_texts() == steps
+        until(page, f"{CORNER} !== {corner!r}")
+        act(page, do="undo")
+        until(page, f"{CORNER} === {corner!r}")
         page.select_option("#map", "points")
         page.wait_for_selector("#legend >> text=depends on the origin")
         page.select_option("#map", "")

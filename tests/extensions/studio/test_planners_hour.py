@@ -90,7 +90,7 @@ def test_an_hour(design: Path) -> None:
         settled(page, 1)
         assert "Full rank" in page.inner_text("#verdict")
         # The map of lengths comes after the figures, on three levels of the volume.
-        until(page, "window.studio.view.sheets.children.length === 3")
+        until(page, "window.studio.view.sheets.length === 3")
         # A plate is dragged, and one is added.
         before = page.evaluate("window.studio.state().design.scene.positions[0].origin")
         page.click("#positions button.name >> nth=0")

@@ -1,125 +1,145 @@
-// Mouse and fingers: plates are dragged, stop at walls, and go back when a drag is cancelled.
-import { Plane, Vector3 } from "three";
+// Mouse and fingers: plates are dragged, stop at walls, and go back when a drag is cancelled; what
+// is dragged elsewhere turns, moves and enlarges the view.
+import { apart, between, clamp, dot, plus } from "./shapes.js";
 
 const SNAP = 0.003; // metres from a wall at which a plate goes to it
 const OUTSIDE = 1e-6; // metres beyond a wall that count
 const HOLD = 500; // milliseconds that a finger rests where something is to be put
 const STILL = 6; // pixels that a resting pointer may move
-const AXES = ["x", "y", "z"];
+const NOWHERE = [0, 0, 0];
+const pixel = ({ offsetX, offsetY }) => [offsetX, offsetY];
 
 export class Hands {
   constructor(view) {
-    this.view = view;
-    this.drag = this.holding = null;
-    this.from = [0, 0]; // where the last pointer went down
-    this.fingers = new Set();
-    const { canvas } = view;
-    // Before the controls, which turn the view unless a plate is dragged.
-    canvas.addEventListener("pointerdown", (event) => this.press(event), { capture: true });
-    canvas.addEventListener("pointermove", (event) => this.pull(event));
-    canvas.addEventListener("pointerup", (event) => this.release(event, false));
-    canvas.addEventListener("pointercancel", (event) => this.release(event, true));
-    canvas.addEventListener("pointerleave", () => view.hover(null));
-    canvas.addEventListener("dblclick", (event) => this.put(event));
+    Object.assign(this, { view, drag: null, dropped: null, holding: null });
+    this.fingers = new Map(); // pixels of pointers that are down
+    const on = (type, does) => view.canvas.addEventListener(type, does, { passive: false });
+    on("pointerdown", (event) => this.press(event));
+    on("pointermove", (event) => this.pull(event));
+    on("pointerup", (event) => this.release(event, false));
+    on("pointercancel", (event) => this.release(event, true));
+    on("pointerleave", () => view.hover(null));
+    on("dblclick", (event) => this.put(pixel(event)));
+    on("contextmenu", (event) => event.preventDefault());
+    on("wheel", (event) => {
+      event.preventDefault();
+      if (view.design) view.enlarge(0.999 ** event.deltaY, pixel(event));
+    });
     window.addEventListener("blur", () => this.drop(true));
     window.addEventListener("keydown", (event) => {
       if (event.key !== "Escape" || !this.drag) return;
       event.preventDefault();
       event.stopPropagation();
+      this.fingers.clear();
       this.drop(true);
     }, { capture: true });
   }
 
-  // Whether the view turns, moves and grows with the pointers.
-  free(isFree) {
-    const { controls, flat } = this.view;
-    controls.enableRotate = isFree && !flat;
-    controls.enablePan = controls.enableZoom = isFree;
+  // How far a plate is drawn from where it is: a drop is kept until the design has it.
+  offset(name) {
+    const { drag, dropped } = this;
+    if (drag?.name === name) return plus(drag.start, drag.by);
+    return dropped?.name === name ? dropped.by : NOWHERE;
   }
 
   press(event) {
-    const { view } = this;
-    if (event.isPrimary) this.fingers.clear();
-    this.fingers.add(event.pointerId);
+    const { view, fingers } = this;
+    const { pointerId } = event;
+    if (event.isPrimary) fingers.clear();
+    const at = pixel(event);
+    fingers.set(pointerId, at);
+    view.canvas.setPointerCapture(pointerId);
     clearTimeout(this.holding);
     // Two fingers move the view, and the plate is where it was.
-    if (this.fingers.size > 1) this.drop(true);
-    else if (event.button === 0 && view.design) {
-      this.from = [event.clientX, event.clientY];
-      const met = view.under(event);
-      if (met) this.grip(event, met);
-      else if (event.pointerType === "touch") {
-        this.holding = setTimeout(() => this.put(event), HOLD);
-      }
+    if (fingers.size > 1) this.drop(true);
+    if (fingers.size > 1 || event.button !== 0 || !view.design) return;
+    this.from = at;
+    const plate = view.under(at);
+    if (!plate) {
+      if (event.pointerType === "touch") this.holding = setTimeout(() => this.put(at), HOLD);
+      return;
     }
-  }
-
-  grip({ pointerId }, { plate: { place, normal }, point }) {
-    this.free(false);
-    this.view.canvas.setPointerCapture(pointerId);
-    const by = new Vector3();
-    this.drag = { name: place.name, pointerId, point, normal, by, far: false, leaves: false };
-    if (place.name !== this.view.selected) this.view.handlers.onSelect(place.name);
+    const { place: { name } } = plate;
+    this.drag = { name, pointerId, start: this.offset(name), by: NOWHERE };
+    if (name !== view.selected) view.handlers.onSelect(name);
   }
 
   pull(event) {
-    const { view, drag } = this;
-    const [x, y] = this.from;
-    const isStill = Math.hypot(event.clientX - x, event.clientY - y) < STILL;
-    if (!isStill) clearTimeout(this.holding);
-    if (!drag && event.pointerType !== "touch" && !event.buttons && view.design) {
-      view.hover(view.under(event)?.plate.place.name ?? null);
+    const { view, drag, fingers } = this;
+    if (!view.design) return;
+    const at = pixel(event);
+    const before = fingers.get(event.pointerId);
+    if (!before) {
+      if (!event.buttons) view.hover(view.under(at)?.place.name ?? null);
+      return;
     }
-    const plate = drag && view.named(drag.name);
-    if (!plate || event.pointerId !== drag.pointerId || (!drag.far && isStill)) return;
-    const way = this.way(view.ray(event).ray, event.shiftKey && !view.flat);
-    if (!way) return;
-    const by = rounded(event.altKey ? way : this.stopped(plate, way), 1e-6);
-    if (by.equals(drag.by)) return;
-    const moved = plate.extent.clone().translate(by);
-    const leaves = !view.volume.clone().expandByScalar(OUTSIDE).containsBox(moved);
-    Object.assign(drag, { by, far: true, leaves });
-    plate.group.position.copy(by);
-    view.dress();
-    view.handlers.onDrag(drag.name, this.told(by));
+    fingers.set(event.pointerId, at);
+    const isFar = apart(at, this.from ?? at) >= STILL;
+    if (isFar) clearTimeout(this.holding);
+    if (!drag) this.look(event, before, at);
+    else if (event.pointerId === drag.pointerId && (drag.far || isFar)) this.carry(event, at);
   }
 
-  // How far the pointer has moved the plate: in its plane, or along its normal.
-  way(ray, isAlong) {
-    const { point, normal } = this.drag;
-    const { step } = this.view;
-    if (isAlong) {
-      // The point of the line through the grip that is nearest to the ray.
-      const across = new Vector3().crossVectors(normal, ray.direction);
-      const apart = new Vector3().subVectors(ray.origin, point).cross(ray.direction).dot(across);
-      const steps = Math.round(apart / across.lengthSq() / step);
-      return across.lengthSq() < 1e-6 ? null : normal.clone().multiplyScalar(steps * step);
-    }
-    const plane = new Plane().setFromNormalAndCoplanarPoint(normal, point);
-    const by = ray.intersectPlane(plane, new Vector3());
-    if (!by) return null;
-    rounded(by.sub(point), step);
-    return by.addScaledVector(normal, -by.dot(normal));
+  // Turn the view, or move it, with a second finger that enlarges it.
+  look({ pointerId, buttons, ctrlKey, metaKey, shiftKey }, before, at) {
+    const { view, fingers } = this;
+    const [, other] = [...fingers].find(([id]) => id !== pointerId) ?? [];
+    const by = plus(at, before, -1);
+    if (other) {
+      view.shift = plus(view.shift, by, 0.5);
+      view.enlarge(apart(at, other) / (apart(before, other) || 1), between(at, other));
+    } else if (view.flat || buttons > 1 || ctrlKey || metaKey || shiftKey) {
+      view.set({ shift: plus(view.shift, by) });
+    } else view.swivel(...by.map((pixels) => (360 * pixels) / view.room[1]));
+  }
+
+  // The plate goes with the pointer, in its plane or along its normal.
+  carry(event, at) {
+    const { view, drag } = this;
+    const plate = view.named(drag.name);
+    const way = plate && this.way(plate, at, event.shiftKey && !view.flat);
+    if (!way) return;
+    const extent = Object.values(plate.extent).map((end) => plus(end, drag.start));
+    const by = rounded(event.altKey ? way : this.stopped(extent, plate.normal, way), 1e-6);
+    if (!apart(by, drag.by)) return;
+    const leaves = extent.some((end) => !this.isInside(plus(end, by)));
+    Object.assign(drag, { by, far: true, leaves });
+    view.dress();
+    view.handlers.onDrag(drag.name, this.components(by));
+  }
+
+  way({ normal, middle }, at, isAlong) {
+    const { view: { towards, step }, view, from } = this;
+    // Along the normal, in the plane with it that faces the eye most.
+    const facing = isAlong ? plus(towards, normal, -dot(towards, normal)) : normal;
+    const [start, end] = [from, at].map((one) => view.meet(one, facing, middle));
+    if (!start) return null;
+    const by = plus(end, start, -1);
+    const along = Math.round(dot(by, normal) / step) * step;
+    return isAlong ? plus(NOWHERE, normal, along)
+      : plus(rounded(by, step), normal, -dot(rounded(by, step), normal));
   }
 
   // As far as the scales read within the volume; what is outside already comes back only.
-  stopped({ extent }, way) {
+  stopped([low, high], normal, way) {
     const { min, max } = this.view.volume;
-    const by = way.clone();
-    let share = 1;
-    for (const axis of AXES.filter((one) => Math.abs(way[one]) > 1e-9)) {
-      const walls = [min[axis] - extent.min[axis], max[axis] - extent.max[axis]];
-      const kept = Math.min(Math.max(way[axis], Math.min(0, walls[0])), Math.max(0, walls[1]));
-      share = Math.min(share, kept / way[axis]);
-      by[axis] = walls.find((wall) => Math.abs(kept - wall) < SNAP) ?? kept;
-    }
+    const [below, above] = [plus(min, low, -1), plus(max, high, -1)];
+    const kept = way.map((one, k) => clamp(one, Math.min(0, below[k]), Math.max(0, above[k])));
     // A plate that leans stops on its way.
-    const isStraight = AXES.some((axis) => Math.abs(this.drag.normal[axis]) > 1 - 1e-9);
-    return isStraight ? by : way.clone().multiplyScalar(share);
+    const isStraight = normal.some((one) => Math.abs(one) > 1 - 1e-9);
+    const shares = kept.map((one, k) => (Math.abs(way[k]) > 1e-9 ? one / way[k] : 1));
+    if (!isStraight) return plus(NOWHERE, way, Math.min(...shares));
+    return kept.map((one, k) => (Math.abs(way[k]) < 1e-9 ? one
+      : [below[k], above[k]].find((wall) => Math.abs(one - wall) < SNAP) ?? one));
   }
 
-  told(by) {
-    return by.toArray().slice(0, this.view.design.scene.dimension);
+  isInside(point) {
+    const { min, max } = this.view.volume;
+    return point.every((one, k) => one === clamp(one, min[k] - OUTSIDE, max[k] + OUTSIDE));
+  }
+
+  components(vector) {
+    return vector.slice(0, this.view.flat ? 2 : 3);
   }
 
   release({ pointerId }, isCancelled) {
@@ -129,47 +149,43 @@ export class Hands {
   }
 
   // The end of a drag; if it is cancelled, the plate is where it was and nothing has happened.
-  drop(isCancelled) {
+  async drop(isCancelled) {
     const { drag, view } = this;
     clearTimeout(this.holding);
     if (!drag) return;
     this.drag = null;
-    this.free(true);
-    if (isCancelled) view.named(drag.name)?.group.position.set(0, 0, 0);
+    const { name, start, by, far } = drag;
+    const isDone = far && !isCancelled && view.named(name);
+    if (isDone) this.dropped = { name, by: plus(start, by) };
     view.dress();
-    if (!view.design || !drag.far) return;
     // The figures are those of the plate that has not moved.
-    if (isCancelled) view.handlers.onDrag(drag.name, this.told(new Vector3()));
-    else if (drag.by.length()) view.handlers.onDrop(drag.name, this.told(drag.by));
+    if (far && !isDone && view.design) view.handlers.onDrag(name, this.components(NOWHERE));
+    if (!isDone || !by.some(Boolean)) return;
+    if (await view.handlers.onDrop(name, this.components(by)) !== false) return;
+    this.settle();
+    view.dress();
   }
 
-  // Answers that come meanwhile let go of a plate only if it is there no more.
-  resume() {
-    if (!this.drag) return;
-    const plate = this.view.named(this.drag.name);
-    if (plate) plate.group.position.copy(this.drag.by);
-    else this.drop(true);
+  // A design has come, or a change was refused: plates are where it has them.
+  settle() {
+    this.dropped = null;
+    if (this.drag) this.drag.start = NOWHERE;
   }
 
   // A position is asked for on the volume's lower face, or else on the nearest plane of a plate.
-  put(event) {
+  put(at) {
     const { view } = this;
-    if (!view.design || !view.handlers.onPlace || view.under(event)) return;
-    const { ray } = view.ray(event);
+    if (!view.design || !view.handlers.onPlace || view.under(at)) return;
     const { min, max } = view.volume;
-    const room = view.volume.clone().expandByScalar(OUTSIDE);
-    const meet = (normal, point) =>
-      ray.intersectPlane(new Plane().setFromNormalAndCoplanarPoint(normal, point), new Vector3());
-    const isIn = (point) => point && room.containsPoint(point);
-    const planes = view.plates.map(({ normal, middle }) => meet(normal, middle)).filter(isIn);
-    planes.sort((a, b) => a.distanceTo(ray.origin) - b.distanceTo(ray.origin));
-    const at = [meet(new Vector3(0, 0, 1), min), ...planes].find(isIn);
-    if (!at) return;
-    view.handlers.onPlace(this.told(rounded(rounded(at, view.step).clamp(min, max), 1e-6)));
+    const planes = view.plates.map(({ normal, middle }) => view.meet(at, normal, middle));
+    planes.sort((one, other) => view.nearness(other) - view.nearness(one));
+    const floor = view.meet(at, [0, 0, 1], min);
+    const point = [floor, ...planes].find((one) => one && this.isInside(one));
+    if (!point) return;
+    const inside = rounded(point, view.step).map((one, k) => clamp(one, min[k], max[k]));
+    view.handlers.onPlace(this.components(rounded(inside, 1e-6)));
   }
 }
 
-function rounded(vector, step) {
-  return vector.fromArray(vector.toArray().map((one) =>
-    Math.round(Math.round(one / step) * step * 1e9) / 1e9 + 0));
-}
+const rounded = (vector, step) => vector.map((one) =>
+  Math.round(Math.round(one / step) * step * 1e9) / 1e9 + 0);

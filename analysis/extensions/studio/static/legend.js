@@ -1,35 +1,70 @@
-// The legend of the map.
+// Colours of the map, in bands between fixed steps, and their legend.
 import { $, make, micro, page } from "./page.js";
+import { roundStep } from "./shapes.js";
 
-// How far colours of the map go, in words.
+// Lower ends of bands as ratios to the target: four below it, and three above.
+const RATIOS = [0, 0.25, 0.5, 0.75, 1, 1.5, 2];
+const FINE = 10; // points of a picture from one node of the map to the next
+const MEANINGS = {
+  target: "Largest uncertainty of the lengths from each point, as a ratio to the target ",
+  lengths: "Largest standard uncertainty of the lengths from each point",
+  points: "Standard uncertainty of a corrected co-ordinate, which depends on the origin",
+};
+const valuesOf = ({ slices }) => slices.flatMap(({ values }) => values.flat());
+const knownOf = (map) => valuesOf(map).filter((value) => value !== null);
+
+// Without a target, multiples of a round number of metres.
+function bandsOf(map) {
+  const step = roundStep(Math.max(...knownOf(map)) / RATIOS.length);
+  return map.unit === "target" ? RATIOS : RATIOS.map((_, k) => k * step);
+}
+
+// A picture of a level, interpolated between the nodes; grey where something is undetermined.
+export function imageOf(map, values, colour) {
+  const bands = bandsOf(map);
+  const shades = bands.map((_, k) => colour(`--band-${k}`));
+  const rows = values.map((row) => row.map((value) => value ?? NaN));
+  const [height, width] = [rows, rows[0]].map((nodes) => (nodes.length - 1) * FINE + 1);
+  const image = Object.assign(document.createElement("canvas"), { width, height });
+  const pen = image.getContext("2d");
+  for (let x = 0; x < width; x += 1) {
+    const column = rows.map((row) => along(row, x / FINE));
+    for (let y = 0; y < height; y += 1) {
+      const value = along(column, y / FINE);
+      const band = Math.max(0, bands.findLastIndex((low) => value > low));
+      pen.fillStyle = Number.isNaN(value) ? colour("--line") : shades[band];
+      pen.fillRect(x, y, 1, 1);
+    }
+  }
+  return image;
+}
+
+function along(nodes, at) {
+  const [low, high] = [Math.floor(at), Math.ceil(at)].map((k) => nodes[k]);
+  return low + (at % 1) * (high - low);
+}
+
 export function legend() {
+  const { map, target } = page.state.design ?? {};
   const kind = $("map").value;
-  const { map } = page.state.design ?? {};
-  const values = map?.slices.flatMap((slice) => slice.values.flat()) ?? [];
-  const known = values.filter((value) => value !== null);
   $("legend").replaceChildren();
   if (!kind || !map) return;
+  const known = knownOf(map);
   if (!known.length) {
     $("legend").append("Map: everything is undetermined, so that there is nothing to colour.");
     return;
   }
-  const to_target = map.scale?.unit === "target";
-  const words = (value) => (to_target ? `${Number(value.toPrecision(2))}` : `${micro(value)} µm`);
-  const [least, most] = [Math.min(...known), Math.max(...known)];
-  const high = map.scale?.high ?? most;
-  const ramp = make("span", { class: "ramp" });
-  if (to_target && high > 1) {
-    const mark = make("i");
-    mark.style.left = `${100 / high}%`;
-    ramp.append(mark);
-  }
-  $("legend").append(
-    to_target ? "Largest uncertainty of the lengths from each point, as a ratio to the target: "
-      : kind === "lengths" ? "Largest standard uncertainty of the lengths from each point: "
-        : "Standard uncertainty of a corrected co-ordinate, which depends on the origin: ",
-    make("span", { class: "nowrap" }, words(map.scale?.low ?? least), " ",
-      ramp, ` ${words(high)}`, to_target && high === 1 ? " = target" : ""),
-    map.scale ? `; here ${words(least)} to ${words(most)}` : "",
-    to_target && high > 1 ? " (the mark is at 1 = target)" : "",
-    known.length < values.length ? "; grey: undetermined" : "");
+  const isRatio = map.unit === "target";
+  const words = (value) => (isRatio ? `${Number(value.toPrecision(2))}` : `${micro(value)} µm`);
+  const bands = bandsOf(map).map((low, k) => {
+    const isTarget = isRatio && low === 1;
+    const item = make("li", { class: isTarget ? "target" : "" }, words(low),
+      isTarget ? " = target" : k === RATIOS.length - 1 ? " or more" : "");
+    item.style.setProperty("--shade", `var(--band-${k})`);
+    return item;
+  });
+  $("legend").append(isRatio ? MEANINGS.target + target : MEANINGS[kind],
+    `; here ${words(Math.min(...known))} to ${words(Math.max(...known))}`,
+    known.length < valuesOf(map).length ? "; grey: undetermined" : "",
+    make("ul", { class: "bands" }, ...bands));
 }

@@ -2,95 +2,95 @@
 import { $, ask, make, micro, page } from "./page.js";
 
 const UNITS = { m: "µm", rad: "µrad", 1: "ppm" };
-const percent = (part) => `${Number((100 * part).toPrecision(2))}`;
+const percent = (part) => `${Number((100 * part).toPrecision(part < 0.01 ? 1 : 2))}`;
+const known = (value, words) => (value === null ? "–" : words(value));
+const hint = (...words) => make("p", { class: "hint" }, ...words);
+const row = (attributes, label, unit, cells) => make("tr", attributes,
+  make("th", { scope: "row" }, label), make("td", {}, unit), ...cells);
 
-// A table of errors by positions. A row that is pointed at or focused is given to `onHover`, with
-// the index of the direction that hides it, or null; a position whose head is pressed to
-// `onChoose`.
-export function matrix(container, data, { onHover, onChoose }) {
-  const head = (position) => make("th", { scope: "col", class: position.is_added ? "added" : "" },
+function head({ positions, average }, onChoose) {
+  const name = (position) => make("th", { scope: "col" },
     make("button", { class: "link", "aria-label": `choose ${position.name}`,
       onclick: () => onChoose(position) }, `${position.is_added ? "+ " : ""}${position.name}`));
-  const row = (label, unit, cell) => make("tr", {},
-    make("th", { scope: "row" }, label), make("td", {}, unit),
-    ...data.positions.map((position) => make("td", {}, cell(position))));
-  const heads = [row("readings", "", ({ readings }) => `${readings}`)];
-  if (data.positions.some(({ minutes }) => minutes !== null)) {
-    heads.push(row("minutes", "", ({ minutes }) =>
-      (minutes === null ? "–" : `${Math.round(minutes)}`)));
-  }
-  heads.push(row("U6 without, µm", micro(data.average), ({ average }) => micro(average)));
-  const table = make("table", { class: "matrix" },
-    make("caption", {}, "Information of each error that goes with each position, %"),
-    make("thead", {}, make("tr", {}, make("th", { scope: "col" }, "error"),
-      make("th", { scope: "col" }, "u"), ...data.positions.map(head)), ...heads),
-    make("tbody", {}, ...data.errors.map((error, row) => errorRow(error, row, data, onHover))));
-  const is_lost = data.undetermined_without.flat().some(Boolean);
-  const shown = [make("div", { class: "scrolled whole", tabindex: "0", role: "region",
-    "aria-label": "Errors by positions" }, table), ...gains(data)];
-  if (is_lost) {
-    shown.push(make("p", { class: "hint" }, "all: without it, the error is undetermined."));
-  }
-  container.replaceChildren(...shown);
+  const figures = (label, all, words) =>
+    row({}, label, all, positions.map((position) => make("td", {}, words(position))));
+  const minutes = figures("minutes", "", (one) => known(one.minutes, Math.round));
+  return make("thead", {}, make("tr", {}, make("th", { scope: "col" }, "error"),
+    make("th", { scope: "col" }, "u"), ...positions.map(name)),
+  figures("readings", "", ({ readings }) => readings),
+  positions.some((one) => one.minutes !== null) ? minutes : "",
+  figures("U6 without, µm", known(average, micro), (one) => known(one.average, micro)));
 }
 
-function errorRow(error, row, data, onHover) {
-  const is_open = error.standard_uncertainty === null;
-  const words = error.hidden_by.map((k) => data.directions[k]).join("; ");
+// A row that is pointed at or focused is given to `onHover`, with the index of the direction that
+// hides it, or null; where several do, its name leads to the next.
+function errorRow(error, parts, isLost, directions, onHover) {
+  const { name, hidden_by: hidden, standard_uncertainty: u, unit } = error;
+  const words = hidden.map((k) => directions[k]).join("; ");
   let k = 0;
-  const point = () => onHover(error, error.hidden_by.length ? error.hidden_by[k] : null);
+  const point = () => onHover(error, hidden[k] ?? null);
   const turn = () => {
-    k = (k + 1) % error.hidden_by.length;
+    k = (k + 1) % hidden.length;
     point();
   };
-  const name = error.hidden_by.length
-    ? make("button", { class: "link", title: words, "data-focus": `error ${error.name}`,
-      "aria-label": `${error.name}: ${words}`, onclick: turn, onfocus: point }, error.name)
-    : make("span", { title: error.meaning }, error.name);
-  const u = is_open ? "undetermined"
-    : `${micro(error.standard_uncertainty)} ${UNITS[error.unit] ?? error.unit}`;
-  return make("tr", { class: error.hidden_by.length ? "hidden-error" : "", onmouseenter: point },
-    make("th", { scope: "row" }, name), make("td", {}, u),
-    ...data.information[row].map((part, k) => cell(part, data.undetermined_without[row][k])));
-}
-
-function cell(part, is_lost) {
-  if (part === null) return make("td", { class: "open" }, "–");
-  const made = make("td", { class: is_lost ? "part lost" : "part" },
-    is_lost ? "all" : percent(part));
-  made.style.setProperty("--part", part);
-  return made;
-}
-
-// What candidates lower U6 by, for each reading and minute that they cost.
-function gains({ average, positions }) {
-  const added = positions.filter((position) => position.is_added);
-  return added.map((position) => {
-    const gain = average - position.average;
-    const by = (cost) => `${Number((1e9 * gain / cost).toPrecision(2))} nm`;
-    const per = average === null || position.average === null ? ""
-      : `: U6 falls by ${micro(gain)} µm, ${by(position.readings)} for each reading${
-        position.minutes ? ` and ${by(position.minutes)} for each minute` : ""}`;
-    return make("p", { class: "hint" }, `+ ${position.name}, the next position`, per);
+  const label = hidden.length
+    ? make("button", { class: "link", title: words, "data-focus": `error ${name}`,
+      "aria-label": `${name}: ${words}`, onclick: turn, onfocus: point }, name)
+    : make("span", { title: error.meaning }, name);
+  const cells = parts.map((part, position) => {
+    const look = part === null ? "open" : isLost[position] ? "part lost" : "part";
+    const cell = make("td", { class: look }, isLost[position] ? "all" : known(part, percent));
+    cell.style.setProperty("--part", part);
+    return cell;
   });
+  return row({ class: hidden.length ? "hidden-error" : "", onmouseenter: point }, label,
+    u === null ? "undetermined" : `${micro(u)} ${UNITS[unit] ?? unit}`, cells);
+}
+
+// What a candidate lowers U6 by, for each reading and minute that it costs.
+function gain({ name, readings, minutes, average }, before) {
+  const by = (cost) => `${Number((1e9 * (before - average) / cost).toPrecision(2))} nm`;
+  return hint(`+ ${name}, the next position`, before === null || average === null ? ""
+    : `: U6 falls by ${micro(before - average)} µm, ${by(readings)} for each reading${
+      minutes ? ` and ${by(minutes)} for each minute` : ""}`);
+}
+
+// The table in a box, and what there is to know about it.
+function matrix(data, { onHover, onChoose }) {
+  const { positions, undetermined_without: lost } = data;
+  const table = make("table", { class: "matrix" }, head(data, onChoose), make("tbody", {}, ...data.errors.map((error, k) =>
+      errorRow(error, data.information[k], lost[k], data.directions, onHover))));
+  const box = make("div", { class: "scrolled whole", tabindex: "0", role: "region",
+    "aria-label": "Errors by positions" }, table);
+  const more = hint(`Scroll to the right for all ${positions.length} positions →`);
+  // Its right edge fades as long as there is more behind it.
+  const look = () => {
+    more.hidden = box.scrollWidth <= box.clientWidth;
+    box.classList.toggle("more", box.scrollLeft + box.clientWidth < box.scrollWidth - 2);
+  };
+  box.addEventListener("scroll", look);
+  new ResizeObserver(look).observe(box);
+  return [hint("Information of each error that goes with each position, %"), more, box, ...positions.filter((one) => one.is_added).map((one) =>
+    gain(one, data.average)),
+  lost.flat().some(Boolean) ? hint("all: without it, the error is undetermined.") : ""];
 }
 
 let shown = null; // what the table is of
 let waiting = null;
-// Show the table of the present design with a candidate, once it is unfolded and nothing moves.
-export function errors(candidate, { onHover, onChoose }) {
+// Show the table of the present design with a candidate, once it is unfolded and nothing moves. A
+// position whose head is pressed is given to `onChoose`.
+export function errors(candidate, handlers) {
   clearTimeout(waiting);
   const { fingerprint, design, stale, pending } = page.state;
   const key = JSON.stringify([fingerprint, candidate ?? null]);
-  const is_current = key === shown;
-  $("matrix").classList.toggle("stale", !is_current);
-  if (!$("errors").open || is_current || !design || stale || pending) return;
+  $("matrix").classList.toggle("stale", key !== shown);
+  if (!$("errors").open || key === shown || !design || stale || pending) return;
   waiting = setTimeout(async () => {
     try {
       const data = await ask("/api/matrix", candidate ? { settings: candidate } : {});
       if (data.fingerprint !== page.state.fingerprint) return;
       shown = key;
-      if (data.errors) matrix($("matrix"), data, { onHover, onChoose });
+      if (data.errors) $("matrix").replaceChildren(...matrix(data, handlers));
       $("matrix").classList.remove("stale");
     } catch (error) {
       $("matrix").textContent = error.message;
