@@ -20,7 +20,7 @@ pytestmark = [
     pytest.mark.skipif(chromium() is None, reason=f"no Chromium on this machine: {INSTALL}"),
 ]
 
-DRAWN = "Object.values(window.studio.view.pooled).map((one) => one.length)"
+DRAWN = "['outlines', 'boxes'].map((name) => window.studio.view[name].length)"
 
 
 @pytest.fixture

@@ -7,7 +7,6 @@ const OUTSIDE = 1e-6; // metres beyond a wall that count
 const HOLD = 500; // milliseconds that a finger rests where something is to be put
 const STILL = 6; // pixels that a resting pointer may move
 const NOWHERE = [0, 0, 0];
-const pixel = ({ offsetX, offsetY }) => [offsetX, offsetY];
 
 export class Hands {
   constructor(view) {
@@ -19,11 +18,11 @@ export class Hands {
     on("pointerup", (event) => this.release(event, false));
     on("pointercancel", (event) => this.release(event, true));
     on("pointerleave", () => view.hover(null));
-    on("dblclick", (event) => this.put(pixel(event)));
+    on("dblclick", (event) => this.put(this.pixel(event)));
     on("contextmenu", (event) => event.preventDefault());
     on("wheel", (event) => {
       event.preventDefault();
-      if (view.design) view.enlarge(0.999 ** event.deltaY, pixel(event));
+      if (view.design) view.enlarge(0.999 ** event.deltaY, this.pixel(event));
     });
     window.addEventListener("blur", () => this.drop(true));
     window.addEventListener("keydown", (event) => {
@@ -33,6 +32,11 @@ export class Hands {
       this.fingers.clear();
       this.drop(true);
     }, { capture: true });
+  }
+
+  pixel({ clientX, clientY }) {
+    const { left, top } = this.view.canvas.getBoundingClientRect();
+    return [clientX - left, clientY - top];
   }
 
   // How far a plate is drawn from where it is: a drop is kept until the design has it.
@@ -46,7 +50,7 @@ export class Hands {
     const { view, fingers } = this;
     const { pointerId } = event;
     if (event.isPrimary) fingers.clear();
-    const at = pixel(event);
+    const at = this.pixel(event);
     fingers.set(pointerId, at);
     view.canvas.setPointerCapture(pointerId);
     clearTimeout(this.holding);
@@ -67,7 +71,7 @@ export class Hands {
   pull(event) {
     const { view, drag, fingers } = this;
     if (!view.design) return;
-    const at = pixel(event);
+    const at = this.pixel(event);
     const before = fingers.get(event.pointerId);
     if (!before) {
       if (!event.buttons) view.hover(view.under(at)?.place.name ?? null);
