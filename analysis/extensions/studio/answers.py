@@ -242,8 +242,8 @@ def _length_map(experiment: Experiment, linearisation: Linearisation) -> Data:
     values = settings.target_factor * groups.maximum_ratio if target else groups.maximum
     values = np.where(groups.undetermined > 0, np.nan, values)
     of_levels = values.reshape(LENGTH_NODES, LENGTH_NODES, -1).T
-    unit = "target" if target else "m"
-    return _map_data(in_slices(linearisation.design, of_levels)) | {"unit": unit}
+    scale = {"largest": float(np.nanmax(values, initial=0.0)), "unit": "target" if target else "m"}
+    return _map_data(in_slices(linearisation.design, of_levels)) | {"scale": scale}
 
 
 def _point_map(experiment: Experiment, linearisation: Linearisation) -> Data:

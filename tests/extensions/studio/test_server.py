@@ -387,7 +387,7 @@ def test_the_map_of_lengths_is_that_of_run(client, design):
     (experiment,) = load(design)
     lengths = length_map(experiment, length_settings(experiment, grid=(9, 9, 3)))
     drawn = found["map"]
-    assert drawn["unit"] == "target"
+    assert drawn["scale"]["unit"] == "target"
     ratios = {
         tuple(point): ratio
         for point, ratio in zip(
@@ -403,7 +403,7 @@ def test_the_map_of_lengths_is_that_of_run(client, design):
     text = client.get("/api/state").json()["text"].replace("target_uncertainty:", "# target:")
     client.post("/api/do", json={"do": "text", "text": text})
     found = client.post("/api/drawn", json={"map": "lengths"}).json()["map"]
-    assert found["unit"] == "m"
+    assert found["scale"]["unit"] == "m"
     known = [v for level in found["slices"] for row in level["values"] for v in row]
     assert 1e-8 < min(known) < max(known) < 1e-5
     for name in ("x low", "x high", "y low", "y high"):

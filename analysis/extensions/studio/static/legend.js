@@ -16,7 +16,7 @@ const knownOf = (map) => valuesOf(map).filter((value) => value !== null);
 // Without a target, multiples of a round number of metres.
 function bandsOf(map) {
   const step = roundStep(Math.max(...knownOf(map)) / RATIOS.length);
-  return map.unit === "target" ? RATIOS : RATIOS.map((_, k) => k * step);
+  return map.scale?.unit === "target" ? RATIOS : RATIOS.map((_, k) => k * step);
 }
 
 // A picture of a level, interpolated between the nodes; grey where something is undetermined.
@@ -54,7 +54,7 @@ export function legend() {
     $("legend").append("Map: everything is undetermined, so that there is nothing to colour.");
     return;
   }
-  const isRatio = map.unit === "target";
+  const isRatio = map.scale?.unit === "target";
   const words = (value) => (isRatio ? `${Number(value.toPrecision(2))}` : `${micro(value)} µm`);
   const bands = bandsOf(map).map((low, k) => {
     const isTarget = isRatio && low === 1;
