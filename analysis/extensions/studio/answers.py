@@ -1,5 +1,5 @@
-"""The studio's view of a design: its objects, its uncertainties, maps of them, and motions of
-undetermined directions.
+"""The studio's view of a design, to be made plain data: its objects, its uncertainties, maps of
+them, and motions of undetermined directions.
 """
 
 from __future__ import annotations
@@ -18,8 +18,8 @@ from ballplate.extensions.pages.motions import (
 )
 from ballplate.extensions.pages.page_facts import target_in_words
 from ballplate.extensions.repair.written import plane_of
-from ballplate.extensions.sweeps.error_map_uncertainty import LEVELS, ErrorMap, in_slices, point_map
-from ballplate.presentation import Data, finite, percent, picked, uncertainty_words
+from ballplate.extensions.sweeps.error_map_uncertainty import LEVELS, in_slices, point_map
+from ballplate.presentation import Data, percent, picked, uncertainty_words
 from ballplate.rank import Verdict, verdict
 from ballplate.results import (
     predict,
@@ -64,7 +64,7 @@ def summary(experiment: Experiment, moving: bool = False) -> dict[str, Any]:
             "expected": expected,
             "parameters": design.parameter_count,
             "observations": design.observation_count,
-            "reasons": [] if judged is None else list(judged.reasons),
+            "reasons": [] if judged is None else judged.reasons,
             "directions": [] if judged is None else _directions(judged),
         },
         "quantities": [_row(quantity) for quantity in quantities.values()],
@@ -72,8 +72,8 @@ def summary(experiment: Experiment, moving: bool = False) -> dict[str, Any]:
         "within": lengths and lengths.within_target,
         "shares": _shares(experiment, quantities),
         "met": _met(quantities, linearisation.deficiency == (expected or 0), judged),
-        "worst": None if lengths is None else _worst(linearisation, lengths),
-        "doubts": list(experiment.doubts),
+        "worst": _worst(linearisation, lengths),
+        "doubts": experiment.doubts,
         "seconds": perf_counter() - start,
     }
 
@@ -139,35 +139,29 @@ def _directions(judged: Verdict) -> list[Data]:
     return undetermined + [{"words": str(direction), "weak": True} for direction in judged.weak]
 
 
-def _worst(linearisation: Linearisation, lengths: Quantity) -> Data | None:
+def _worst(linearisation: Linearisation, lengths: Quantity | None) -> Data | None:
     """Return the ends of the length with the largest standard uncertainty, at scale readings."""
-    if lengths.pair is None:
+    if lengths is None or lengths.pair is None:
         return None
-    first, second = linearisation.design.evaluation.points[list(lengths.pair)].tolist()
+    first, second = linearisation.design.evaluation.points[list(lengths.pair)]
     return {"from": first, "to": second, "uncertainty": lengths.maximum}
 
 
 def _row(quantity: Quantity) -> Data:
-    return {
-        **picked(quantity, "symbol", "description"),
-        "maximum": finite(quantity.maximum),
-        "average": finite(quantity.average),
-        **picked(quantity, "unit", "count", "undetermined", "largest", "within_target"),
-    }
+    names = ("symbol", "description", "maximum", "average", "unit", "count", "undetermined")
+    return picked(quantity, *names, "largest", "within_target")
 
 
 def scene(experiment: Experiment, problems: Mapping[str, str]) -> dict[str, Any]:
     """Return the volume and all positions, with what is wrong with some by their names, as plain
     data in metres. Positions that are `unclear` have no place.
     """
-    volume = experiment.machine.volume
     names = {place.name for place in experiment.positions}
     return {
         "dimension": experiment.dimension,
-        "lower": volume.lower.tolist(),
-        "upper": volume.upper.tolist(),
-        "probes": {name: entry.offset.tolist() for name, entry in experiment.probes.items()},
-        "artefacts": {name: list(entry.names) for name, entry in experiment.layouts.items()},
+        **picked(experiment.machine.volume, "lower", "upper"),
+        "probes": {name: probe.offset for name, probe in experiment.probes.items()},
+        "artefacts": {name: layout.names for name, layout in experiment.layouts.items()},
         "positions": [
             place_data(experiment, place) | {"problem": problems.get(place.name)}
             for place in experiment.positions
@@ -180,18 +174,14 @@ def place_data(experiment: Experiment, place: Position) -> Data:
     """Return the pose of a position, as plain data in metres."""
     layout = experiment.layouts[place.artefact]
     plane = plane_of(place.pose.rotation)
-    is_read = np.zeros(len(layout.names), bool)
-    is_read[place.balls] = True
     return {
-        **picked(place, "name", "artefact", "enabled"),
-        "probes": list(place.probes),
+        **picked(place, "name", "artefact", "enabled", "probes"),
+        **picked(place.pose, "origin", "rotation"),
         "groups": len(place.readings),
         "readings": place.count,
-        "plane": None if plane is None else plane[0],
-        "origin": place.pose.origin.tolist(),
-        "rotation": place.pose.rotation.tolist(),
-        "balls": ball_coordinates(place.pose, layout).tolist(),
-        "read": is_read.tolist(),
+        "plane": plane and plane[0],
+        "balls": ball_coordinates(place.pose, layout),
+        "read": np.isin(np.arange(len(layout.names)), place.balls),
     }
 
 
@@ -218,14 +208,14 @@ def _motions(linearisation: Linearisation, target: Target | None, index: int) ->
     ]
     moved = without_rigid_motion(places, np.concatenate(by)[:, :, None])[:, :, 0]
     largest = float(np.linalg.norm(moved, axis=1).max())
-    rounded = np.round(moved / (largest or 1.0), 4).tolist()
+    rounded = np.round(moved / (largest or 1.0), 4)
     first = np.array([design.balls.of(int(artefact)).min() for artefact in design.balls.artefact])
     numbers = np.arange(len(first)) - first
     return {
         "nodes": NODES,
-        "names": list(design.positions.names),
-        "position": of_plates.position.tolist(),
-        "ball": numbers[of_plates.ball].tolist(),
+        "names": design.positions.names,
+        "position": of_plates.position,
+        "ball": numbers[of_plates.ball],
         "direction": {"nodes": rounded[: len(nodes)], "readings": rounded[len(nodes) :]},
     }
 
@@ -243,31 +233,15 @@ def _length_map(experiment: Experiment, linearisation: Linearisation) -> Data:
     values = np.where(groups.undetermined > 0, np.nan, values)
     of_levels = values.reshape(LENGTH_NODES, LENGTH_NODES, -1).T
     scale = {"largest": float(np.nanmax(values, initial=0.0)), "unit": "target" if target else "m"}
-    return _map_data(in_slices(linearisation.design, of_levels)) | {"scale": scale}
+    mapped = in_slices(linearisation.design, of_levels)
+    return {**picked(mapped, "x", "y", "slices"), "scale": scale}
 
 
 def _point_map(experiment: Experiment, linearisation: Linearisation) -> Data:
     """Return standard uncertainties of corrected points through the volume, None if
     undetermined.
     """
-    return _map_data(point_map(linearisation, MAP_NODES))
-
-
-def _map_data(mapped: ErrorMap) -> Data:
-    def written(value: float) -> float | None:
-        return finite(float(f"{value:.4g}"))
-
-    return {
-        "x": mapped.x.tolist(),
-        "y": mapped.y.tolist(),
-        "slices": [
-            {
-                **picked(map_slice, "name", "level"),
-                "values": [[written(v) for v in row] for row in map_slice.values.tolist()],
-            }
-            for map_slice in mapped.slices
-        ],
-    }
+    return picked(point_map(linearisation, MAP_NODES), "x", "y", "slices")
 
 
 MAPS: Mapping[Any, Callable[[Experiment, Linearisation], Data]] = {

@@ -60,9 +60,9 @@ def pool_of(experiment: Experiment) -> Data:
         "left_out": sorted(out),
         "outlines": list(outlines)[:MOST_OUTLINES],
         "more": max(0, len(outlines) - MOST_OUTLINES),
-        "boxes": [] if pool is None else np.clip(pool.forbidden, lower, upper).tolist(),
+        "boxes": [] if pool is None else np.clip(pool.forbidden, lower, upper),
         "probes": {
-            plane: list(probes_across(experiment, artefact, axis)) for plane, axis in planes.items()
+            plane: probes_across(experiment, artefact, axis) for plane, axis in planes.items()
         },
     }
 

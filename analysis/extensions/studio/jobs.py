@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 from ballplate.extensions.repair.written import position_settings
-from ballplate.presentation import Data, finite, picked
+from ballplate.presentation import Data, picked
 from ballplate.simulator.computing import Report
 from ballplate.simulator.experiment import Position, lay_out
 from ballplate.simulator.inputs import ExperimentError, number_of
@@ -53,8 +53,7 @@ def _plan(document: DesignDocument, settings: Mapping[str, Any], report: Report)
     return {
         "lines": found.lines(),
         "words": f"the plan: {number_of(len(chosen.positions), 'position')}, {found.spent.budget}",
-        "average": None if lengths is None else finite(lengths.average),
-        "maximum": None if lengths is None else finite(lengths.maximum),
+        **({} if lengths is None else picked(lengths, "average", "maximum")),
         "deficiency": found.prediction.verdict.deficiency,
         "places": [place_data(chosen, place) for place in chosen.positions],
         "plan": [position_settings(chosen, place) for place in chosen.positions],
@@ -75,7 +74,7 @@ def _fit(document: DesignDocument, settings: Mapping[str, Any], report: Report) 
         file.write_bytes(base64.b64decode(str(settings["content"])))
         observed = read_readings([file], lay_out(experiment), settings=experiment.readings)
     result = fit(experiment, observed)
-    data: Data = {"lines": result.lines(), "notes": list(result.notes)}
+    data: Data = {"lines": result.lines(), "notes": result.notes}
     if result.converged:
         design = result.design
         readings, residuals, standardised = reading_residuals(
@@ -83,9 +82,9 @@ def _fit(document: DesignDocument, settings: Mapping[str, Any], report: Report) 
         )
         data["residuals"] = {
             "position": [design.positions.names[k] for k in readings.position],
-            "place": result.observed.x[design.plate_readings].tolist(),
-            "value": residuals.tolist(),
-            "standardised": np.abs(standardised).max(axis=1).tolist(),
+            "place": result.observed.x[design.plate_readings],
+            "value": residuals,
+            "standardised": np.abs(standardised).max(axis=1),
         }
     return data
 

@@ -10,6 +10,7 @@ from functools import lru_cache
 from typing import Any
 
 from ballplate.extensions.repair.yamltext import TextChange
+from ballplate.presentation import Data
 from ballplate.results import check
 from ballplate.simulator.computing import Report, single_threaded, unreported
 from ballplate.simulator.estimation import Linearisation, linearise
@@ -80,18 +81,19 @@ def previewed(
 
 def _pictures(document: DesignDocument, arguments: Arguments, report: Report) -> dict[str, Any]:
     """Return all quantities, the `map` of a kind, the `motion` of an index, and the hours."""
-    experiment, linearisation = _linearised(document, arguments["revision"])
+    experiment, linearisation, hours = _evaluated(document, arguments["revision"])
     kind, motion = arguments.get("map"), arguments.get("motion")
-    hours = hours_of(evaluable_of(document, planning=True))
     return quantities_and_pictures(experiment, linearisation, kind, motion) | hours
 
 
 @lru_cache(maxsize=1)
 @single_threaded
-def _linearised(document: DesignDocument, revision: int) -> tuple[Experiment, Linearisation]:
-    """Return what can be evaluated, which other maps and motions of one revision share."""
-    experiment = evaluable_of(document)
-    return experiment, linearise(lay_out(experiment))
+def _evaluated(document: DesignDocument, revision: int) -> tuple[Experiment, Linearisation, Data]:
+    """Return what can be evaluated, linearised, and its hours: other maps and motions of the same
+    revision share them.
+    """
+    experiment, planned = evaluable_of(document), evaluable_of(document, planning=True)
+    return experiment, linearise(lay_out(experiment)), hours_of(planned)
 
 
 def _support(document: DesignDocument, arguments: Arguments, report: Report) -> dict[str, Any]:

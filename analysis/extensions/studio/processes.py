@@ -13,6 +13,7 @@ from multiprocessing.connection import Connection
 from multiprocessing.process import BaseProcess
 from typing import Any
 
+from ballplate.presentation import as_data
 from ballplate.simulator.computing import (
     EnoughError,
     ProgressStep,
@@ -120,7 +121,7 @@ def _serve(connection: Connection, folder: str) -> None:
 def _outcome(
     connection: Connection, work: Work, document: DesignDocument, settings: Mapping[str, Any]
 ) -> tuple[Any] | Exception:
-    """Return the result, or the error that a person who waits is told."""
+    """Return the result as plain data, or the error that a person who waits is told."""
 
     def report(step: ProgressStep) -> None:
         connection.send(step)
@@ -128,7 +129,7 @@ def _outcome(
             raise EnoughError
 
     try:
-        return (work(document, settings, report),)
+        return (as_data(work(document, settings, report)),)
     except (ActionError, ExperimentError) as error:
         return error
     except Exception as error:

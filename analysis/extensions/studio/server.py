@@ -9,12 +9,12 @@ from __future__ import annotations
 import hmac
 import json
 import logging
-import math
 from collections.abc import Awaitable, Callable
 from functools import partial
 from pathlib import Path
 from typing import Any
 
+from ballplate.presentation import as_data
 from ballplate.simulator.inputs import ExperimentError, UnusableError, service
 from starlette.applications import Starlette
 from starlette.concurrency import run_in_threadpool
@@ -201,16 +201,8 @@ def _json(data: Any, status: int = 200) -> Response:
         text = json.dumps(data, allow_nan=False)
     except ValueError:
         # A file may say .nan or .inf, of which JSON has none.
-        text = json.dumps(_without_nan(data))
+        text = json.dumps(as_data(data))
     return Response(text, status, media_type="application/json")
-
-
-def _without_nan(data: Any) -> Any:
-    if isinstance(data, float) and not math.isfinite(data):
-        return f"{data}"
-    if isinstance(data, dict):
-        return {key: _without_nan(value) for key, value in data.items()}
-    return [_without_nan(value) for value in data] if isinstance(data, list | tuple) else data
 
 
 def _error(text: str, status: int = 200) -> Response:

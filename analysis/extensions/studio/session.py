@@ -11,10 +11,9 @@ from pathlib import Path
 from threading import RLock
 from typing import Any
 
-from ballplate.presentation import Data, picked
+from ballplate.presentation import Data, as_data
 from ballplate.simulator.inputs import (
     ExperimentError,
-    Message,
     format_path,
     service,
 )
@@ -76,10 +75,9 @@ class Session:
         # What is asked for once nothing moves gives way to what moves.
         self._workers = {"preview": moving, "drawn": moving, "later": moving}
         self._workers |= {"matrix": Worker(), "pool": Worker()}
-        self._answer: dict[str, Any] | None = None
-        self._scene: dict[str, Any] | None = None
+        self._design: Data | None = None
         self._burst: tuple[Any, ...] = ()
-        self._judgement = DesignJudgement(None, None, (), None, ())
+        self._judgement: Data = as_data(DesignJudgement(None, None, (), None, ()))
         self._begin()
 
     def state(self) -> dict[str, Any]:
@@ -90,24 +88,24 @@ class Session:
         self._await()
         with self._lock:
             document, judged, pending = self._document, self._judgement, self._judge.is_busy
-            messages = () if pending else judged.messages
+            messages = () if pending else judged["messages"]
             return {
                 "session": self.name,
                 "revision": self.revision,
                 "fingerprint": document.fingerprint,
                 "file": document.path.name,
                 "variant": document.variant,
-                "variants": list(judged.variants),
+                "variants": judged["variants"],
                 "text": document.text,
-                "data": data_of(document) if pending else judged.data,
+                "data": data_of(document) if pending else judged["data"],
                 "saved": document.is_saved,
                 "untouched": document.is_untouched,
                 "back": len(document.back),
                 "forward": len(document.forward),
-                "messages": [_message_data(message, judged.data) for message in messages],
+                "messages": [_named(message, judged["data"]) for message in messages],
                 "pending": pending,
-                "design": self._scene and {**(self._answer or {}), "scene": self._scene},
-                "stale": judged.answer is None,
+                "design": self._design,
+                "stale": judged["answer"] is None,
                 "kept": self._kept,
                 "files": self._folder.names(),
                 "recoverable": self.is_recoverable,
@@ -275,7 +273,7 @@ class Session:
         """
         last, self._document = self._document, document
         if (document.path, document.variant) != (last.path, last.variant):
-            self._answer = self._scene = None
+            self._design = None
         self.revision += 1
         self.note = ""
         keep(document, self.name)
@@ -295,18 +293,19 @@ class Session:
             time.sleep(INTERVAL)
 
     def _look(self) -> None:
-        """Take the judgement if there is one now."""
+        """Take the judgement if there is one now; what it lacks is shown of the last one."""
         try:
-            result = self._judge.look()
+            judged: Data | None = self._judge.look()
         except ExperimentError as error:
-            self._judgement = replace(
-                self._judgement, messages=error.messages, data=data_of(self._document)
-            )
+            self._judgement |= {"messages": as_data(error.messages)}
+            self._judgement |= {"data": data_of(self._document)}
             return
-        if result is not None:
-            self._judgement = result
-            self._answer = result.answer or self._answer
-            self._scene = result.scene or self._scene
+        if judged is None:
+            return
+        self._judgement = judged
+        if judged["scene"]:
+            answers = (self._design or {}) | (judged["answer"] or {})
+            self._design = {**answers, "scene": judged["scene"]}
 
     def _choose(self, action: Mapping[str, Any]) -> None:
         names = variants_of(self._document)
@@ -323,7 +322,7 @@ class Session:
             self._ensure_seen(action)
             if self._judge.is_busy:
                 raise RefusedError("the results are being computed; wait for them")
-            if self._judgement.answer is None:
+            if self._judgement["answer"] is None:
                 raise RefusedError(
                     "there are no figures of this design; correct it before keeping it"
                 )
@@ -384,15 +383,14 @@ def _with_first_variant(document: DesignDocument) -> DesignDocument:
     return replace(document, variant=names[0] if names else None)
 
 
-def _message_data(message: Message, data: Any) -> Data:
-    """Return a message as plain data; it is about `what`, a position by its name."""
-    what = message.path
-    if message.steps[:1] == ("positions",):
+def _named(message: Data, data: Any) -> Data:
+    """Return a message with `what` it is about, a position by its name."""
+    what, steps = message["path"], message["steps"]
+    if steps[:1] == ["positions"]:
         with suppress(LookupError, TypeError):
-            name = data["positions"][message.steps[1]]["name"]
-            rest = format_path(message.steps[2:])
-            what = f'position "{name}"{rest and f", {rest}"}'
-    return {**picked(message, "line", "column", "path", "text"), "what": what}
+            below = format_path(steps[2:])
+            what = f'position "{data["positions"][steps[1]]["name"]}"{below and f", {below}"}'
+    return {**message, "what": what}
 
 
 __all__ = ["ActionError", "OutdatedError", "RefusedError", "Session"]

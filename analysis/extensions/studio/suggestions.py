@@ -14,7 +14,7 @@ from ballplate.extensions.repair.offers import offers
 from ballplate.extensions.repair.repair_search import Repair, repairs
 from ballplate.extensions.repair.repair_tables import caveat, changes_in_words
 from ballplate.extensions.repair.written import Edit, position_settings
-from ballplate.presentation import Data, finite, picked
+from ballplate.presentation import Data, picked
 from ballplate.results import planned_uncertainty
 from ballplate.simulator.computing import Report, counted, unreported
 from ballplate.simulator.experiment import Experiment, Position
@@ -57,7 +57,7 @@ def _repair_data(experiment: Experiment, repair: Repair) -> Data:
         "maximum": lengths and lengths.maximum,
         "places": [place_data(after, place) for place in places],
         "edits": [
-            {"path": list(edit.steps), **picked(edit, "value", "is_new")}
+            {"path": edit.steps, **picked(edit, "value", "is_new")}
             for edit in (*repair.edits, *expectation)
         ],
     }
@@ -93,8 +93,7 @@ def next_positions(
         {
             "words": change.words,
             "deficiency": order[0],
-            "average": finite(lengths.average),
-            "maximum": finite(lengths.maximum),
+            **picked(lengths, "average", "maximum"),
             "place": place_data(experiment, change.adds),
             "settings": position_settings(experiment, change.adds),
         }

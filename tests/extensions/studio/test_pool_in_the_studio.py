@@ -11,11 +11,12 @@ from ballplate.designs import shipped
 
 pytest.importorskip("starlette", reason="the studio is an extra")
 
+from ballplate.extensions.studio import judging
 from ballplate.extensions.studio.actions import ActionError, done
 from ballplate.extensions.studio.document import DesignDocument, experiment_of, opened, undone
 from ballplate.extensions.studio.jobs import JOBS
-from ballplate.extensions.studio.judging import pooled
 from ballplate.extensions.studio.session import Session
+from ballplate.presentation import as_data
 from ballplate.simulator.experiment import Experiment
 from ballplate.simulator.inputs import ExperimentError
 
@@ -31,6 +32,11 @@ def document(tmp_path: Path) -> DesignDocument:
     path = tmp_path / "plate.yaml"
     path.write_bytes(Path(shipped("quickstart.yaml")).read_bytes())
     return opened(path)
+
+
+def pooled(document: DesignDocument) -> dict:
+    data: dict = as_data(judging.pooled(document))
+    return data
 
 
 def planned(document: DesignDocument) -> Experiment:
