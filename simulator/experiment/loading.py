@@ -75,18 +75,19 @@ def load(
     if not trees:
         tree = _without_variants(root)
         experiment, messages = build(tree, source, None, trust, planning, tolerant)
-        faults = in_order([*base_problems.messages, *messages], refused, source)
-        return (_with_faults(experiment, faults, tolerant),)
+        all_faults = in_order([*base_problems.messages, *messages], refused, source)
+        if experiment is None or (all_faults and not tolerant):
+            raise ExperimentError(all_faults)
+        return (replace(experiment, faults=tuple(all_faults) if tolerant else None),)
     experiments = []
     variants_of: dict[Message, list[str]] = {}
     size = 0
     for name, tree in trees.items():
         experiment, messages = build(tree, source, name, trust, planning, tolerant)
         if experiment is not None:
-            if tolerant:
-                experiment = _with_faults(experiment, in_order(messages, refused, source), True)
+            faults = tuple(in_order(messages, refused, source)) if tolerant else None
             mark = mark_of(root, ("variants", name), of_key=True)
-            experiments.append(replace(experiment, mark=mark))
+            experiments.append(replace(experiment, mark=mark, faults=faults))
             size += experiment.size
         if size > MOST_OF_ALL and len(experiments) > 1:
             text = (
@@ -102,31 +103,13 @@ def load(
         for message in messages:
             variants_of.setdefault(message, []).append(name)
     found = base_problems.messages + [
-        Message(
-            message.file,
-            message.line,
-            message.column,
-            message.path,
-            message.text + in_variants(names, list(trees)),
-        )
+        replace(message, text=message.text + in_variants(names, list(trees)))
         for message, names in variants_of.items()
     ]
-    faults = in_order(found, refused, source)
-    if faults and not (tolerant and experiments):
-        raise ExperimentError(faults)
+    all_faults = in_order(found, refused, source)
+    if all_faults and not (tolerant and experiments):
+        raise ExperimentError(all_faults)
     return tuple(experiments)
-
-
-def _with_faults(
-    experiment: Experiment | None, faults: list[Message], tolerant: bool
-) -> Experiment:
-    """Return the experiment, for a tolerant reader with its faults.
-
-    :raises ExperimentError: there are faults, and the reader is not tolerant, or none was built.
-    """
-    if experiment is None or (faults and not tolerant):
-        raise ExperimentError(faults)
-    return replace(experiment, faults=tuple(faults)) if tolerant else experiment
 
 
 def trees_of(

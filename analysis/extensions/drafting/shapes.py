@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+from ballplate.presentation import as_data
 from ballplate.simulator.experiment import Experiment
-from ballplate.simulator.geometry import AXIS_NAMES, ball_coordinates
+from ballplate.simulator.geometry import AXIS_NAMES, corners
 from ballplate.simulator.machines import ARRANGEMENTS, Array
 
 from .machine_tables import arrangement_of, table
@@ -37,8 +38,8 @@ def machine_shapes(kind: str) -> Iterator[Shape]:
     """Yield a kind of machine from back to front, and the letters of the axes of its parts."""
     chain = ARRANGEMENTS[arrangement_of(kind, (1.0, 1.0, 1.0))]
     letters = []
-    for axis, *corners in table("boxes")[kind]:
-        ends = np.array(corners, float)
+    for axis, *box in table("boxes")[kind]:
+        ends = np.array(box, float)
         if axis == "stylus":
             yield Shape(axis, ends)
             continue
@@ -55,10 +56,7 @@ def draft_shapes(experiment: Experiment) -> Iterator[Shape]:
     ends = np.array([volume.lower, volume.upper])
     yield from _box("volume", ends, 1 - SEEN)
     for place in experiment.positions:
-        layout = experiment.layouts[place.artefact]
-        # Round the plate: its corners are listed by rows.
-        corners = [layout.corner_set[k] for k in (0, 1, 3, 2)]
-        yield Shape("plate", ball_coordinates(place.pose, layout)[corners], place.name)
+        yield Shape("plate", corners(place.pose, experiment.layouts[place.artefact]), place.name)
     yield from _box("volume", ends, SEEN)
     for name, end in zip(AXIS_NAMES, 1.08 * np.diag(volume.upper), strict=True):
         yield Shape("letter", end[None], name)
@@ -66,18 +64,11 @@ def draft_shapes(experiment: Experiment) -> Iterator[Shape]:
 
 def on_paper(shapes: Iterable[Shape]) -> list[dict[str, Any]]:
     """Return shapes as plain data with points on the paper, in metres."""
-    return [
-        {
-            "role": shape.role,
-            "text": shape.text,
-            "points": np.round(shape.points @ VIEW, 4).tolist(),
-        }
-        for shape in shapes
-    ]
+    return [as_data(replace(shape, points=np.round(shape.points @ VIEW, 4))) for shape in shapes]
 
 
 def _box(role: str, ends: Array, sides: Array) -> Iterator[Shape]:
     """Yield the sides of a box between two corners (2, 3), at one end along each axis."""
     for axis, end in enumerate(sides):
-        corners = np.insert([[0, 0], [1, 0], [1, 1], [0, 1]], axis, end, axis=1)
-        yield Shape(role, np.take_along_axis(ends, corners, axis=0))
+        side = np.insert([[0, 0], [1, 0], [1, 1], [0, 1]], axis, end, axis=1)
+        yield Shape(role, np.take_along_axis(ends, side, axis=0))

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from ballplate.presentation import write_files
-from ballplate.simulator.experiment import Experiment, load
+from ballplate.simulator.experiment import Experiment, load, trees_of
 from ballplate.simulator.inputs import (
     OPENED,
     ExperimentError,
@@ -103,10 +103,9 @@ def data_of(document: DesignDocument) -> Any:
 def variants_of(document: DesignDocument) -> tuple[str, ...]:
     """Return the names of the text's variants; empty for a text that cannot be understood."""
     try:
-        experiments = load(document.path, True, document.trust, document.text, tolerant=True)
+        return tuple(trees_of(document.text, document.path, [])[1])
     except ExperimentError:
         return ()
-    return tuple(experiment.name for experiment in experiments if experiment.name is not None)
 
 
 def changed(document: DesignDocument, text: str) -> DesignDocument:

@@ -197,12 +197,8 @@ async def _content(request: Request) -> bytes | None:
 
 
 def _json(data: Any, status: int = 200) -> Response:
-    try:
-        text = json.dumps(data, allow_nan=False)
-    except ValueError:
-        # A file may say .nan or .inf, of which JSON has none.
-        text = json.dumps(as_data(data))
-    return Response(text, status, media_type="application/json")
+    # A file may say .nan or .inf, of which JSON has none.
+    return Response(json.dumps(as_data(data)), status, media_type="application/json")
 
 
 def _error(text: str, status: int = 200) -> Response:

@@ -375,7 +375,7 @@ def test_what_was_not_saved_brings_no_model_in_python_into_a_file(design, ran, c
 def test_a_text_that_runs_a_model_is_one_that_would_have_been_found(design, ran, change):
     """The test above can fail: these files run the model when they are named."""
     design.write_text(change(design.read_text()))
-    Session(design)
+    Session(design).state()
     assert ran.exists()
 
 
@@ -385,6 +385,7 @@ def test_what_was_not_saved_does_not_exchange_the_model_in_python_of_a_file(desi
     design.write_text(text.replace("model:build", "own:build"))
     session = Session(design)
     session.act({"do": "set", "path": ["title"], "value": "mine"})
+    session.state()
     assert design.with_name("own").exists()
     said = json.loads(kept_in(design).read_text())
     # The file's own model may go on.

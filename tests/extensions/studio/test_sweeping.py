@@ -140,7 +140,7 @@ def test_a_page_goes_apart_from_the_figures():
     """Figures are asked for again and again while others run."""
     found = {"cells": [], "page": "<!DOCTYPE html>"}
     worker = SimpleNamespace(is_busy=False, step="", look=lambda: found, stop=lambda: None)
-    job = Job("sweep", "", worker)
+    job = Job("sweep", "", "", worker)
     job.look()
     data = job.to_dict(1)
     assert job.page == "<!DOCTYPE html>" and data["page"] and data["result"] == {"cells": []}
