@@ -93,7 +93,7 @@ def tour(page, folder: Path, design: Path) -> None:
     page.fill("[data-axis=paths] >> nth=1", "artefacts.plate.balls")
     page.fill("[data-axis=values] >> nth=1", "[5, 5]; [6, 6]; [7, 7]")
     picture("sweep")
-    page.click("#ok")
+    page.click("#compute")
     page.wait_for_selector("[data-page]")
     page.keyboard.press("Control+s")
     until(page, "window.studio.state().saved")

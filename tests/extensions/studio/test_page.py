@@ -5,6 +5,7 @@ With `BALLPLATE_AXE`, the path of axe-core's `axe.min.js`, its rules are applied
 
 from __future__ import annotations
 
+import itertools
 import os
 from pathlib import Path
 
@@ -23,8 +24,10 @@ pytestmark = [
     pytest.mark.skipif(chromium() is None, reason=f"no Chromium on this machine: {INSTALL}"),
 ]
 
-# What can be pressed and is smaller than 24 pixels, other than links within sentences.
-SMALL = """() => [...document.querySelectorAll('button, select, input, summary, a')].filter(one =>
+# What can be pressed and is smaller than 24 pixels, other than links within sentences; radio buttons
+# are pressed with their labels.
+SMALL = """() => [...document.querySelectorAll('button, select, input, summary, a')]
+.map(one => one.type === 'radio' ? one.closest('label') : one).filter(one =>
 one.checkVisibility({ visibilityProperty: true }) && !one.matches('.skip') &&
 Math.min(one.getBoundingClientRect().width, one.getBoundingClientRect().height) < 23.9)
 .map(one => one.outerHTML.slice(0, 90))"""
@@ -74,8 +77,24 @@ def act(page, **action: object) -> None:
 
 
 def states(page):
-    """The page in five states, by their names."""
+    """The page in eight states, by their names."""
     yield "full rank"
+    page.click("#pool summary")
+    page.wait_for_selector("#pool-said >> text=No candidates yet")
+    page.click("#fill")
+    page.click("#forbid")
+    page.wait_for_selector("#pool-said >> text=in a forbidden box")
+    yield "pool"
+    page.click("#pool summary")
+    for section in ("influences", "calibration", "positions"):
+        page.click(f"#forms [data-section={section}] > summary")
+    page.click("[aria-label='add to influences']")
+    page.wait_for_selector("#forms legend >> text=temperature")
+    yield "forms"
+    for section in ("influences", "calibration", "positions"):
+        page.click(f"#forms [data-section={section}] > summary")
+    for _ in range(3):
+        act(page, do="undo")
     page.click("#positions button.name >> nth=1")
     yield "chosen position"
     path = ["machine", "repeatability"]
@@ -91,6 +110,18 @@ def states(page):
     yield "dialogue"
 
 
+def first_page(page):
+    """The page on which a design begins, and its wrong answers."""
+    page.click("#sweeping button >> text=Cancel")
+    page.click("#new")
+    page.wait_for_selector("#draft dl")
+    yield "first page"
+    page.fill("#answer-volume-0", "much")
+    page.keyboard.press("Enter")
+    page.wait_for_selector("#error-volume:not(:empty)")
+    yield "wrong answer"
+
+
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 def test_what_is_pressed_is_large_and_what_is_read_has_contrast(design: Path, scheme: str) -> None:
     axe = os.environ.get("BALLPLATE_AXE")
@@ -99,7 +130,8 @@ def test_what_is_pressed_is_large_and_what_is_read_has_contrast(design: Path, sc
         page.goto(studio.address)
         until(page, "!!window.studio?.state()?.design")
         page.wait_for_selector("#assumptions:not(.stale)")
-        for name in states(page):
+        page.wait_for_selector("#scale:not(.stale)", state="attached")
+        for name in itertools.chain(states(page), first_page(page)):
             assert page.evaluate(SMALL) == [], name
             assert page.evaluate(FAINT) == [], name
             if axe:

@@ -14,7 +14,7 @@ const lengths_of = (design) => design?.quantities.find(({ symbol }) => symbol ==
 const LOOKS = { met: "good", missed: "warn", undecided: "warn" };
 function target({ met, shares, rank, within }, before, of_rest, is_old) {
   if (!met) return figure("", "No target", "target_uncertainty is not stated");
-  const head = is_old ? `Before: ${met}` : of_rest ? `By the rest: ${met}` : `Target ${met}`;
+  const head = is_old ? `Before: ${met}` : `Target ${met}${of_rest ? " by the rest" : ""}`;
   return figure(rank.deficiency && met !== "met" ? "bad" : LOOKS[met], head, shares.join("; "),
     met === "undecided" ? ", but not everything is determined" : "",
     was(share(before?.within_target) || "no target"), within === null ? null
@@ -46,7 +46,7 @@ function late({ met }) {
   const time = (value) => (value ? `${Number(value.toFixed(2))} h` : "–");
   return make("div", { id: "late" }, hours ? figure("", time(hours), "of measuring",
     usual ? ", with usual times" : "", was(time(page.state.kept?.hours))) : null,
-  met === "met" && unit === "target" && largest > 1 ? make("p", {},
+  met === "met" && unit === "target" && largest > 1 ? make("p", { class: "notes" },
     `Elsewhere in the volume, lengths reach ${Number(largest.toPrecision(3))} times the target.`)
     : null);
 }
@@ -72,9 +72,8 @@ export function figures(design, messages, pending = false) {
     left_out.length && !wrong ? `of the positions without ${left_out.map((one) => one.name)
       .join(", ")}, which cannot be read there` : ""].filter(Boolean);
   const box = $("verdict");
-  const looks = { bad: wrong || rank?.deficiency > 0, old: wrong, open: !design?.met,
-    warn: !wrong && !rank?.deficiency && is_missed };
-  Object.entries(looks).forEach(([look, is]) => box.classList.toggle(look, is));
+  box.className = wrong ? "bad old" : rank?.deficiency ? "bad" : is_missed ? "warn"
+    : design?.met ? "" : "open";
   fill(box, rank ? [answered(design, left_out.length > 0, wrong), late(design)] : [],
     make("div", { class: "notes" }, lines(notes), left_out.length
       ? button("Fit all positions to the volume", () => act({ do: "fit" }), { id: "fit" }) : null));
@@ -149,52 +148,49 @@ export function dress(design) {
   const { drawn } = page;
   if (!drawn || drawn.dimension !== design.scene.dimension) return;
   design.map = $("map").value ? drawn.map : null;
-  const swings = drawn.motions && drawn.motion === page.motion;
-  design.motions = swings ? { ...drawn.motions, directions: [] } : null;
-  if (swings) design.motions.directions[drawn.motion] = drawn.motions.direction;
+  design.motions = drawn.motions && drawn.motion === page.motion
+    ? { ...drawn.motions, directions: { [drawn.motion]: drawn.motions.direction } } : null;
 }
 
-async function ask_drawn() {
-  const { motion } = page;
-  const found = await ask_now("/api/drawn", { map: $("map").value, motion });
-  if (!found || motion !== page.motion) return;
-  const { design } = page.state;
-  page.drawn = { ...found, motion, dimension: design.scene.dimension };
-  dress(design);
-  page.view.map();
-  page.view.move(motion);
-  legend();
-  quantities(found.quantities);
-  $("late")?.replaceWith(late(design));
-  $("hours").placeholder = `as now: ${Number(found.hours.toFixed(2))}`;
-  $("legend").classList.remove("stale");
-  $("quantities").classList.remove("stale");
-}
+const stale = (is, ...names) =>
+  names.forEach((name) => $(name)?.classList.toggle("stale", is));
 
 let waiting = null;
 // The map and what swings come once nothing moves; scale and assumptions, which take longer than
 // all the rest, after them.
 export function ask_later(after = 100) {
   clearTimeout(waiting);
-  const stale = (is) => ["scale", "assumptions", "rests", "quantities", "legend", "late"]
-    .forEach((name) => $(name)?.classList.toggle("stale", is));
-  stale(true);
+  stale(true, "scale", "assumptions", "rests", "quantities", "legend", "late");
   waiting = setTimeout(async () => {
-    const { fingerprint } = page.state;
+    const { motion, state: { fingerprint } } = page;
     try {
-      await ask_drawn();
+      const drawn = await ask_now("/api/drawn", { map: $("map").value, motion });
+      if (drawn && motion === page.motion) draw({ ...drawn, motion });
       const is_known = page.later?.fingerprint === fingerprint;
-      const found = is_known ? page.later : await ask_now("/api/later");
-      if (found?.fingerprint !== page.state.fingerprint) return;
-      page.later = found;
-      fill($("scale"), lines(found.lines));
-      assumed(found.assumptions);
-      stale(false);
+      const later = is_known ? page.later : await ask_now("/api/later");
+      if (later?.fingerprint !== page.state.fingerprint) return;
+      page.later = later;
+      fill($("scale"), lines(later.lines));
+      assumed(later.assumptions);
+      stale(false, "scale", "assumptions", "rests");
     } catch {
       // A later request has replaced this one, or the design has no such figures.
       if (fingerprint === page.state.fingerprint) fill($("scale"));
     }
   }, after);
+}
+
+function draw(found) {
+  const { view, state: { design } } = page;
+  page.drawn = { ...found, dimension: design.scene.dimension };
+  dress(design);
+  view.map();
+  view.move(found.motion);
+  legend();
+  quantities(found.quantities);
+  $("late")?.replaceWith(late(design));
+  $("hours").placeholder = `as now: ${Number(found.hours.toFixed(2))}`;
+  stale(false, "legend", "quantities", "late");
 }
 
 // A button that leads to where an assumption is stated; an effect of its own is written first.
@@ -206,8 +202,8 @@ function stating({ assumed: what, changes }) {
     const action = { do: "set", path: [section, "+"], value: flow(added) };
     if (!added || await act(action, said)) lead(section, "standard_uncertainty");
   };
-  const words = added ? "state it" : "show where it is stated";
-  return button(words, go, { class: "link", "aria-label": `${words}: ${what}` });
+  return button(added ? "state it" : "show", go,
+    { class: "link", "aria-label": `${added ? "state it" : "show where it is stated"}: ${what}` });
 }
 
 const FEW_ASSUMED = 3; // rows that are shown before a person asks for all

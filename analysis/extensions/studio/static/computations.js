@@ -166,15 +166,18 @@ function cells(found, has_page) {
     : make("p", {}, "its page needs the extra report: python -m pip install 'ballplate[report]'"));
 }
 
-// A dialogue with some fields, true if it was confirmed.
+// True if a dialogue was confirmed.
+function confirmed(dialogue) {
+  Object.assign(dialogue, { returnValue: "" }).showModal();
+  return new Promise((resolve) => {
+    dialogue.onclose = () => resolve(dialogue.returnValue === "ok");
+  });
+}
+
 function opened(question, ...fields) {
   $("question").textContent = question;
   $("fields").replaceChildren(...fields);
-  $("dialog").returnValue = "";
-  $("dialog").showModal();
-  return new Promise((resolve) => {
-    $("dialog").onclose = () => resolve($("dialog").returnValue === "ok");
-  });
+  return confirmed($("dialog"));
 }
 
 export async function dialog(question, ...fields) {
@@ -193,37 +196,29 @@ function keys(data, path = "") {
 }
 
 export async function sweep() {
-  const list = make("datalist", { id: "paths" },
-    keys(page.state.data ?? {}).map((path) => make("option", { value: path })));
-  const field = (words, axis, value) =>
-    make("label", {}, words, make("input", { value, "data-axis": axis, autocomplete: "off",
-      list: axis === "paths" ? "paths" : undefined }));
-  const error = () => make("p", { class: "field-error", role: "alert" });
-  const axis = (path, values) => make("fieldset", {},
-    field("keys, separated by commas", "paths", path),
-    field("values, separated by semicolons", "values", values), error());
-  const rows = make("div", {}, axis("machine.repeatability", "0.1 um; 0.2 um; 0.4 um"));
-  const add = () => {
-    rows.append(axis("", ""));
-    rows.lastElementChild.querySelector("input").focus();
-  };
-  const more = button("Another axis", add, { id: "more-axes" });
-  const below = error();
+  const axes = $("axes");
   const part = (one, key, mark) => one.querySelector(`[data-axis=${key}]`).value.split(mark)
     .map((text) => text.trim()).filter(Boolean);
-  const question = "Compute every combination of some values";
-  while (await opened(question, rows, list, more, below)) {
-    const axes = [...rows.children].map((one) =>
-      ({ paths: part(one, "paths", ","), values: part(one, "values", ";"), one }));
-    const refused = await start("sweep", { axes: axes.filter(({ paths }) => paths.length)
-      .map(({ paths, values }) => ({ paths, values })) });
+  fill($("paths"), keys(page.state.data ?? {}).map((path) => make("option", { value: path })));
+  while (await confirmed($("sweeping"))) {
+    const meant = [...axes.children].map((one) =>
+      ({ paths: part(one, "paths", ","), values: part(one, "values", ";") }));
+    const refused = await start("sweep", { axes: meant.filter(({ paths }) => paths.length) });
+    // Beside the axis whose key the words begin with, or below all.
+    const k = meant.findIndex(({ paths }) => paths.some((path) => refused.startsWith(`${path}: `)));
+    [...axes.children].forEach((one, other) => {
+      one.lastElementChild.textContent = k === other ? refused : "";
+    });
+    $("sweep-error").textContent = k < 0 ? refused : "";
     if (!refused) return;
-    // Beside the axis that is meant, whose key the words begin with, or below all.
-    [...$("fields").querySelectorAll(".field-error")].forEach((one) => { one.textContent = ""; });
-    const meant = axes.find(({ paths }) => paths.some((path) => refused.startsWith(`${path}: `)));
-    (meant?.one.lastElementChild ?? below).textContent = refused;
   }
 }
+$("more-axes").onclick = () => {
+  const axis = $("axes").lastElementChild.cloneNode(true);
+  axis.querySelectorAll("input").forEach((input) => { input.value = ""; });
+  $("axes").append(axis);
+  axis.querySelector("input").focus();
+};
 
 export function fit(file) {
   const reader = new FileReader();

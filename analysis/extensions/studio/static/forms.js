@@ -1,5 +1,5 @@
 // Forms for the sections of a design, made from the schema of its file.
-import { $, act, button, fill, make, options, page, table } from "./page.js";
+import { $, act, button, fill, make, options, page } from "./page.js";
 
 const SECTIONS = [
   "title", "machine", "error_model", "probes", "artefacts", "positions", "calibration",
@@ -95,10 +95,9 @@ function fields(path, data, part, label) {
       return fields([...path, key], value, below, path.length > 1 ? `${label} ${key}` : key);
     }), adding(path, data, possible, path.length > 1 ? label : path[0])];
   }
-  if (items && kinds(items).length && (!data || data.some(isMapping))) {
-    return entries(path, data ?? [], items);
+  if (Array.isArray(data) ? data.some(isMapping) : items && kinds(items).length) {
+    return entries(path, data ?? [], items ?? {});
   }
-  if (Array.isArray(data) && data.some(isMapping)) return rows(path, data, items ?? {});
   const [input, errors] = control(path, data, possible);
   return make("label", {}, make("span", { class: NUMBER.test(input.value) ? "handle" : "",
     title: part.description ?? resolve(part).description ?? possible[0]?.description },
@@ -106,17 +105,15 @@ function fields(path, data, part, label) {
 }
 
 // The field of a value, and what is wrong with it.
-function control(path, data, possible, label) {
+function control(path, data, possible) {
   const listed = data === undefined ? null : choices(possible);
   const said = flow(data);
   const steps = path.reduce((text, step) =>
     (typeof step === "number" ? `${text}[${step}]` : `${text}.${step}`));
   const wrong = page.state.messages.filter((one) => one.path === steps);
-  const attributes = { "data-path": JSON.stringify(path), "aria-label": label,
-    class: wrong.length ? "bad-field" : "" };
-  const input = listed?.length > 1 ? make("select", attributes)
-    : make("input", { value: said, placeholder: data === undefined ? "not stated" : "",
-      ...attributes });
+  const attributes = { "data-path": JSON.stringify(path), class: wrong.length ? "bad-field" : "" };
+  const input = make(listed?.length > 1 ? "select" : "input", listed?.length > 1 ? attributes
+    : { value: said, placeholder: data === undefined ? "not stated" : "", ...attributes });
   if (listed?.length > 1) options(input, [...new Set([said, ...listed])], said);
   return [input, wrong.map(({ text }) => make("span", { class: "field-error" }, text))];
 }
@@ -143,42 +140,25 @@ function usual(kind, items) {
     ...USUAL[kind] });
 }
 
-// A list of entries of several kinds, one below the other, to which one of a kind is added.
+// A list of entries, to which one of a kind is added, or one like the last; positions are added
+// where they are listed.
 function entries(path, data, items) {
-  const add = ({ currentTarget: { previousElementSibling } }) =>
-    set([...path, "+"], usual(previousElementSibling.value, items));
-  return [data.map((value, k) => make("fieldset", {},
-    make("legend", {}, value.kind, " ", button("×", () => set([...path, k], ""),
-      { title: "remove", "aria-label": `remove ${value.kind} ${k + 1}` })),
-    Object.entries(value).filter(([key]) => key !== "kind").map(([key, one]) =>
-      fields([...path, k, key], one, property(forms(items, value), key), key)),
-    adding([...path, k], value, forms(items, value), value.kind))),
-  make("div", { class: "bar" },
-    make("select", { "aria-label": `kind of another entry of ${path.at(-1)}`, "data-own": "" },
-      choices(kinds(items)).map((kind) => make("option", {}, kind))),
-    button("Add", add, { "aria-label": `add to ${path.at(-1)}` }))];
-}
-
-// A list of entries, each a row; keys that only some have are columns too.
-function rows(path, data, part) {
-  const leaves = (value, steps) => (!isMapping(value) ? [steps]
-    : Object.entries(value).flatMap(([key, one]) => leaves(one, [...steps, key])));
-  const columns = new Map(data.flatMap((one) => leaves(one, []))
-    .map((steps) => [steps.join(" "), steps]));
-  const below = (value, steps) => steps.reduce((found, step) => found?.[step], value);
-  const cell = (one, k, [words, steps]) => {
-    const possible = steps.reduce((schemas, step, depth) =>
-      forms(property(schemas, step), below(one, steps.slice(0, depth + 1))), forms(part, one));
-    return control([...path, k, ...steps], below(one, steps), possible,
-      `${words} of ${one?.name ?? k + 1}`);
-  };
-  const body = data.map((one, k) => [...[...columns].map((column) => cell(one, k, column)),
-    button("×", () => set([...path, k], ""),
-      { title: "remove", "aria-label": `remove ${one?.name ?? k + 1}` })]);
-  return make("div", { class: "scrolled", tabindex: "0" },
-    make("table", {}, table([...columns.keys(), ""].map(spaced), body)),
-    path[0] === "positions" ? null
-      : button("Add one like the last", () => set([...path, "+"], flow(data.at(-1)))));
+  const listed = choices(kinds(items)) ?? [];
+  const add = ({ currentTarget: { previousElementSibling: select } }) =>
+    set([...path, "+"], select ? usual(select.value, items) : flow(data.at(-1)));
+  const title = (one, k) => one?.kind ?? one?.name ?? `${k + 1}`;
+  const shown = data.map((one, k) => make("fieldset", {},
+    make("legend", {}, title(one, k), " ", button("×", () => set([...path, k], ""),
+      { title: "remove", "aria-label": `remove ${title(one, k)} ${k + 1}` })),
+    make("div", { class: "entry" }, Object.entries(one ?? {}).map(([key, value]) =>
+      (key === "kind" ? []
+        : fields([...path, k, key], value, property(forms(items, one), key), key)))),
+    adding([...path, k], one ?? {}, forms(items, one), title(one, k))));
+  return [shown, path[0] === "positions" ? [] : make("div", { class: "bar" },
+    listed.length ? make("select", { "aria-label": `kind of another entry of ${path.at(-1)}`,
+      "data-own": "" }, listed.map((kind) => make("option", {}, kind))) : null,
+    button(listed.length ? "Add" : "Add one like the last", add,
+      { "aria-label": `add to ${path.at(-1)}` }))];
 }
 
 // A key that is not there yet: one of the schema's, or a name of the user's own.

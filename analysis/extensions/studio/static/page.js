@@ -153,10 +153,11 @@ export function watch() {
 
 let queue = Promise.resolve();
 let acting = 0;
-// Change the design. Changes come one after the other: each goes on from the answer before.
+// Change the design, and return whether that was done. Changes come one after the other: each goes
+// on from the answer before.
 export function act(action, said = "") {
   acting += 1;
-  const next = queue.then(async () => {
+  queue = queue.then(async () => {
     const slow = setTimeout(() => tell("computing …"), 400);
     try {
       const { revision, session } = page.state;
@@ -171,29 +172,28 @@ export function act(action, said = "") {
       else page.show();
       return false;
     }
-  });
-  queue = next.catch(() => {}).finally(() => { acting -= 1; });
-  return next;
+  }).catch(() => false).finally(() => { acting -= 1; });
+  return queue;
 }
 
-let waiting = null;
+let wanted = null;
 let previewing = false;
 // Ask for the figures of a design as it would be, the last one that is asked for alone.
 export async function preview(action, onFigures) {
   // Of the design as it is now: what comes after the drop is of another one.
-  waiting = { ...action, revision: page.state.revision, session: page.state.session };
+  const { revision, session } = page.state;
+  wanted = { ...action, revision, session };
   if (previewing) return;
   previewing = true;
-  while (waiting) {
-    const next = waiting;
-    const isMeant = () => !acting && page.state.revision === next.revision;
-    waiting = null;
+  while (wanted) {
+    const asked = wanted;
+    const isMeant = () => !acting && page.state.revision === asked.revision;
+    wanted = null;
     try {
-      const design = isMeant() ? await ask("/api/preview", next) : null;
-      if (design && isMeant()) {
-        tell("");
-        onFigures(design);
-      }
+      const design = isMeant() && await ask("/api/preview", asked);
+      if (!design || !isMeant()) continue;
+      tell("");
+      onFigures(design);
     } catch (error) {
       if (isMeant()) tell(error.message, true);
     }

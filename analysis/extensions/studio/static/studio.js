@@ -36,7 +36,8 @@ function show() {
   $("save").disabled = state.saved;
   $("keep").textContent = state.kept ? "Stop comparing" : "Keep to compare";
   state_hours();
-  if (!page.typed && $("text").value !== state.text) $("text").value = state.text;
+  page.typed &&= $("text").value !== state.text;
+  if (!page.typed) $("text").value = state.text;
   $("apply").disabled = !page.typed;
   if (design) draw(design);
   else view.empty();
@@ -79,9 +80,7 @@ function draw(design) {
   dress(design);
   view.motion = page.motion;
   view.show(design, page.selected);
-  const [along, does] = dimension === 3 ? [", with Shift along its normal", "turn"] : ["", "move"];
-  $("hint").textContent = `Drag a plate along its plane${along}; Escape puts it back, Alt lets it`
-    + ` through walls. Drag elsewhere to ${does} the view; double-click the floor to add a plate.`;
+  $("stage").classList.toggle("flat", dimension === 2);
   legend();
 }
 
@@ -99,14 +98,7 @@ const CLICKS = {
     const answer = await dialog(question, ["name", page.state.file]);
     if (answer) act({ do: "save", name: answer[0] }, "saved");
   },
-  apply: async () => {
-    const text = $("text").value;
-    page.typed = false;
-    if (await act({ do: "text", text })) return;
-    $("text").value = text;
-    page.typed = true;
-    $("apply").disabled = false;
-  },
+  apply: () => act({ do: "text", text: $("text").value }),
   reopen: () => {
     page.typed = false;
     act({ do: "reopen" }, "read again; undo leads back to the text that was here");
