@@ -22,7 +22,8 @@ export class Hands {
     on("contextmenu", (event) => event.preventDefault());
     on("wheel", (event) => {
       event.preventDefault();
-      if (view.design) view.enlarge(0.999 ** event.deltaY, this.pixel(event));
+      const step = event.ctrlKey ? 0.99 : 0.999; // two fingers on a pad, or a wheel
+      if (view.design) view.enlarge(step ** event.deltaY, this.pixel(event));
     });
     window.addEventListener("blur", () => this.drop(true));
     window.addEventListener("keydown", (event) => {
@@ -113,7 +114,8 @@ export class Hands {
   }
 
   way({ normal, middle }, at, isAlong) {
-    const { view: { towards, step }, view, from } = this;
+    const { view, from } = this;
+    const { eye: [, , towards], step } = view;
     // Along the normal, in the plane with it that faces the eye most.
     const facing = isAlong ? plus(towards, normal, -dot(towards, normal)) : normal;
     const [start, end] = [from, at].map((one) => view.meet(one, facing, middle));

@@ -1,5 +1,5 @@
 // Colours of the map, in bands between fixed steps, and their legend.
-import { $, make, micro, page } from "./page.js";
+import { $, fill, make, micro, page } from "./page.js";
 import { roundStep } from "./shapes.js";
 
 // Lower ends of bands as ratios to the target: four below it, and three above.
@@ -22,7 +22,7 @@ function bandsOf(map) {
 // A picture of a level, interpolated between the nodes; grey where something is undetermined.
 export function imageOf(map, values, colour) {
   const bands = bandsOf(map);
-  const shades = bands.map((_, k) => colour(`--band-${k}`));
+  const [grey, ...shades] = ["--line", ...bands.map((_, k) => `--band-${k}`)].map(colour);
   const rows = values.map((row) => row.map((value) => value ?? NaN));
   const [height, width] = [rows, rows[0]].map((nodes) => (nodes.length - 1) * FINE + 1);
   const image = Object.assign(document.createElement("canvas"), { width, height });
@@ -32,7 +32,7 @@ export function imageOf(map, values, colour) {
     for (let y = 0; y < height; y += 1) {
       const value = along(column, y / FINE);
       const band = Math.max(0, bands.findLastIndex((low) => value > low));
-      pen.fillStyle = Number.isNaN(value) ? colour("--line") : shades[band];
+      pen.fillStyle = Number.isNaN(value) ? grey : shades[band];
       pen.fillRect(x, y, 1, 1);
     }
   }
@@ -47,24 +47,18 @@ function along(nodes, at) {
 export function legend() {
   const { map, target } = page.state.design ?? {};
   const kind = $("map").value;
-  $("legend").replaceChildren();
-  if (!kind || !map) return;
-  const known = knownOf(map);
+  const known = kind && map ? knownOf(map) : [];
   if (!known.length) {
-    $("legend").append("Map: everything is undetermined, so that there is nothing to colour.");
+    fill($("legend"), kind && map && "Map: everything is undetermined: nothing to colour.");
     return;
   }
   const isRatio = map.scale?.unit === "target";
   const words = (value) => (isRatio ? `${Number(value.toPrecision(2))}` : `${micro(value)} µm`);
-  const bands = bandsOf(map).map((low, k) => {
-    const isTarget = isRatio && low === 1;
-    const item = make("li", { class: isTarget ? "target" : "" }, words(low),
-      isTarget ? " = target" : k === RATIOS.length - 1 ? " or more" : "");
-    item.style.setProperty("--shade", `var(--band-${k})`);
-    return item;
-  });
-  $("legend").append(isRatio ? MEANINGS.target + target : MEANINGS[kind],
+  const band = (low, k, { length }) => make("li",
+    { class: isRatio && low === 1 && "target", style: `--shade: var(--band-${k})` },
+    words(low), isRatio && low === 1 && " = target", k === length - 1 && " or more");
+  fill($("legend"), isRatio ? MEANINGS.target + target : MEANINGS[kind],
     `; here ${words(Math.min(...known))} to ${words(Math.max(...known))}`,
-    known.length < valuesOf(map).length ? "; grey: undetermined" : "",
-    make("ul", { class: "bands" }, ...bands));
+    known.length < valuesOf(map).length && "; grey: undetermined",
+    make("ul", { class: "bands" }, bandsOf(map).map(band)));
 }

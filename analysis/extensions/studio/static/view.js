@@ -69,16 +69,17 @@ export class View {
   map(isRecoloured = false) {
     const { map } = this.design ?? {};
     if (map === this.mapped && !isRecoloured) return;
-    const style = getComputedStyle(this.canvas);
     // Where everything is undetermined there is nothing to compare.
     const slices = map?.slices.filter(({ values }) => values.flat().some(Boolean)) ?? [];
     const sheets = slices.map(({ level, values }) => {
       const corner = (i, j) => [map.x.at(i), map.y.at(j), level ?? 0];
-      const image = imageOf(map, values, (name) => style.getPropertyValue(name));
-      return { image, ends: [corner(0, 0), corner(-1, 0), corner(0, -1)] };
+      const ends = [corner(0, 0), corner(-1, 0), corner(0, -1)];
+      return { ends, image: imageOf(map, values, this.colour) };
     });
     this.set({ mapped: map, sheets });
   }
+
+  colour = (name) => getComputedStyle(this.canvas).getPropertyValue(name);
 
   named(name) {
     return this.plates.find((plate) => plate.place.name === name);
@@ -119,6 +120,8 @@ export class View {
     if (!this.design) return;
     const [turn, rise] = this.flat ? [0, 90] : [TURN, RISE];
     Object.assign(this, { turn, rise, zoom: 1, shift: [0, 0] });
+    const [right, up] = this.eye;
+    this.seen = boxOf(this.corners.map((corner) => [dot(corner, right), dot(corner, up)]));
     this.resize();
   }
 
@@ -128,10 +131,9 @@ export class View {
     this.room = [canvas.clientWidth, canvas.clientHeight];
     if (!this.design || !this.room.every(Boolean)) return;
     [canvas.width, canvas.height] = this.room.map((side) => Math.round(side * ratio));
-    const [right, up] = this.flat ? eye(0, 90) : eye(TURN, RISE);
-    const { min, max } = boxOf(this.corners.map((one) => [dot(one, right), dot(one, up)]));
-    const sides = this.room.map((side) => Math.max(side - 2 * MARGIN, 100));
-    this.metre = Math.min(sides[0] / (max[0] - min[0]), sides[1] / (max[1] - min[1]));
+    const sides = plus(this.seen.max, this.seen.min, -1);
+    this.metre = Math.min(...this.room.map((side, k) =>
+      Math.max(side - 2 * MARGIN, 100) / sides[k]));
     this.paint(performance.now());
   }
 
@@ -151,20 +153,24 @@ export class View {
   // Pixels of a point from the canvas's corner.
   pixel = (point) => {
     const { volume, room, shift } = this;
-    const [right, up] = eye(this.turn, this.rise);
+    const [right, up] = this.eye;
     const off = plus(point, between(volume.min, volume.max), -1);
     const scale = this.metre * this.zoom;
     return [room[0] / 2 + shift[0] + scale * dot(off, right),
       room[1] / 2 + shift[1] + LOWER - scale * dot(off, up)];
   };
 
-  get towards() {
-    return eye(this.turn, this.rise)[2];
+  // Directions to the right, up, and towards the eye, which is turned and raised by degrees.
+  get eye() {
+    const [t, r] = [this.turn, this.rise].map((degrees) => (degrees * Math.PI) / 180);
+    return [[Math.cos(t), -Math.sin(t), 0],
+      [Math.sin(t) * Math.sin(r), Math.cos(t) * Math.sin(r), Math.cos(r)],
+      [-Math.sin(t) * Math.cos(r), -Math.cos(t) * Math.cos(r), Math.sin(r)]];
   }
 
   // Where a plane through a point is seen at a pixel; null if it is seen edge-on.
   meet(at, normal, point) {
-    const [right, up, towards] = eye(this.turn, this.rise);
+    const [right, up, towards] = this.eye;
     const [x, y] = plus(at, this.pixel(point), -1).map((one) => one / (this.metre * this.zoom));
     const by = plus(right.map((one) => one * x), up, -y);
     const facing = dot(normal, towards);
@@ -173,7 +179,7 @@ export class View {
   }
 
   nearness(point) {
-    return point ? dot(point, this.towards) : -Infinity;
+    return point ? dot(point, this.eye[2]) : -Infinity;
   }
 
   // Where a plate, or a point in metres, is on the screen, for whoever drives the page.
@@ -208,8 +214,6 @@ export class View {
   paint(now) {
     const { pen, canvas, ratio, residual, segments } = this;
     this.next = null;
-    const style = getComputedStyle(canvas);
-    this.colour = (name) => style.getPropertyValue(name);
     pen.setTransform(ratio, 0, 0, ratio, 0, 0);
     pen.fillStyle = this.colour("--paper");
     pen.fillRect(0, 0, canvas.width, canvas.height);
@@ -329,12 +333,4 @@ function pathOf(lines) {
   const path = new Path2D();
   lines.forEach((line) => line.forEach((point, k) => path[k ? "lineTo" : "moveTo"](...point)));
   return path;
-}
-
-// Directions to the right, up, and towards the eye, which is turned and raised by degrees.
-function eye(turn, rise) {
-  const [t, r] = [turn, rise].map((degrees) => (degrees * Math.PI) / 180);
-  return [[Math.cos(t), -Math.sin(t), 0],
-    [Math.sin(t) * Math.sin(r), Math.cos(t) * Math.sin(r), Math.cos(r)],
-    [-Math.sin(t) * Math.cos(r), -Math.cos(t) * Math.cos(r), Math.sin(r)]];
 }
