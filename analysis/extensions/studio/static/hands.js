@@ -10,8 +10,9 @@ const NOWHERE = [0, 0, 0];
 
 export class Hands {
   constructor(view) {
-    Object.assign(this, { view, drag: null, dropped: null, holding: null });
+    Object.assign(this, { view, drag: null, holding: null });
     this.fingers = new Map(); // pixels of pointers that are down
+    this.dropped = new Map(); // how far plates were dragged whose answers have not come
     const on = (type, does) => view.canvas.addEventListener(type, does, { passive: false });
     on("pointerdown", (event) => this.press(event));
     on("pointermove", (event) => this.pull(event));
@@ -40,11 +41,10 @@ export class Hands {
     return [clientX - left, clientY - top];
   }
 
-  // How far a plate is drawn from where it is: a drop is kept until the design has it.
+  // How far a plate is drawn from where it is.
   offset(name) {
     const { drag, dropped } = this;
-    if (drag?.name === name) return plus(drag.start, drag.by);
-    return dropped?.name === name ? dropped.by : NOWHERE;
+    return drag?.name === name ? plus(drag.start, drag.by) : dropped.get(name) ?? NOWHERE;
   }
 
   press(event) {
@@ -95,7 +95,10 @@ export class Hands {
       view.enlarge(apart(at, other) / (apart(before, other) || 1), between(at, other));
     } else if (view.flat || buttons > 1 || ctrlKey || metaKey || shiftKey) {
       view.set({ shift: plus(view.shift, by) });
-    } else view.swivel(...by.map((pixels) => (360 * pixels) / view.room[1]));
+    } else {
+      const [turn, rise] = by.map((pixels) => (360 * pixels) / view.room[1]); // in degrees
+      view.set({ turn: view.turn + turn, rise: clamp(view.rise + rise, -90, 90) });
+    }
   }
 
   // The plate goes with the pointer, in its plane or along its normal.
@@ -121,9 +124,9 @@ export class Hands {
     const [start, end] = [from, at].map((one) => view.meet(one, facing, middle));
     if (!start) return null;
     const by = plus(end, start, -1);
-    const along = Math.round(dot(by, normal) / step) * step;
-    return isAlong ? plus(NOWHERE, normal, along)
-      : plus(rounded(by, step), normal, -dot(rounded(by, step), normal));
+    if (isAlong) return plus(NOWHERE, normal, Math.round(dot(by, normal) / step) * step);
+    const steps = rounded(by, step);
+    return plus(steps, normal, -dot(steps, normal));
   }
 
   // As far as the scales read within the volume; what is outside already comes back only.
@@ -162,7 +165,7 @@ export class Hands {
     this.drag = null;
     const { name, start, by, far } = drag;
     const isDone = far && !isCancelled && view.named(name);
-    if (isDone) this.dropped = { name, by: plus(start, by) };
+    if (isDone) this.dropped.set(name, plus(start, by));
     view.dress();
     // The figures are those of the plate that has not moved.
     if (far && !isDone && view.design) view.handlers.onDrag(name, this.components(NOWHERE));
@@ -174,7 +177,7 @@ export class Hands {
 
   // A design has come, or a change was refused: plates are where it has them.
   settle() {
-    this.dropped = null;
+    this.dropped.clear();
     if (this.drag) this.drag.start = NOWHERE;
   }
 

@@ -56,7 +56,8 @@ export class View {
     if (isOther) this.empty();
     const volume = { min: vector(lower), max: vector(upper) };
     Object.assign(this, { design, selected, bounds, volume, flat: dimension === 2 });
-    Object.assign(this, { size: apart(volume.min, volume.max), corners: cornersOf(volume) });
+    this.size = apart(volume.min, volume.max);
+    this.corners = cornersOf(volume);
     this.plates = positions.map((place) =>
       plateOf(place, place.probes.map((probe) => probes[probe]), this.size));
     this.dress();
@@ -135,11 +136,6 @@ export class View {
     this.metre = Math.min(...this.room.map((side, k) =>
       Math.max(side - 2 * MARGIN, 100) / sides[k]));
     this.paint(performance.now());
-  }
-
-  // Turn the view by degrees.
-  swivel(turn, rise) {
-    this.set({ turn: this.turn + turn, rise: clamp(this.rise + rise, -90, 90) });
   }
 
   // Enlarge the picture about a pixel.
