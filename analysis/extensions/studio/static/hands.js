@@ -142,13 +142,11 @@ export class Hands {
       : [below[k], above[k]].find((wall) => Math.abs(one - wall) < SNAP) ?? one));
   }
 
+  components = (vector) => vector.slice(0, this.view.flat ? 2 : 3);
+
   isInside(point) {
     const { min, max } = this.view.volume;
     return point.every((one, k) => one === clamp(one, min[k] - OUTSIDE, max[k] + OUTSIDE));
-  }
-
-  components(vector) {
-    return vector.slice(0, this.view.flat ? 2 : 3);
   }
 
   release({ pointerId }, isCancelled) {

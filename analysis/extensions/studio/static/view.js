@@ -81,10 +81,7 @@ export class View {
   }
 
   colour = (name) => getComputedStyle(this.canvas).getPropertyValue(name);
-
-  named(name) {
-    return this.plates.find((plate) => plate.place.name === name);
-  }
+  named = (name) => this.plates.find((plate) => plate.place.name === name);
 
   dress() {
     const { drag } = this.hands;
@@ -174,9 +171,7 @@ export class View {
     return plus(plus(point, by), towards, -dot(normal, by) / facing);
   }
 
-  nearness(point) {
-    return point ? dot(point, this.eye[2]) : -Infinity;
-  }
+  nearness = (point) => (point ? dot(point, this.eye[2]) : -Infinity);
 
   // Where a plate, or a point in metres, is on the screen, for whoever drives the page.
   screen(what) {
