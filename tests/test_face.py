@@ -346,7 +346,6 @@ def test_other_results_draw_themselves(tmp_path: Path) -> None:
         (
             bp.map(MACHINE, grid=(2, 2, 2)).plot,
             bp.map(MACHINE, line="y = 300 mm, z = 200 mm").plot,
-            bp.map(MACHINE, error="EXX").plot,
             curve.plot,
             curve.plot_whiskers,
         )

@@ -62,7 +62,7 @@ def add_options(parser: ArgumentParser) -> None:
     add_picture(
         parser,
         "--plot",
-        help="also draw the errors, in three dimensions or along the line or axis",
+        help="also draw the errors, in three dimensions or along the line",
     )
     add_force(parser)
     add_formats(parser, ("text", "csv", "json"), "csv: the points alone; json: metres, radians")

@@ -1,6 +1,4 @@
-"""Drawings of volumetric errors: a displaced grid, errors along a line, and a parametric error
-along its axis.
-"""
+"""Drawings of volumetric errors: a displaced grid, and errors at points or along a line."""
 
 from __future__ import annotations
 
@@ -15,7 +13,6 @@ from ballplate.presentation import (
     MUTED,
     PAPER,
     SERIES,
-    SHOWN,
     Vectors,
     blank_axes,
     box,
@@ -32,9 +29,9 @@ from ballplate.presentation import (
 )
 from ballplate.simulator.computing import comparable, evenly_spread
 from ballplate.simulator.design import Volume
-from ballplate.simulator.machines import AXES, Array, meaning, symbol
+from ballplate.simulator.machines import Array
 
-from .volumetric_errors import AlongAxis, LengthErrors, VolumetricErrors
+from .volumetric_errors import LengthErrors, VolumetricErrors
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -191,58 +188,9 @@ def draw_line(
         return save(figure, path, f"Volumetric errors {along}: {subtitle}")
 
 
-def draw_along(along: AlongAxis, path: str | Path | None = None) -> Figure:
-    """A picture of a parametric error along its axis, as stated and at the reference point; it is
-    written to the path, if there is one.
-
-    :raises OSError: the file cannot be written.
-    """
-    positions = 1e3 * along.positions
-    name, unit = along.error.name, SHOWN[along.unit]
-    with drawing(280.0, WIDTH) as figure:
-        axes = placed_axes(figure, LEFT, BELOW, WIDTH - LEFT - RIGHT, 280.0 - BELOW - ABOVE)
-        band = "" if along.values is None else f", range {number(1e6 * along.range)} {unit}"
-        axes.set_title(f"{name}, {symbol(name)}: {meaning(name)}{band}", loc="left", pad=TITLE_PAD)
-        values = np.zeros(len(positions)) if along.values is None else 1e6 * along.values
-        deviation = np.zeros(len(positions)) if along.deviation is None else 1e6 * along.deviation
-        label = "random part alone" if along.values is None else "at the reference point"
-        _band(axes, positions, values, 2.0 * deviation, 0, label, mark=False)
-        if (
-            along.stated is not None
-            and along.values is not None
-            and (along.stated != along.values).any()
-        ):
-            axes.plot(
-                positions,
-                1e6 * along.stated,
-                color=SERIES[1],
-                linestyle=DASHES[1],
-                label="as stated",
-            )
-        if along.measured is not None:
-            x, y = 1e3 * np.array(along.measured.positions), 1e6 * np.array(along.measured.values)
-            axes.plot(
-                x,
-                y,
-                color=SERIES[1],
-                linestyle="none",
-                marker=MARKERS[1],
-                markersize=4.0,
-                markerfacecolor=PAPER,
-                label="measured",
-                clip_on=False,
-                zorder=3,
-            )
-        _band_in_legend(axes, bool(deviation.any()))
-        _finish(axes, f"{AXES[along.error.axis]}, mm", unit)
-        return save(figure, path, f"{name}, {meaning(name)}{band}")
-
-
-def _band(
-    axes: Axes, x: Array, values: Array, half: Array, k: int, label: str, mark: bool = True
-) -> None:
+def _band(axes: Axes, x: Array, values: Array, half: Array, k: int, label: str) -> None:
     """A curve, and a band of `half` its width on either side."""
-    marker = MARKERS[k] if mark and len(x) <= MOST_MARKS else ""
+    marker = MARKERS[k] if len(x) <= MOST_MARKS else ""
     axes.plot(
         x,
         values,
@@ -263,7 +211,7 @@ def _band(
             axes.plot(x, edge, color=SERIES[k], linewidth=0.7, linestyle=DASHES[k])
 
 
-def _band_in_legend(axes: Axes, is_drawn: bool, words: str = "2 standard deviations") -> None:
+def _band_in_legend(axes: Axes, is_drawn: bool, words: str) -> None:
     """An entry for the bands of all colours."""
     if is_drawn:
         axes.fill_between([], [], [], color=MUTED, alpha=0.3, linewidth=0, label=f"± {words}")

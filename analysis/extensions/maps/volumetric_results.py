@@ -32,7 +32,7 @@ from .volumetric_errors import (
     along_axes,
     drawn_machine_errors,
 )
-from .volumetric_plots import draw_along, draw_grid, draw_line, draw_points
+from .volumetric_plots import draw_grid, draw_line, draw_points
 from .volumetric_tables import (
     along_csv,
     along_data,
@@ -79,9 +79,9 @@ class MachineErrors(Result):
         With a path, which ends in .svg, .png or .pdf, the picture is written as well.
 
         :raises ImportError: matplotlib is missing.
-        :raises ValueError: the path ends in something else.
+        :raises ValueError: the path ends in something else, or errors along one axis.
         """
-        raise NotImplementedError
+        raise ValueError("a parametric error along its axis has no picture; leave it out")
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -206,9 +206,6 @@ class ErrorAlongAxis(MachineErrors):
 
     def point_lines(self) -> Iterable[str]:
         return along_csv(self.along)
-
-    def plot(self, path: str | Path | None = None) -> Figure:
-        return draw_along(self.along, path)
 
 
 def machine_errors(
