@@ -57,7 +57,7 @@ def add_options(parser: ArgumentParser) -> None:
     parser.add_argument(
         "--budget",
         action="store_true",
-        help="what each parametric error contributes to the errors and to their uncertainties",
+        help="of a map file: what each parametric error contributes to errors and uncertainties",
     )
     add_picture(
         parser,

@@ -51,7 +51,9 @@ def map_errors(
             raise ValueError("a machine file states its own probe; leave the probe out")
         if tasks:
             raise ValueError("tasks are measured by a map of a fit; leave them out")
-        return machine_errors(source, asked, error, draws, with_budget)
+        if with_budget:
+            raise ValueError("a budget is that of a map of a fit; leave it out")
+        return machine_errors(source, asked, error, draws)
     if error is not None:
         raise ValueError("error functions of a map are those of map --curves, in Python bp.curves")
     fitted, label = map_of_source(source)

@@ -1,4 +1,4 @@
-"""Contributions of parametric errors to the errors of a machine and to their uncertainties.
+"""Contributions of parametric errors to the errors of a fitted machine and their uncertainties.
 
 The error of a point, and of a length to first order, is a sum over the parametric errors. The share
 of a part in a mean square is its mean product with the whole, in a variance its covariance with the
@@ -18,11 +18,10 @@ from ballplate.simulator.maps import FittedMap
 
 from .fitted_errors import ErrorRows, length_ends, length_rows, rows_of_errors
 from .map_places import MapPlaces
-from .volumetric_errors import Volumetric, length_errors
+from .volumetric_errors import length_errors
 
 REST = "together", "joint effect of the parts beyond the sum of their single effects"
 OFFSETS = "offsets", "estimated offsets of probes, which rotations turn"
-PROBING = "probing", "what probing adds to each co-ordinate"
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,7 +81,7 @@ class _End:
 
 
 def _figures(
-    split: _Split, places: MapPlaces, of_points: Array, ends: tuple[_End, _End], offset: int = -1
+    split: _Split, places: MapPlaces, of_points: Array, ends: tuple[_End, _End], offset: int
 ) -> Iterator[tuple[str, bool, Array, Array, float]]:
     """Yield budgets without uncertainties: errors at points, with offsets of probes (m, d) or (d,),
     then lengths, to which the part of index `offset` contributes estimated offsets.
@@ -176,61 +175,6 @@ def fitted_budget(
             np.where(is_open, np.nan, np.sqrt(np.append(alone, 0.0))),
             np.where(is_unknown, np.nan, _ratio(np.append(with_whole, 0.0), variance)),
             np.nan if undetermined else float(np.sqrt(variance)),
-        )
-        budgets.append(budget)
-    return tuple(budgets)
-
-
-@single_threaded
-def machine_budget(built: Volumetric, places: MapPlaces) -> tuple[PartBudget, ...]:
-    """Budgets of the errors that a machine file states, whose random parts are independent: their
-    contributions add in squares.
-    """
-    points, starts, ends = places.points, places.starts, places.ends
-    truth, machine = built.truth, built.machine
-    approach, lasting_errors = built.approach[0].parameters, built.lasting[0].parameters
-    every_parameter = (*truth.model.parameters, *approach, *lasting_errors)
-    meanings = {parameter.function: parameter.meaning for parameter in every_parameter}
-    random = [parameter.function for parameter in approach]
-    random += [PROBING[0]] * 3 + [parameter.function for parameter in lasting_errors]
-    of_truth = [parameter.function for parameter in truth.model.parameters]
-    every = list(dict.fromkeys([*of_truth, *random]))
-    parts = [PROBING if name == PROBING[0] else (name, meanings[name]) for name in every]
-    masks = np.array([[function == name for function in of_truth] for name in every])
-    split = _Split(truth.model, truth.a, masks.reshape(len(every), -1))
-    offset = np.array(machine.probe)
-    both_ends = _End(starts, offset, offset), _End(ends, offset, offset)
-    drawn, lasting = built.random_roots(points)
-    at_points = np.concatenate([drawn, lasting], axis=2)
-    variances = [(at_points**2).sum(axis=(0, 1)) / len(points)]
-    (first, steady), (last, moved) = built.random_roots(starts), built.random_roots(ends)
-    along = [
-        np.einsum("md,mdk->mk", _directions(starts, ends), root)
-        for root in (first, last, moved - steady)
-    ]
-    variances += list(np.concatenate([along[0] ** 2 + along[1] ** 2, along[2] ** 2], axis=1))
-    budgets = []
-    for (name, is_length, errors, shares, total), variances_of_figure in zip(
-        _figures(split, places, offset, both_ends), variances, strict=True
-    ):
-        by_part = np.array(
-            [
-                variances_of_figure[[name_of_random == part for name_of_random in random]].sum()
-                for part in every
-            ]
-            + [0.0]
-        )
-        variance = float(by_part.sum())
-        budget = PartBudget(
-            name,
-            is_length,
-            (*parts, REST),
-            errors,
-            shares,
-            total,
-            np.sqrt(by_part),
-            _ratio(by_part, variance),
-            float(np.sqrt(variance)),
         )
         budgets.append(budget)
     return tuple(budgets)

@@ -23,19 +23,15 @@ OF_ESTIMATES = (
     " correlated: a part alone may be less certain than the whole, and a share negative. Parts"
     " depend on the frame, the whole of a length does not"
 )
-OF_SOURCES = "share of variance: random parts are independent, and add in squares"
 
 
-def budget_lines(
-    figures: Sequence[PartBudget], factor: float = 1.0, correlated: bool = True
-) -> list[str]:
+def budget_lines(figures: Sequence[PartBudget], factor: float) -> list[str]:
     """Return contributions of the parts to the errors at points, then to all lengths and their
     variances.
     """
     shown = [
         k for k in range(len(figures[0].parts)) if any(_is_shown(budget, k) for budget in figures)
     ]
-    word = f"U alone, k = {factor:g}" if correlated else "random"
     lines, lengths = [], [budget for budget in figures if budget.is_length]
     names = [figures[0].parts[k][0] for k in shown]
     meanings = [figures[0].parts[k][1] for k in shown]
@@ -45,14 +41,13 @@ def budget_lines(
             "": [*meanings, ""],
             "error alone, µm": ([*budget.errors[shown], budget.total], _shown),
             "share": ([*budget.shares[shown], None], _percent),
-            f"{word}, µm": (
+            f"U alone, k = {factor:g}, µm": (
                 factor * np.append(budget.uncertainties[shown], budget.uncertainty),
                 _shown,
             ),
             "share of variance": ([*budget.variance_shares[shown], None], _percent),
         }
         lines += [*table_lines(columns), ""]
-    whole = f"U, k = {factor:g}, µm" if correlated else "random, µm"
     errors = [
         (budget.figure, ([*budget.errors[shown], budget.total], _shown)) for budget in lengths
     ]
@@ -64,11 +59,13 @@ def budget_lines(
     for k in shown:
         shares = [_percent(budget.variance_shares[k]) for budget in lengths]
         rows.append([figures[0].parts[k][0], *shares])
-    rows.append([whole, *(_shown(factor * budget.uncertainty) for budget in lengths)])
+    rows.append(
+        [f"U, k = {factor:g}, µm", *(_shown(factor * budget.uncertainty) for budget in lengths)]
+    )
     lines += [*aligned(rows, right), ""]
     omitted = len(figures[0].parts) - len(shown)
     omission = [f"(omitted: {omitted} parts without contribution)"] if omitted else []
-    return [*lines, *omission, OF_POINTS, OF_LENGTHS, OF_ESTIMATES if correlated else OF_SOURCES]
+    return [*lines, *omission, OF_POINTS, OF_LENGTHS, OF_ESTIMATES]
 
 
 def _is_shown(budget: PartBudget, k: int) -> bool:
@@ -78,7 +75,7 @@ def _is_shown(budget: PartBudget, k: int) -> bool:
     return bool(sizes.max() > NOTHING)
 
 
-def budget_data(figures: Sequence[PartBudget], factor: float = 1.0) -> list[Data]:
+def budget_data(figures: Sequence[PartBudget], factor: float) -> list[Data]:
     """The same in metres."""
     return [
         {

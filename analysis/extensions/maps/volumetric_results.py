@@ -6,7 +6,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
-from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -14,6 +13,7 @@ from ballplate.presentation import (
     Data,
     MainTable,
     Result,
+    given,
 )
 from ballplate.simulator.experiment import load_machine
 from ballplate.simulator.inputs import Message
@@ -21,8 +21,6 @@ from ballplate.simulator.machines import meaning
 
 from .fitted_tables import realisation_lines
 from .map_places import MapPlaces, PlacesAsked, map_places
-from .part_budget import PartBudget, machine_budget
-from .part_tables import budget_data, budget_lines
 from .realisations import Draws, Realisations
 from .volumetric_errors import (
     AlongAxis,
@@ -86,49 +84,23 @@ class MachineErrors(Result):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class ErrorsAtPoints(MachineErrors):
-    """Volumetric errors at `places`: `errors` at points, and those of `lengths`.
-
-    `realisations` are optional draws of the random part; `with_budget` adds the contributions of
-    parametric errors.
+    """Volumetric errors at `places`: `errors` at points, and those of `lengths`; `realisations` are
+    optional draws of the random part.
     """
 
     places: MapPlaces
     errors: VolumetricErrors
     lengths: LengthErrors
     realisations: Realisations | None = None
-    with_budget: bool = False
 
     def headline(self) -> str:
         largest = 1e6 * float(self.errors.resultant.max())
         return f"{len(self.errors.points)} points, resultant {largest:.4g} µm at most"
 
-    @cached_property
-    def budget(self) -> tuple[PartBudget, ...]:
-        """Contributions of parametric errors to the errors at points and to each length."""
-        return machine_budget(self.machine, self.places)
-
-    def more_lines(self) -> list[str]:
-        """Return requested realisations and budget as lines of text."""
-        lines = []
-        if self.realisations is not None:
-            lines += ["", *realisation_lines(self.realisations, self.places.names)]
-        if self.with_budget:
-            lines += ["", *budget_lines(self.budget, correlated=False)]
-        return lines
-
-    def more_data(self) -> Data:
-        """Return requested realisations and budget as plain data."""
-        data: Data = {}
-        if self.realisations is not None:
-            data["realisations"] = self.realisations.to_dict()
-        if self.with_budget:
-            data["budget"] = budget_data(self.budget)
-        return data
-
     def lines(self) -> list[str]:
         diagonals = diagonal_lines(self.lengths)
         points = error_lines(self.errors)
-        return [*machine_lines(self.machine), "", *diagonals, "", *points, *self.more_lines()]
+        return [*machine_lines(self.machine), "", *diagonals, "", *points, *self._drawn()]
 
     def data(self) -> Data:
         return {
@@ -137,8 +109,14 @@ class ErrorsAtPoints(MachineErrors):
                 {"diagonal": k, **row} for k, row in enumerate(length_data(self.lengths), 1)
             ],
             self.places.kind: error_data(self.errors),
-            **self.more_data(),
+            **given(realisations=self.realisations and self.realisations.to_dict()),
         }
+
+    def _drawn(self) -> list[str]:
+        """Return requested realisations as lines of text."""
+        if self.realisations is None:
+            return []
+        return ["", *realisation_lines(self.realisations, self.places.names)]
 
     def columns(self) -> MainTable:
         """One row for each point, in metres."""
@@ -167,14 +145,14 @@ class ErrorsOnLine(ErrorsAtPoints):
     """Errors along a line, and that of its length."""
 
     def lines(self) -> list[str]:
-        return [*error_lines(self.errors), length_line(self.lengths), *self.more_lines()]
+        return [*error_lines(self.errors), length_line(self.lengths), *self._drawn()]
 
     def data(self) -> Data:
         return {
             **machine_data(self.machine),
             "length": length_data(self.lengths)[0],
             "line": error_data(self.errors),
-            **self.more_data(),
+            **given(realisations=self.realisations and self.realisations.to_dict()),
         }
 
     def plot(self, path: str | Path | None = None) -> Figure:
@@ -213,7 +191,6 @@ def machine_errors(
     asked: PlacesAsked,
     error: str | None = None,
     draws: Draws | None = None,
-    with_budget: bool = False,
 ) -> MachineErrors:
     """Return errors of a machine file at requested locations, or of one parametric error along its
     axis.
@@ -240,5 +217,4 @@ def machine_errors(
         built.errors(places.points),
         built.lengths(places.starts, places.ends),
         None if draws is None else drawn_machine_errors(built, places, draws),
-        with_budget,
     )

@@ -240,15 +240,12 @@ def test_parts_add_up_to_the_whole(fitted: FittedMap) -> None:
     assert min(at_points.variance_shares.min(), *(one.variance_shares.min() for one in lengths)) < 0
 
 
-def test_random_parts_of_a_machine_file_add_in_squares() -> None:
+def test_random_parts_of_a_machine_file_are_drawn_as_stated() -> None:
     file = TOP / "designs/park/machines/measured-errors.yaml"
-    found = bp.map(file, grid=(3, 3, 3), budget=True, draw=1000, seed=3)
+    with pytest.raises(ValueError, match="a budget is that of a map of a fit"):
+        bp.map(file, budget=True)
+    found = bp.map(file, grid=(3, 3, 3), draw=1000, seed=3)
     assert found.realisations is not None
-    for k, one in enumerate(found.budget[1:]):
-        squares = float((one.uncertainties**2).sum())
-        assert np.sqrt(squares) == pytest.approx(found.lengths.uncertainties[k], rel=1e-12)
-        assert one.variance_shares.sum() == pytest.approx(1.0)
-        assert one.total == pytest.approx(found.lengths.errors[k], abs=1e-15)
     spread = found.realisations.errors.std(axis=0)
     known = found.errors.uncertainties > 0.0
     # 1000 draws know a standard deviation to 2.2 %.
