@@ -56,7 +56,7 @@ class CertifiedBalls(Result):
     """Balls of a plate in the plate's own axes: `coordinates` (n, d) in metres and their
     `covariance` (n d, n d), those of a ball side by side, in square metres.
 
-    `drawn` (n, d) are the balls in the axes of the drawing, `datum` says what defines the axes.
+    `datum` says what defines the axes.
     `left_out` are balls whose co-ordinates in these axes nothing determined. `scale` tells what the
     lengths rest on, `scale_uncertainty` is that of all lengths in common, as a ratio.
     `reference_temperature` in °C is None where it is unknown. `degrees_of_freedom` are those of
@@ -69,7 +69,6 @@ class CertifiedBalls(Result):
     artefact: str
     datum: str
     names: tuple[str, ...]
-    drawn: Array
     coordinates: Array
     covariance: Array
     distances: tuple[PlateDistance, ...]

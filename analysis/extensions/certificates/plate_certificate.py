@@ -159,7 +159,6 @@ def plate_certificate(
         name,
         chosen.words(layout.names),
         names,
-        layout.coordinates[determined, :d],
         coordinates,
         flat @ flat.T,
         _distances(linearisation, index[determined], names, fit.sigma),

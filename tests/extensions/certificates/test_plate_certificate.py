@@ -77,10 +77,10 @@ def test_covariance_is_that_of_the_definition(tmp_path: Path, names: tuple[str, 
 
 def test_axes_of_all_balls_say_the_same_of_every_distance(tmp_path: Path) -> None:
     found, other = (certified(tmp_path, datum=datum) for datum in ("all", ()))
-    n = len(found.names)
+    n, (layout,) = len(found.names), uncertain(tmp_path).layouts.values()
     rows = np.zeros((n * (n - 1) // 2, n, 3))
     for k, (i, j) in enumerate(combinations(range(n), 2)):
-        apart = found.drawn[i] - found.drawn[j]
+        apart = layout.coordinates[i] - layout.coordinates[j]
         rows[k, i], rows[k, j] = apart / np.linalg.norm(apart), -apart / np.linalg.norm(apart)
     flat = rows.reshape(len(rows), -1)
     expected = dense.standard_uncertainties(problem(uncertain(tmp_path)), symbols=["U5"])["U5"]
