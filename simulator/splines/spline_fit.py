@@ -146,45 +146,14 @@ def _constrained(
     contradictory = [k for k in free_columns if abs(matrix[k] @ particular - values[k]) > size]
     if contradictory:
         raise SplineError(
-            _contradiction(constraints, matrix, determined_columns, k) for k in contradictory
+            SplineProblem(
+                f"the {constraints[k].words} contradicts what else is prescribed; leave it out, or"
+                " add a knot",
+                constraints[k].places,
+            )
+            for k in contradictory
         )
     return particular, q[:, rank:], tuple(constraints[k] for k in free_columns)
-
-
-def _contradiction(
-    constraints: tuple[Constraint, ...], matrix: Array, kept_rows: Array, k: int
-) -> SplineProblem:
-    """Return a message on the constraints that a constraint contradicts."""
-    if not matrix[k].any():
-        text = f"the {constraints[k].words} is zero for every spline of this order; leave it out"
-        return SplineProblem(text, constraints[k].places)
-    parts = np.linalg.lstsq(matrix[kept_rows].T, matrix[k], rcond=None)[0]
-    involved = [
-        constraints[j]
-        for j, part in zip(kept_rows.tolist(), parts, strict=True)
-        if abs(part) > NOTHING
-    ]
-    # One that prescribes the same thing.
-    if (
-        len(involved) == 1
-        and (constraint := involved[0]).words == constraints[k].words
-        and np.allclose(constraint.places, constraints[k].places, rtol=1e-12, atol=0.0)
-    ):
-        return SplineProblem(
-            f"the {constraints[k].words} is prescribed twice, differently; give only one of them",
-            constraints[k].places,
-        )
-    texts = []
-    places: list[float] = []
-    for constraint in (constraints[k], *involved):
-        indices = [f"{{{len(places) + i}}}" for i in range(len(constraint.places))]
-        texts.append(constraint.words.format(*indices))
-        places += constraint.places
-    text = (
-        f"the {texts[0]} contradicts the {', the '.join(texts[1:])}; remove one of them or add a"
-        " knot"
-    )
-    return SplineProblem(text, tuple(places))
 
 
 def _refuse_undetermined(space: SplineSpace, x: Array, design: Array, null: Array) -> None:

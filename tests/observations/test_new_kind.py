@@ -66,7 +66,6 @@ from pathlib import Path
 
 import ballplate as bp
 from ballplate.cli import main
-from ballplate.extensions.repair.certificates import better_certificates
 from ballplate.simulator.inputs.messages import ExperimentError
 
 def said(*arguments):
@@ -125,7 +124,6 @@ print(json.dumps({
     "reach both": json.loads(said(*searched)),
     "suggested": json.loads(said("check", corner, "--suggest", "--goal", goal, "--json")),
     "offered": offered,
-    "better": [one.words for one in better_certificates(bp.load(corner))],
     "fixed": [fixed, (folder / "low.yaml").read_text()],
     "angle certificate": Path(angle_certificate).read_text(),
     "angle fit": said("fit", corner, readings + "2", "--certificate", angle_certificate, "--json"),
@@ -351,7 +349,6 @@ def test_reach_scales_an_angle(told: dict[str, Any]) -> None:
 def test_repairs_leave_an_angle_alone(told: dict[str, Any]) -> None:
     text = json.dumps([told["suggested"], told["offered"], told["fixed"]])
     assert "calibrate the corner" not in text and '"calibration[1]' not in text
-    assert len(told["better"]) == 2 and all("distances" in one for one in told["better"])
     edits = [
         edit
         for one in told["offered"]["repairs"]["partial"]

@@ -6,9 +6,7 @@ THE_CURVE_LACKS_POINTS_BETWEEN_MM = (
     "the curve lacks 3 points between 350 mm and 1000 mm, where it has 2; leave out knots "
     "or prescribe more"
 )
-THE_SECOND_DERIVATIVE_AT_IS_ZERO = (
-    "the second derivative at 0 is zero for every spline of this order"
-)
+THE_SECOND_DERIVATIVE_AT_IS_ZERO = "the second derivative at 0 contradicts what else is prescribed"
 THE_SLOPE_AT_IS_PRESCRIBED_TWICE = (
-    "^the slope at 0 is prescribed twice, differently; give only one of them$"
+    "^the slope at 0 contradicts what else is prescribed; leave it out, or add a knot$"
 )

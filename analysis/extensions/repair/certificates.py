@@ -1,9 +1,8 @@
-"""Distances and radii that may be calibrated, or calibrated better."""
+"""Distances and radii that may be calibrated."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import replace
 from functools import partial
 from typing import Any
 
@@ -13,8 +12,7 @@ from ballplate.simulator.experiment import Experiment
 from ballplate.simulator.geometry import BallLayout, BryanGaugeSettings, TwoSpheresSettings, pairs
 from ballplate.simulator.inputs import LengthFunction, format_length
 
-from .changes import Change, ChangeKind, distances, pair_set, with_calibration
-from .written import can_be_written
+from .changes import Change, ChangeKind, distances, with_calibration
 
 # Distances between two balls of a line.
 MOST_DISTANCES = 200
@@ -50,37 +48,6 @@ def certificates(experiment: Experiment) -> Iterator[Change]:
             if any(frozenset(pair) not in calibrated for pair in chosen.tolist()):
                 new = distances(like, layout, chosen)
                 yield calibrated_distances(name, words, new)
-
-
-def better_certificates(experiment: Experiment) -> Iterator[Change]:
-    """Calibration with smaller uncertainties, of the kinds that can be written."""
-    for k, item in enumerate(experiment.calibration):
-        if not can_be_written(item):
-            continue
-        for factor in (0.5, 0.1):
-            better, layout = item.times_as_uncertain(factor), experiment.layout_of(item)
-            least = min(value.standard_uncertainty for value in better.certified_values(layout))
-            if not least:
-                # What is exact cannot be calibrated better.
-                break
-            quantity = "radius" if isinstance(item, RadiusCalibration) else "co-ordinates"
-            words = format_length(least)
-            if isinstance(better, DistanceCalibration):
-                quantity = f"distances ({pair_set(layout, better.pairs) or len(better.pairs)})"
-                assert better.standard_uncertainty is not None
-                words = length_words(better.standard_uncertainty)
-            change_words = (
-                f"calibrate the {quantity} of {item.artefact} to {words} ({factor:g} times the"
-                " standard uncertainty)"
-            )
-            apply = partial(_with_better, k=k, item=better)
-            yield Change(
-                ChangeKind.CERTIFICATE,
-                change_words,
-                1.0 / factor,
-                frozenset({f"calibration {k}"}),
-                apply,
-            )
 
 
 def calibrated_distances(artefact: str, words: str, item: DistanceCalibration) -> Change:
@@ -179,8 +146,3 @@ def length_words(value: LengthFunction) -> str:
     """Return an uncertainty, constant or growing with length, as text."""
     constant = format_length(value.constant)
     return f"{constant} + L/{1.0 / value.slope:.6g}" if value.slope else constant
-
-
-def _with_better(experiment: Experiment, k: int, item: Any) -> Experiment:
-    items = (*experiment.calibration[:k], item, *experiment.calibration[k + 1 :])
-    return replace(experiment, calibration=items)

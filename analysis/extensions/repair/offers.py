@@ -7,7 +7,7 @@ from functools import partial
 
 from ballplate.simulator.experiment import Experiment, Pool, Position, placed_only
 
-from .certificates import better_certificates, certificates
+from .certificates import certificates
 from .changes import Change, ChangeKind, with_calibration, with_position
 from .moves import more_readings, moves, repeats
 from .positions import positions
@@ -27,7 +27,7 @@ def offers(experiment: Experiment, is_deficient: bool = True) -> dict[ChangeKind
         (ChangeKind.READ_MORE, more_readings),
     ]
     if not is_deficient:
-        makers += [(ChangeKind.READ_MORE, repeats), (ChangeKind.CERTIFICATE, better_certificates)]
+        makers.append((ChangeKind.READ_MORE, repeats))
     if experiment.pool is not None:
         makers.append((ChangeKind.POOL, pool_additions))
     else:

@@ -286,7 +286,7 @@ def test_wrong_usage(
         ),
         (
             ("--start-slope", "0", "--at", "start", "slope", "1 um/mm"),
-            ["the slope at 0 mm is prescribed twice, differently; give only one of them"],
+            ["the slope at 0 mm contradicts what else is prescribed; leave it out, or add a knot"],
         ),
         (("--boundary", "1 mm, 1 mm"), ["the point (1 mm, 1 mm) is not on the profile"]),
         (
