@@ -50,12 +50,12 @@ class ReversalFit(FitResult):
     """The reversal, and the full estimate of the same readings.
 
     `first` and `second` are positions, the second turned by about 90 degrees clockwise from the
-    first; the balls that are read in `both` (k,) are the only ones that the reversal uses. `names` and `coordinates` (n, 2) are the balls by the
-    reversal in the plate's own `axes`, NaN for others. `full` is the estimate by multiple
-    redundancy with the same share of the scale difference, and `redundant` its alpha, beta, gamma
-    (unless `scale` is "none") and offsets as the reversal defines them, with standard
-    uncertainties. `without_offsets` is the p-value of the hypothesis of no offsets; NaN if they are
-    parameters.
+    first; the balls that are read in `both` (k,) are the only ones that the reversal uses.
+    `names` and `coordinates` (n, 2) are the balls by the reversal in the plate's own `axes`,
+    NaN for others. `full` is the estimate by multiple redundancy with the same share of the
+    scale difference, and `redundant` its alpha, beta, gamma (unless `scale` is "none") and
+    offsets as the reversal defines them, with standard uncertainties. `without_offsets` is the
+    p-value of the hypothesis of no offsets; NaN if they are parameters.
     """
 
     label: str
