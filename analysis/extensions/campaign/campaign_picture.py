@@ -36,9 +36,7 @@ if TYPE_CHECKING:
 
 # Points: of the drawing, its parts and what stands around them.
 WIDTH, LEFT, RIGHT, BELOW, ABOVE = 480.0, 56.0, 16.0, 44.0, 26.0
-CURVE, SCENE, ROW, LEGEND, UNDER = 180.0, 330.0, 17.0, 42.0, 4.0
-# Room for a line of a value alone, and for its name.
-STRIP, LABELS = 22.0, 134.0
+CURVE, SCENE, ROW, LEGEND, UNDER, LINE = 180.0, 330.0, 17.0, 42.0, 4.0, 16.0
 # Room for a position's number on the left of the gains, and for their values on the right.
 NUMBERS, VALUES = 26.0, 74.0
 
@@ -62,25 +60,20 @@ def draw_campaign(selection: Selection, path: str | Path | None = None) -> Figur
     """
     rows, marks = _rows(selection), _marks(selection)
     bars = ROW * max(len(rows), 1)
-    top = CURVE + LEGEND if selection.curve else STRIP * len(marks)
-    total = SCENE + UNDER + bars + ABOVE + BELOW + top + ABOVE
+    top = CURVE + LEGEND + BELOW if selection.curve else LINE
+    total = SCENE + UNDER + bars + ABOVE + top + ABOVE
     with drawing(total, WIDTH) as figure:
-        _title(
-            figure,
-            total - 14.0,
-            f"{DESCRIPTIONS[selection.criterion]}{'' if selection.unit == '1' else ', µm'}",
-        )
+        unit = "" if selection.unit == "1" else ", µm"
+        _title(figure, total - 14.0, f"{DESCRIPTIONS[selection.criterion]}{unit}")
         if selection.curve:
             _curve(
-                placed_axes(figure, LEFT, total - ABOVE - top, WIDTH - LEFT - RIGHT, CURVE),
+                placed_axes(figure, LEFT, total - ABOVE - top + BELOW, WIDTH - LEFT - RIGHT, CURVE),
                 selection,
                 marks,
             )
         else:
-            _strip(
-                placed_axes(figure, LABELS, total - ABOVE - top, WIDTH - LABELS - VALUES, top),
-                marks,
-            )
+            values = "; ".join(f"{mark.name}: {mark.text}" for mark in marks)
+            _title(figure, total - ABOVE - 0.5 * LINE, values)
         bottom = SCENE + UNDER
         axes = placed_axes(figure, NUMBERS, bottom, WIDTH - NUMBERS - VALUES, bars)
         _title(
@@ -171,37 +164,6 @@ def _marks(selection: Selection) -> list[_Mark]:
     if selection.target is not None:
         marks.append(_Mark(TARGET, selection.target, INK, "|"))
     return [replace(mark, value=_factor(selection) * mark.value) for mark in marks]
-
-
-def _strip(axes: Axes, marks: Sequence[_Mark]) -> None:
-    """Draw the marks in rows, with the range below the bound shaded."""
-    target = next((mark.value for mark in marks if mark.name == TARGET), None)
-    low, high = _limits([mark.value for mark in marks if mark.name != TARGET], target)
-    axes.set_xscale("log" if high > WIDE * low > 0.0 else "linear")
-    axes.set_xlim(low, high)
-    axes.set_ylim(len(marks) - 0.5, -0.5)
-    axes.set_yticks(range(len(marks)), [mark.name for mark in marks])
-    axes.tick_params(left=False)
-    axes.spines["left"].set_visible(False)
-    axes.grid(True, axis="x")
-    for k, mark in enumerate(marks):
-        is_known, is_inside = math.isfinite(mark.value), low <= mark.value <= high
-        if mark.name == BOUND and is_known:
-            axes.axvspan(low, mark.value, color=MUTED, alpha=0.2, linewidth=0)
-        # What does not fit is beyond the end that its triangle points to.
-        marker = mark.marker if is_inside else "<" if mark.value < low else ">"
-        axes.plot(
-            min(max(mark.value, low), high),
-            k,
-            color=mark.colour,
-            linestyle="none",
-            marker=marker,
-            markersize=9.0,
-            markeredgewidth=2.0 if is_inside and marker == "|" else 1.0,
-            clip_on=False,
-        )
-        _write_beside(axes, mark.text, k, high)
-    _plain_numbers(axes.xaxis, axes.get_xscale() == "log")
 
 
 # In one piece: layers of one drawing, from the back to the front.

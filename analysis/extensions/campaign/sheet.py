@@ -4,9 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
 
-import numpy as np
 from ballplate.planning import (
     RunSheet,
     Step,
@@ -18,8 +16,8 @@ from ballplate.planning import (
     summary,
 )
 from ballplate.presentation import Data, Result
-from ballplate.simulator.experiment import Candidate, ChangeTimes, Experiment, Position
-from ballplate.simulator.inputs import length_text, refused, to_python
+from ballplate.simulator.experiment import Candidate, ChangeTimes, Experiment
+from ballplate.simulator.inputs import refused, to_python
 
 from .reading_lists import planned_readings, points_csv, points_dmis, template_csv
 from .sheet_forms import sheet_text
@@ -103,7 +101,7 @@ def sheet_of(experiment: Experiment) -> Sheet:
     )
     changes = ChangeTimes(0.0, 0.0) if pool is None else pool.changes
     for position in experiment.positions:
-        settings = by_name.get(position.name) or _settings(position, experiment)
+        settings = by_name[position.name]
         plane = settings.get("plane") if experiment.dimension == 3 else None
         seconds = timed.get(position.name, 0.0)
         candidate = Candidate(position.name, position, seconds, plane or "", "", True, settings)
@@ -124,24 +122,3 @@ def sheet_of(experiment: Experiment) -> Sheet:
         )
         before, start = here, start + change + seconds
     return Sheet(experiment, RunSheet(tuple(steps), (), bool(timed), changes))
-
-
-def _settings(position: Position, experiment: Experiment) -> dict[str, Any]:
-    """Return the settings of a position that is in no file."""
-    rotation = position.pose.rotation
-    turns = [float(np.arctan2(rotation[1, 0], rotation[0, 0]))]
-    if len(rotation) == 3:
-        about_x = float(np.arctan2(rotation[2, 1], rotation[2, 2]))
-        turns = [about_x, -float(np.arcsin(np.clip(rotation[2, 0], -1.0, 1.0))), *turns]
-    angles = [f"{np.degrees(angle) + 0.0:.6g} deg" for angle in turns]
-    every = len(experiment.layouts[position.artefact].names)
-    return {
-        "pose": {
-            "origin": [length_text(length) for length in position.pose.origin.tolist()],
-            "rotation": angles if len(angles) == 3 else angles[0],
-        },
-        "readings": [
-            {"balls": "all" if len(group.balls) == every else list(group.balls)}
-            for group in position.readings
-        ],
-    }

@@ -79,17 +79,8 @@ def test_a_picture_with_a_curve_has_marks_gains_and_positions(
 
 def test_without_a_curve_marks_stand_alone(found: Campaign, tmp_path: Path) -> None:
     drawn = texts(replace(found, curve=()), tmp_path)
-    assert {"chosen", "as drawn", "target", "0.600", "0.400", "1.20", "5.70"} <= set(drawn)
-    assert "hours allowed" not in drawn
-    assert "1.00" in texts(replace(found, curve=(), target=1e-6), tmp_path)
-
-
-@pytest.mark.parametrize("bound", [4e-7, math.nan])
-def test_only_what_no_choice_reaches_is_shaded(found: Campaign, bound: float) -> None:
-    axes = draw_campaign(replace(found, curve=(), bound=bound)).axes[0]
-    shades = [one.get_extents().transformed(axes.transData.inverted()) for one in axes.patches]
-    wanted = [] if math.isnan(bound) else [(axes.get_xlim()[0], 1e6 * bound)]
-    assert [(one.x0, one.x1) for one in shades] == [pytest.approx(one) for one in wanted]
+    values = "chosen: 0.600; bound of any choice: 0.400; as drawn: 1.20; target: 5.70"
+    assert values in drawn and "hours allowed" not in drawn
 
 
 def test_the_same_campaign_gives_the_same_bytes(found: Campaign, tmp_path: Path) -> None:
@@ -110,7 +101,7 @@ def test_what_is_undetermined_or_has_no_bound_is_drawn_as_such(
     drawn = texts(nothing, tmp_path)
     assert "–" in drawn and "needed" not in drawn
     assert any(text.startswith("left out") for text in drawn) is False
-    assert ("chosen: deficient" if curve else "deficient") in drawn
+    assert any(text.startswith("chosen: deficient") for text in drawn)
     assert "deficient" in words(nothing) and "bound" not in words(nothing)
     bare = replace(nothing, drawn=None, drawn_spent=None, target=None, gains=(), left_out=())
     assert not {"as drawn", "target"} & set(texts(bare, tmp_path))
