@@ -273,21 +273,13 @@ def _numbers(row: str | float, count: int, steps: tuple[str, int], problems: Pro
         values = np.array(list(map(float, words)))
     except ValueError:
         values = np.full(len(words), np.nan)
-    if len(words) != count:
-        problems.add(steps, f"{len(words)} numbers instead of {count}; write the map again")
-    elif not np.isfinite(values).all():
-        wrong = next(word for word in words if not _is_number(word))
-        problems.add(steps, f'"{shorten(wrong)}" is not a number; write the map again')
-    else:
+    if len(words) == count and np.isfinite(values).all():
         return values
+    text = f"{len(words)} numbers instead of {count}"
+    if len(words) == count:
+        text = "has an entry that is no finite number"
+    problems.add(steps, f"{text}; write the map again")
     return np.zeros(count)
-
-
-def _is_number(word: str) -> bool:
-    try:
-        return bool(np.isfinite(float(word)))
-    except ValueError:
-        return False
 
 
 def _check_covariance(
@@ -300,20 +292,14 @@ def _check_covariance(
     if not (np.isfinite(covariance).all() and np.isfinite(undetermined).all()):
         problems.add(("covariance",), "has entries that are no finite numbers")
         return
-    if (covariance != covariance.T).any():
-        problems.add(("covariance",), "is not symmetric")
-        return
-    variances = np.diagonal(covariance)
-    for k in np.flatnonzero(variances < 0.0).tolist():
-        problems.add(("covariance", k), f"ends in the variance {float(variances[k])!r}, below zero")
-    if (variances < 0.0).any():
-        return
-    spread = np.where(variances > 0.0, np.sqrt(variances), 1.0)
+    spread = np.sqrt(np.abs(np.diagonal(covariance)))
+    spread = np.where(spread > 0.0, spread, 1.0)
     least = float(np.linalg.eigvalsh(covariance / np.outer(spread, spread)).min())
-    if least < -NEGATIVE * size:
+    if (covariance != covariance.T).any() or least < -NEGATIVE * size:
         text = (
-            "is not that of any values: some combination of them would have a variance below zero"
-            f" (eigenvalue {least:.3g} of the correlations); write the map again"
+            "is not that of any values: it is not symmetric, or some combination of them would have"
+            f" a variance below zero (eigenvalue {least:.3g} of the correlations); write the map"
+            " again"
         )
         problems.add(("covariance",), text)
 

@@ -92,7 +92,7 @@ EDITS: dict[str, tuple[Callable[[str], str], str, int, str]] = {
         1,
         "is not that of any values",
     ),
-    "variance": (lambda text: with_covariance(text, _negative), "covariance:", 5, "below zero"),
+    "variance": (lambda text: with_covariance(text, _negative), "covariance:", 1, "below zero"),
     "short row": (
         lambda text: with_covariance(text, _short),
         "covariance:",
@@ -103,13 +103,13 @@ EDITS: dict[str, tuple[Callable[[str], str], str, int, str]] = {
         lambda text: with_covariance(text, _slip),
         "covariance:",
         4,
-        '"4,5e-12" is not a number',
+        "has an entry that is no finite number",
     ),
     "infinite": (
         lambda text: with_covariance(text, _infinite),
         "covariance:",
         4,
-        '"inf" is not a number',
+        "has an entry that is no finite number",
     ),
     "row missing": (
         lambda text: with_covariance(text, list.pop),  # type: ignore[arg-type]
