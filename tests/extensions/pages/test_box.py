@@ -45,7 +45,7 @@ def test_names_and_ends_of_axes_stand_apart_inside_the_picture(
     machine = Volumetric(load_machine(path, []))
     found = machine.errors(map_places(machine.volume, PlacesAsked((2, 2, 2))).points)
     volumetric_plots.draw_grid(
-        found, machine.lengths(*machine.volume.diagonals), (2, 2, 2), None, tmp_path / "grid.svg"
+        found, machine.lengths(*machine.volume.diagonals), (2, 2, 2), tmp_path / "grid.svg"
     )
     *texts, (_, whole) = drawn
     assert sorted(text for text, _ in texts) == sorted(
