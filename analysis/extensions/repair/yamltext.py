@@ -289,7 +289,7 @@ def _with_entry(text: _Text, into: _Span, value: Any, key: str | None = None) ->
 def _of_key(key: str, value: Any, new_line: str) -> str:
     """A key with its value in one line, or what would be too long for one in several."""
     written, below = f"{_key(key)}: {flow(value)}", f"{new_line}  "
-    if isinstance(value, list | tuple) and len(value) > 1 and isinstance(value[0], dict):
+    if isinstance(value, list | tuple) and value and isinstance(value[0], dict):
         return f"{_key(key)}:" + "".join(f"{below}- {flow(item)}" for item in value)
     if isinstance(value, dict) and len(written) > MOST_COLUMNS:
         lines = [below + _of_key(name, entry, below) for name, entry in value.items()]

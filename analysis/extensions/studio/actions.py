@@ -36,6 +36,9 @@ STEP = 1e-5
 # Places along an axis of a pool that fills the volume.
 MOST_PLACES = 20
 
+# Keys of an item that could be had at a price, beside its own.
+PRICED = ("name", "price")
+
 # What an action makes of a design: another experiment, changes of the file, or another text.
 Outcome = Experiment | Sequence[TextChange] | str
 
@@ -273,38 +276,31 @@ def _planned(action: Action) -> Outcome:
     """Read the positions and have the certificates of a plan; other positions are switched off and
     stay in the file, as does the pool, less the certificates, which could be had twice otherwise.
     """
-    draft, data = action.draft, to_list(to_python(action.draft.tree))
+    data, names = to_python(action.draft.tree), action.get("calibration", ())
     chosen = {str(settings["name"]): settings for settings in to_list(action["positions"])}
     read = {
         str(entry.get("name")): k
-        for k, entry in enumerate(entries_of(draft))
+        for k, entry in enumerate(entries_of(action.draft))
         if entry.get("enabled", True)
     }
-    off = [("positions", read[name], "enabled") for name in read if name not in chosen]
-    new = [
-        settings | {"name": free_name(draft, name)}
-        for name, settings in chosen.items()
-        if name not in read
-    ]
     priced = (data.get("pool") or {}).get("calibration") or ()
-    had = [k for k, item in enumerate(priced) if item["name"] in action.get("calibration", ())]
-    items = [
-        {key: value for key, value in priced[k].items() if key not in ("name", "price")}
-        for k in had
+    had = [k for k, item in enumerate(priced) if item["name"] in names]
+    entries = [
+        *(
+            ("positions", settings | {"name": free_name(action.draft, name)})
+            for name, settings in chosen.items()
+            if name not in read
+        ),
+        *(
+            ("calibration", {key: priced[k][key] for key in priced[k] if key not in PRICED})
+            for k in had
+        ),
     ]
     return [
-        *(TextChange(steps, False) for steps in off),
-        *(TextChange(("positions",), settings, "append") for settings in new),
-        *_with_items(data, "calibration", items),
+        *(TextChange(("positions", read[name], "enabled"), False) for name in read.keys() - chosen),
+        *(TextChange((key,), to_list(entry), "append") for key, entry in entries),
         *_without(data, ("pool", "calibration"), had),
     ]
-
-
-def _with_items(data: Any, key: str, items: Sequence[Any]) -> list[TextChange]:
-    """Return the changes that add entries to a list, which is written by lines if it is new."""
-    if items and not data.get(key):
-        return [TextChange((key,), items)]
-    return [TextChange((key,), item, "append") for item in items]
 
 
 def _without(data: Any, steps: Steps, indices: Sequence[int]) -> list[TextChange]:

@@ -21,11 +21,6 @@ from ballplate.extensions.repair.written import plane_of
 from ballplate.extensions.sweeps.error_map_uncertainty import LEVELS, in_slices, point_map
 from ballplate.presentation import Data, percent, picked, uncertainty_words
 from ballplate.rank import Verdict, verdict
-from ballplate.results import (
-    predict,
-    scale_lines,
-    scale_warnings,
-)
 from ballplate.simulator.computing import single_threaded
 from ballplate.simulator.design import locations
 from ballplate.simulator.estimation import Linearisation, linearise
@@ -67,7 +62,7 @@ def summary(experiment: Experiment, moving: bool = False) -> dict[str, Any]:
             "reasons": [] if judged is None else judged.reasons,
             "directions": [] if judged is None else _directions(judged),
         },
-        "quantities": [_row(quantity) for quantity in quantities.values()],
+        "quantities": rows(quantities),
         "target": target_in_words(experiment),
         "within": lengths and lengths.within_target,
         "shares": _shares(experiment, quantities),
@@ -75,35 +70,6 @@ def summary(experiment: Experiment, moving: bool = False) -> dict[str, Any]:
         "worst": _worst(linearisation, lengths),
         "doubts": experiment.doubts,
         "seconds": perf_counter() - start,
-    }
-
-
-@single_threaded
-def quantities_and_pictures(
-    experiment: Experiment, linearisation: Linearisation, kind: str | None, motion: int | None
-) -> dict[str, Any]:
-    """Return all quantities, the map of a `kind`, "lengths", "points" or None for another, and the
-    motion of an undetermined direction by its index.
-    """
-    target = experiment.target_uncertainty
-    quantities = uncertainties(linearisation, target=target)
-    return {
-        "quantities": [_row(quantity) for quantity in quantities.values()],
-        "map": MAPS[kind](experiment, linearisation) if kind in MAPS else None,
-        "motions": None if motion is None else _motions(linearisation, target, motion),
-    }
-
-
-@single_threaded
-def scale_and_assumptions(experiment: Experiment) -> dict[str, Any]:
-    """Return the source of scale as `lines` of text, and `assumptions`, None without U6; the design
-    is evaluated again for each row.
-    """
-    prediction = predict(experiment, with_scale=True)
-    scale, assumptions = prediction.scale, prediction.assumptions
-    return {
-        "lines": [*scale_lines(scale), *scale_warnings(scale)],
-        "assumptions": assumptions and {**assumptions.to_dict(), "warning": assumptions.warning},
     }
 
 
@@ -147,9 +113,10 @@ def _worst(linearisation: Linearisation, lengths: Quantity | None) -> Data | Non
     return {"from": first, "to": second, "uncertainty": lengths.maximum}
 
 
-def _row(quantity: Quantity) -> Data:
+def rows(quantities: Mapping[str, Quantity]) -> list[Data]:
+    """Return what is shown of each quantity."""
     names = ("symbol", "description", "maximum", "average", "unit", "count", "undetermined")
-    return picked(quantity, *names, "largest", "within_target")
+    return [picked(each, *names, "largest", "within_target") for each in quantities.values()]
 
 
 def scene(experiment: Experiment, problems: Mapping[str, str]) -> dict[str, Any]:
@@ -185,7 +152,7 @@ def place_data(experiment: Experiment, place: Position) -> Data:
     }
 
 
-def _motions(linearisation: Linearisation, target: Target | None, index: int) -> Data | None:
+def motions(linearisation: Linearisation, target: Target | None, index: int) -> Data | None:
     """Return the motion of a lattice through the volume (x running slowest) and of the balls read
     along an undetermined or a weak direction, per unit of the largest displacement; None if there
     is no direction of that index.

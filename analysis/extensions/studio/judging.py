@@ -11,7 +11,7 @@ from typing import Any
 
 from ballplate.extensions.repair.yamltext import TextChange
 from ballplate.presentation import Data
-from ballplate.results import check
+from ballplate.results import check, predict, scale_lines, scale_warnings
 from ballplate.simulator.computing import Report, single_threaded, unreported
 from ballplate.simulator.estimation import Linearisation, linearise
 from ballplate.simulator.experiment import Experiment, lay_out
@@ -22,9 +22,10 @@ from ballplate.simulator.inputs import (
     to_list,
     to_python,
 )
+from ballplate.uncertainty import uncertainties
 
 from .actions import draft_after
-from .answers import quantities_and_pictures, scale_and_assumptions, scene, summary
+from .answers import MAPS, motions, rows, scene, summary
 from .document import DesignDocument, data_of, variants_of
 from .drafts import draft_of, draft_with, evaluable, evaluable_of, problems
 from .filling import hours_of, pool_of
@@ -79,11 +80,23 @@ def previewed(
     return {**summary(evaluable(draft), moving=True), "scene": {"positions": places}}
 
 
+@single_threaded
 def _pictures(document: DesignDocument, arguments: Arguments, report: Report) -> dict[str, Any]:
-    """Return all quantities, the `map` of a kind, the `motion` of an index, and the hours."""
+    """Return all quantities, the `map` of a kind, if there is one of it, the `motion` of a
+    direction by its index, and the hours.
+    """
     experiment, linearisation, hours = _evaluated(document, arguments["revision"])
-    kind, motion = arguments.get("map"), arguments.get("motion")
-    return quantities_and_pictures(experiment, linearisation, kind, motion) | hours
+    kind, motion, target = (
+        arguments.get("map"),
+        arguments.get("motion"),
+        experiment.target_uncertainty,
+    )
+    return {
+        "quantities": rows(uncertainties(linearisation, target=target)),
+        "map": MAPS[kind](experiment, linearisation) if kind in MAPS else None,
+        "motions": None if motion is None else motions(linearisation, target, motion),
+        **hours,
+    }
 
 
 @lru_cache(maxsize=1)
@@ -97,8 +110,15 @@ def _evaluated(document: DesignDocument, revision: int) -> tuple[Experiment, Lin
 
 
 def _support(document: DesignDocument, arguments: Arguments, report: Report) -> dict[str, Any]:
-    """Return the source of scale and the assumptions."""
-    return scale_and_assumptions(evaluable_of(document))
+    """Return the source of scale as `lines` of text, and `assumptions`, None without U6; the design
+    is evaluated again for each row.
+    """
+    prediction = predict(evaluable_of(document), with_scale=True)
+    scale, assumptions = prediction.scale, prediction.assumptions
+    return {
+        "lines": [*scale_lines(scale), *scale_warnings(scale)],
+        "assumptions": assumptions and {**assumptions.to_dict(), "warning": assumptions.warning},
+    }
 
 
 def _matrix(document: DesignDocument, arguments: Arguments, report: Report) -> dict[str, Any]:

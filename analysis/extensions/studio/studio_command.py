@@ -55,17 +55,12 @@ def unsaved(session: Session) -> str:
 
     if session.is_saved:
         return "all changes are saved"
-    unsaved_files = session.kept()
-    if unsaved_files == kept_in(session.path):
-        return (
-            f"changes are not saved, and are in {unsaved_files.name}:"
-            " the same command restores them"
-        )
-    if unsaved_files is not None:
-        return (
-            f"changes are not saved, and are in {unsaved_files.name}: another studio has the file"
-        )
-    return "changes are not saved, and could not be kept in the folder of the file"
+    kept = session.kept()
+    if kept is None:
+        return "changes are not saved, and could not be kept in the folder of the file"
+    is_own = kept == kept_in(session.path)
+    remedy = "the same command restores them" if is_own else "another studio has the file"
+    return f"changes are not saved, and are in {kept.name}: {remedy}"
 
 
 def run(options: Namespace) -> int:
