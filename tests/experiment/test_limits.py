@@ -142,7 +142,11 @@ def test_too_much(tmp_path: Path, old: str, new: str, line: str) -> None:
 
 @pytest.mark.parametrize(("count", "repeats"), [(5, 1), (1, 5)])
 def test_gauges_of_too_many_lengths(tmp_path: Path, count: int, repeats: int) -> None:
-    gauge = "  gauge: {kind: bryan_gauge, radius: 300 mm, directions: {random: 5000}}\npositions:\n"
+    elevations = ", ".join(f"{k} deg" for k in range(20))
+    directions = f"{{azimuths: 250, elevations: [{elevations}]}}"
+    gauge = (
+        f"  gauge: {{kind: bryan_gauge, radius: 300 mm, directions: {directions}}}\npositions:\n"
+    )
     places = (
         f"  - {{name: {k}, artefact: gauge, repeats: {repeats}, pose: {{origin: [500 mm, 500 mm,"
         " 100 mm]}}"
