@@ -53,12 +53,13 @@ export function legend() {
     return;
   }
   const isRatio = map.scale?.unit === "target";
-  const words = (value) => (isRatio ? `${Number(value.toPrecision(2))}` : `${micro(value)} µm`);
+  const number = (value) => (isRatio ? `${Number(value.toPrecision(2))}` : micro(value));
+  const unit = isRatio ? "" : " µm";
   const band = (low, k, { length }) => make("li",
     { class: isRatio && low === 1 && "target", style: `--shade: var(--band-${k})` },
-    words(low), isRatio && low === 1 && " = target", k === length - 1 && " or more");
+    number(low), isRatio && low === 1 && " = target", k === length - 1 && `${unit} or more`);
   fill($("legend"), isRatio ? MEANINGS.target + target : MEANINGS[kind],
-    `; here ${words(Math.min(...known))} to ${words(Math.max(...known))}`,
+    `; here ${number(Math.min(...known))} to ${number(Math.max(...known))}${unit}`,
     known.length < valuesOf(map).length && "; grey: undetermined",
     make("ul", { class: "bands" }, bandsOf(map).map(band)));
 }
