@@ -63,8 +63,7 @@ def pictures(page) -> list[Image.Image]:
 def swung(page, seconds: float) -> Image.Image:
     share = SHARE * sin(2.0 * pi * seconds / PERIOD)
     page.evaluate(
-        f"() => {{ const {{ view }} = window.studio; view.amplitude = {share} * view.size;"
-        " view.draw(); }"
+        f"() => {{ const {{ view }} = window.studio; view.set({{ amplitude: {share} * view.size }}); }}"
     )
     page.wait_for_timeout(60)
     return shot(page)

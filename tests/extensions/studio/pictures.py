@@ -47,6 +47,7 @@ def tour(page, folder: Path, design: Path) -> None:
         page.click(f"[aria-label='read {name}']")
         place = f"window.studio.state().design.scene.positions.find((one) => one.name === {name!r})"
         until(page, f"!{place}.enabled")
+    until(page, "!!window.studio.state().design.motions")
     picture("undetermined")
     page.click("[data-job=suggest]")
     page.wait_for_selector("#suggestions li")
