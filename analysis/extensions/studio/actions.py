@@ -297,7 +297,11 @@ def _planned(action: Action) -> Outcome:
         ),
     ]
     return [
-        *(TextChange(("positions", read[name], "enabled"), False) for name in read.keys() - chosen),
+        *(
+            TextChange(("positions", read[name], "enabled"), False)
+            for name in read
+            if name not in chosen
+        ),
         *(TextChange((key,), to_list(entry), "append") for key, entry in entries),
         *_without(data, ("pool", "calibration"), had),
     ]

@@ -69,10 +69,10 @@ def _fit(document: DesignDocument, settings: Mapping[str, Any], report: Report) 
     from ballplate.simulator.readings import read_readings
 
     experiment = evaluable_of(document)
-    with tempfile.TemporaryDirectory() as folder:
-        file = Path(folder) / (Path(str(settings["name"])).name or "readings.csv")
-        file.write_bytes(base64.b64decode(str(settings["content"])))
-        observed = read_readings([file], lay_out(experiment), settings=experiment.readings)
+    # In the folder of this process, which is removed with it.
+    file = Path(tempfile.mkdtemp()) / (Path(str(settings["name"])).name or "readings.csv")
+    file.write_bytes(base64.b64decode(str(settings["content"])))
+    observed = read_readings([file], lay_out(experiment), settings=experiment.readings)
     result = fit(experiment, observed)
     data: Data = {"lines": result.lines(), "notes": result.notes}
     if result.converged:

@@ -115,13 +115,11 @@ class Session:
     @property
     def path(self) -> Path:
         """The file of the design."""
-        with self._lock:
-            return self._document.path
+        return self._document.path
 
     @property
     def is_saved(self) -> bool:
-        with self._lock:
-            return not self._document.has_changes
+        return not self._document.has_changes
 
     @property
     def is_recoverable(self) -> bool:

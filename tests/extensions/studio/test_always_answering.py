@@ -11,6 +11,7 @@ from ballplate.designs import shipped
 
 pytest.importorskip("starlette", reason="the studio is an extra")
 
+from ballplate.extensions.studio import judging
 from ballplate.extensions.studio.actions import done
 from ballplate.extensions.studio.document import DesignDocument, experiment_of, opened, undone
 from ballplate.extensions.studio.judging import judgement, previewed
@@ -140,6 +141,40 @@ def test_a_preview_of_a_plate_outside_says_so_and_has_figures(document):
     action = {"do": "move", "position": "z high", "by": [0, 0, 2]}
     found = previewed(document, action)
     assert found["scene"]["positions"][1]["problem"] and u6(found) > 0
+
+
+@pytest.mark.parametrize(
+    "action",
+    [
+        {"do": "move", "position": "z low", "by": [0.05, 0.0, 0.1]},
+        {"do": "move", "position": "x low", "by": [0.9, 0.0, 0.0]},
+        {"do": "turn", "position": "y high"},
+        {"do": "stand", "position": "z low", "across": "x"},
+        {"do": "put", "at": [0.5, 0.5, 0.5]},
+        {"do": "fit"},
+        {"do": "off", "position": "z high"},
+        {"do": "set", "path": ["machine", "repeatability"], "value": "0.4 um"},
+        {"do": "text", "text": TEXT.replace("0.2 um", "0.3 um")},
+    ],
+    ids=str,
+)
+def test_a_preview_is_what_the_design_becomes(document, action):
+    """It writes nothing, and has the figures and the faults of what is written."""
+    found, after = previewed(document, action), judgement(done(document, action))
+    assert u6(found) == pytest.approx(u6(after.answer), rel=1e-9)
+    assert found["rank"]["observations"] == after.answer["rank"]["observations"]
+    assert [(place["name"], place["problem"]) for place in found["scene"]["positions"]] == [
+        (place["name"], place["problem"]) for place in after.scene["positions"]
+    ]
+
+
+def test_maps_and_motions_of_one_state_are_of_one_evaluation(document):
+    judging._evaluated.cache_clear()
+    for arguments in ({"map": "lengths"}, {"map": "points"}, {"motion": 0}):
+        judging.VIEWS["drawn"](document, arguments | {"revision": 1}, lambda step: None)
+    assert judging._evaluated.cache_info().misses == 1
+    judging.VIEWS["drawn"](document, {"revision": 2}, lambda step: None)
+    assert judging._evaluated.cache_info().misses == 2
 
 
 def test_keys_in_a_burst_are_one_step_back(document):

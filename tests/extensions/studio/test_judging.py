@@ -125,6 +125,25 @@ def test_a_preview_that_is_overtaken_is_refused_and_ends(session):
     assert found["title"] == "mine"
 
 
+def test_other_requests_are_answered_while_quantities_are_kept(session, monkeypatch):
+    found = []
+
+    def is_free() -> bool:
+        is_acquired = session._lock.acquire(timeout=5)
+        if is_acquired:
+            session._lock.release()
+        return is_acquired
+
+    def view(name, arguments):
+        with ThreadPoolExecutor(1) as pool:
+            found.append(pool.submit(is_free).result())
+        return {"quantities": []}
+
+    monkeypatch.setattr(session, "view", view)
+    session.act({"do": "keep"})
+    assert found == [True] and session.state()["kept"] == {"quantities": []}
+
+
 def below(process: int) -> set[int]:
     """The processes that a process has begun, and those that these have."""
     found = set()
