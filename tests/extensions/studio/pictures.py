@@ -42,6 +42,7 @@ def tour(page, folder: Path, design: Path) -> None:
         shot = page.locator(part).screenshot() if part else page.screenshot()
         small(shot, folder / f"studio-{name}.webp")
 
+    until(page, "document.querySelector('#rests').textContent !== ''")
     picture("verdict", "#answer")
     for name in ("z high", "x low", "x high", "y high"):
         page.click(f"[aria-label='read {name}']")
@@ -66,7 +67,7 @@ def tour(page, folder: Path, design: Path) -> None:
     page.mouse.move(x, y - 20, steps=6)
     page.mouse.up()
     settled(page, revision + 1)
-    page.click("#details summary")
+    # Keeping a design has unfolded all uncertainties.
     picture("drag")
     page.click("#details summary")
     page.click("#position [aria-label='r3c3']")
