@@ -241,7 +241,7 @@ def test_a_file_without_a_pool_says_so(capsys: pytest.CaptureFixture[str]) -> No
 
 
 def test_sheets_are_written(drawn: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    for ending in ("html", "csv"):
+    for ending in ("html", "txt"):
         sheet = drawn.with_name(f"sheet.{ending}")
         assert (
             main(["plan", str(drawn), "--positions", "4", "--sheet", str(sheet), "--workers", "1"])
