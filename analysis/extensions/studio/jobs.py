@@ -14,7 +14,7 @@ from ballplate.extensions.repair.written import position_settings
 from ballplate.presentation import Data, picked
 from ballplate.simulator.computing import Report
 from ballplate.simulator.experiment import Position, lay_out
-from ballplate.simulator.inputs import ExperimentError, number_of
+from ballplate.simulator.inputs import ExperimentError
 
 from .actions import ActionError
 from .answers import place_data
@@ -52,7 +52,7 @@ def _plan(document: DesignDocument, settings: Mapping[str, Any], report: Report)
     chosen, lengths = found.chosen_experiment, found.prediction.quantities.get("U6")
     return {
         "lines": found.lines(),
-        "words": f"the plan: {number_of(len(chosen.positions), 'position')}, {found.spent.budget}",
+        "words": f"the plan: {found.spent.budget}",
         **({} if lengths is None else picked(lengths, "average", "maximum")),
         "deficiency": found.prediction.verdict.deficiency,
         "places": [place_data(chosen, place) for place in chosen.positions],
