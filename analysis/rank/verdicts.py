@@ -19,6 +19,7 @@ from ballplate.simulator.estimation.linearisation import Linearisation
 from ballplate.simulator.geometry.motions import without_rigid_motion
 from ballplate.simulator.inputs.extensions import optional_service
 from ballplate.simulator.inputs.quantities import Target
+from ballplate.simulator.inputs.settings import number_of
 from ballplate.simulator.machines.protocol import Array, HasLines, Unit
 
 # Shares of a direction that move points by less than this fraction of its largest are not reported.
@@ -501,7 +502,8 @@ def in_words(direction: Direction) -> str:
     if direction.functions:
         described = [_function_words(part) for part in direction.functions[:8]]
         more = len(direction.functions) - len(described)
-        parts.append(", ".join(described) + (f" and {more} errors more" if more > 0 else ""))
+        further = f" and {number_of(more, 'further error')}" if more > 0 else ""
+        parts.append(", ".join(described) + further)
     for artefact in direction.artefacts:
         parts.append(f"{artefact.name} {artefact.words} (balls by up to {length(artefact.peak)})")
     if direction.positions:

@@ -53,7 +53,7 @@ class AxisError:
         """Description.
 
         >>> [AXIS_ERRORS[name].meaning for name in ("EXX", "EYX", "ECZ")]
-        ['positioning error of X', 'straightness of X in Y', 'yaw of Z about Z']
+        ['positioning error of X', 'straightness of X in Y', 'roll of Z about Z']
         """
         axis, component = TRANSLATIONS[self.axis], TRANSLATIONS[self.component]
         if not self.is_rotation:
@@ -61,7 +61,7 @@ class AxisError:
                 return f"straightness of {axis} in {component}"
             return f"positioning error of {axis}"
         if axis == component:
-            word = "roll" if axis != "Z" else "yaw"
+            word = "roll"
         elif axis == "Z":
             word = "tilt"
         else:

@@ -168,7 +168,7 @@ def test_of_many_parts_the_first_are_told_and_the_others_counted(count: int) -> 
     words = in_words(Direction(functions, (), positions))
     errors, moved = words.split("; moved positions: ")
     assert re.findall(r"F(\d+) ", errors) == [str(k) for k in range(min(count, 8))]
-    assert re.findall(r"(\d+) errors more", errors) == [str(count - 8)] * (count > 8)
+    assert re.findall(r"(\d+) further errors?", errors) == [str(count - 8)] * (count > 8)
     assert re.findall(r"P(\d+) \((\d+) µm\)", moved) == [
         (str(k), str(k + 1)) for k in range(min(count, 6))
     ]

@@ -148,7 +148,6 @@ def test_a_deficient_fit_beyond_the_limit_says_both() -> None:
 OF_MAPS = [
     ["correct", "MAP", "points.csv"],
     ["map", "MAP", "--grid", "2,2,2"],
-    ["map", "MAP", "--error", "EXX"],
     ["map", "--curves", "MAP"],
     ["map", "--convert", "MAP", "--to", "metric"],
     ["adjust", "MAP", "--scale", "x=10 um/m"],

@@ -117,7 +117,9 @@ def _certificate(standard: LengthFunction) -> str:
     scale, common to all.
     """
     if standard.slope:
-        common = function_text(LengthFunction(0.0, standard.slope)).rpartition("+ ")[2]
+        common = function_text(LengthFunction(0.0, standard.slope))
+        if "L/" not in common:
+            common = common.rpartition("+ ")[2]
         return f"standard_uncertainty: {rounded(standard.constant)}\n    common: {common}"
     return f"standard_uncertainty: {function_text(standard)}"
 

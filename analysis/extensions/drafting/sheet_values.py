@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from dataclasses import dataclass
 
@@ -228,6 +229,11 @@ def function_text(function: LengthFunction) -> str:
 
     >>> function_text(LengthFunction(9e-7, 2.5e-6))
     '0.9 um + 2.5 um/m'
+    >>> function_text(LengthFunction(9e-7, 1 / 600e3))
+    '0.9 um + L/600000'
     """
-    grows = f" + {1e6 * function.slope:.6g} um/m" if function.slope else ""
+    rate = f"{1e6 * function.slope:.6g}"
+    grows = f" + {rate} um/m" if function.slope else ""
+    if not math.isclose(float(rate), 1e6 * function.slope, rel_tol=1e-9):
+        grows = f" + L/{1.0 / function.slope:.9g}"
     return rounded(function.constant) + grows

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
 
@@ -31,13 +31,13 @@ MOST_COLUMNS = 120
 
 @dataclass(frozen=True)
 class TextChange:
-    """A value that is set at a path, possibly a new one, appended to the list there, or
-    removed.
+    """A value that is set at a path, possibly a new one, appended to the list there, or removed;
+    or the indices of that list's entries in another order.
     """
 
     steps: Steps
     value: Any = None
-    kind: Literal["set", "append", "remove"] = "set"
+    kind: Literal["set", "append", "remove", "order"] = "set"
 
 
 @dataclass(frozen=True, eq=False)
@@ -131,6 +131,8 @@ def _one_changed(data: Any, steps: Steps, change: TextChange) -> Any:
             {} if data is None else data, TextChange(steps, change.value, change.kind)
         )
     value = _as_read(change.value)
+    if change.kind == "order":
+        return tuple(data[k] for k in value)
     return (*(data or ()), value) if change.kind == "append" else value
 
 
@@ -223,6 +225,8 @@ def _changed(text: _Text, change: TextChange) -> str:
         )
     if change.kind == "remove":
         return _without(text, way[-2], last, change)
+    if change.kind == "order":
+        return _reordered(text.text, last, change.value)
     if change.kind == "append" and last.kind == "list":
         return _with_entry(text, last, change.value)
     value = [change.value] if change.kind == "append" else change.value
@@ -295,6 +299,22 @@ def _of_key(key: str, value: Any, new_line: str) -> str:
         lines = [below + _of_key(name, entry, below) for name, entry in value.items()]
         return f"{_key(key)}:" + "".join(lines)
     return written
+
+
+def _reordered(whole: str, span: _Span, order: Sequence[int]) -> str:
+    """The text with the entries of a list in another order, with the comments about each."""
+    bounds = [(entry.start, entry.end) for _, _, entry in span.entries]
+    if not span.is_flow:
+        ends = [_line_end(whole, end) for _, end in bounds]
+        first = max((end.end() for end in LINE_END.finditer(whole, 0, bounds[0][0])), default=0)
+        # What stands above an entry, after the line of the one before, goes with it; what stands
+        # above the first is about all.
+        starts = [first, *(end + len(_break(whole, end)) for end in ends[:-1])]
+        bounds = list(zip(starts, ends, strict=True))
+    parts = [whole[start:end] for start, end in bounds]
+    for (start, end), k in zip(reversed(bounds), reversed(order), strict=True):
+        whole = whole[:start] + parts[k] + whole[end:]
+    return whole
 
 
 def _without(text: _Text, above: _Span, span: _Span, change: TextChange) -> str:

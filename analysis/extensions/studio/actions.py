@@ -273,8 +273,9 @@ def _repaired(action: Action) -> Outcome:
 
 
 def _planned(action: Action) -> Outcome:
-    """Read the positions and have the certificates of a plan; other positions are switched off and
-    stay in the file, as does the pool, less the certificates, which could be had twice otherwise.
+    """Read the positions of a plan in its order, and have its certificates; other positions are
+    switched off and stay in the file, as does the pool, less the certificates, which could be had
+    twice otherwise.
     """
     data, names = to_python(action.draft.tree), action.get("calibration", ())
     chosen = {str(settings["name"]): settings for settings in to_list(action["positions"])}
@@ -283,14 +284,16 @@ def _planned(action: Action) -> Outcome:
         for k, entry in enumerate(entries_of(action.draft))
         if entry.get("enabled", True)
     }
+    new = [name for name in chosen if name not in read]
+    count = len(data.get("positions") or ())
+    index = read | {name: count + k for k, name in enumerate(new)}
+    order = [*range(count + len(new))]
+    for k, name in zip(sorted(index[name] for name in chosen), chosen, strict=True):
+        order[k] = index[name]
     priced = (data.get("pool") or {}).get("calibration") or ()
     had = [k for k, item in enumerate(priced) if item["name"] in names]
     entries = [
-        *(
-            ("positions", settings | {"name": free_name(action.draft, name)})
-            for name, settings in chosen.items()
-            if name not in read
-        ),
+        *(("positions", chosen[name] | {"name": free_name(action.draft, name)}) for name in new),
         *(
             ("calibration", {key: priced[k][key] for key in priced[k] if key not in PRICED})
             for k in had
@@ -303,6 +306,7 @@ def _planned(action: Action) -> Outcome:
             if name not in chosen
         ),
         *(TextChange((key,), to_list(entry), "append") for key, entry in entries),
+        *([TextChange(("positions",), order, "order")] if order != sorted(order) else []),
         *_without(data, ("pool", "calibration"), had),
     ]
 

@@ -114,9 +114,10 @@ def _worst(linearisation: Linearisation, lengths: Quantity | None) -> Data | Non
 
 
 def rows(quantities: Mapping[str, Quantity]) -> list[Data]:
-    """Return what is shown of each quantity."""
+    """Return what is shown of each quantity; no average is shown over parts of several units."""
     names = ("symbol", "description", "maximum", "average", "unit", "count", "undetermined")
-    return [picked(each, *names, "largest", "within_target") for each in quantities.values()]
+    shown = [each for each in quantities.values() if ", " not in each.unit]
+    return [picked(each, *names, "largest", "within_target") for each in shown]
 
 
 def scene(experiment: Experiment, problems: Mapping[str, str]) -> dict[str, Any]:

@@ -179,7 +179,7 @@ def test_missing_values_are_asked_for_at_a_terminal(tmp_path: Path) -> None:
     stated = {name: text for name, text in BRIDGE.items() if name != "mpe"}
     status, told = at_terminal(tmp_path, "m.yaml", *options(stated), typed="1 um + L/300\n")
     assert status == 0 and told.count("]: ") == 1
-    assert "1 um + 3.33333 um/m" in (tmp_path / "m.yaml").read_text(encoding="utf-8")
+    assert "1 um + L/300000" in (tmp_path / "m.yaml").read_text(encoding="utf-8")
 
 
 def test_the_end_of_the_answers(tmp_path: Path) -> None:

@@ -133,6 +133,26 @@ def test_all_stays_beside_what_is_removed(random: Random, has_comments: bool) ->
 
 
 @pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ("a: [1, {b: 2}, 3]  # all\n", "a: [3, 1, {b: 2}]  # all\n"),
+        (
+            "a:\n  # all\n  - b: 1  # one\n    c: 2\n  # second\n  - 2\n\n  - 3  # three\nd: 1\n",
+            "a:\n  # all\n\n  - 3  # three\n  - b: 1  # one\n    c: 2\n  # second\n  - 2\nd: 1\n",
+        ),
+        ("a:\r\n- 1\r\n- 2\r\n- 3", "a:\r\n- 3\r\n- 1\r\n- 2"),
+    ],
+)
+def test_entries_take_another_order_with_their_comments(text: str, expected: str) -> None:
+    assert with_changes(text, "f", [TextChange(("a",), [2, 0, 1], "order")]) == expected
+
+
+def test_an_alias_stays_after_its_anchor() -> None:
+    with pytest.raises(ExperimentError, match="change it by hand"):
+        with_changes("a:\n- &x 1\n- *x\n", "f", [TextChange(("a",), [1, 0], "order")])
+
+
+@pytest.mark.parametrize(
     "text, change, place",
     [
         ("a: &x {b: 1}\nc: *x\n", TextChange(("a", "b"), 2), "f:1:4: a.b: others refer to this"),
