@@ -88,7 +88,8 @@ def scheduler(tmp_path: Path, start: Start) -> tuple[str, subprocess.Popen[bytes
     ]
     process = start("-m", "distributed.cli.dask_scheduler", *options)
     end = time.monotonic() + 60
-    while not file.exists():
+    # The file may be there before its content.
+    while not (file.exists() and file.read_text(encoding="utf-8")):
         assert time.monotonic() < end and process.poll() is None
         time.sleep(0.05)
     return json.loads(file.read_text(encoding="utf-8"))["address"], process

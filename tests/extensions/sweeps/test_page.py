@@ -321,7 +321,8 @@ def test_python_writes_the_page_of_a_sweep(
 ) -> None:
     asked: list[tuple[Any, ...]] = []
     monkeypatch.setattr(
-        "ballplate.extensions.sweeps.report.page.page", lambda *given: asked.append(given) or "page"
+        "ballplate.extensions.sweeps.report.sweep_page.page",
+        lambda *given: asked.append(given) or "page",
     )
     result = bp.stored(plate_sizes)
     told = {"run_modules": True, "compare": plate_sizes}

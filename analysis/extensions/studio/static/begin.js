@@ -111,13 +111,17 @@ function choices(field, name) {
 // The text of an answer as init takes it, and what is `wrong` in fields by their names.
 function answer({ name, fields }) {
   const wrong = {};
+  const typedIn = (k) => form.elements[`answer-${name}-${k}`].value.trim();
+  const isStated = fields.some(({ units }, k) => units && typedIn(k));
   const texts = fields.map(({ label, units, usual }, k) => {
     const id = `answer-${name}-${k}`;
-    const typed = form.elements[id].value.trim();
+    const typed = typedIn(k);
     if (!units) return typed;
     const unit = units[form.elements[`${id}-unit`]?.value ?? 0];
-    form.elements[id].placeholder = unit.default ?? usual ?? "";
-    const value = typed.replace(",", ".") || unit.default || "";
+    // A constant that is stated alone does not grow.
+    const empty = isStated && unit.text.includes("+") ? "" : unit.default;
+    form.elements[id].placeholder = empty ?? usual ?? "";
+    const value = typed.replace(",", ".") || empty || "";
     if (!(Number(value) >= 0)) wrong[id] = `${label}: "${typed}" is no number`;
     return value && unit.text.replace("{}", () => value);
   });
