@@ -79,4 +79,6 @@ def _words(sheet: DataSheet, experiment: Experiment) -> dict[str, str]:
         "hours": f"{number_of(len(experiment.positions), 'position')} to start with; the plan"
         f" chooses from {number_of(len(pool.candidates), 'place')}",
     }
+    if sheet.temperature:
+        words["temperature"] = f"{sheet.temperature} in all positions alike, and again in each"
     return {name: text.replace(" um", " µm") for name, text in words.items()}

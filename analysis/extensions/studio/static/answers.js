@@ -85,6 +85,7 @@ export function figures(design, messages, pending = false) {
   if (moving) return;
   // Only where there is something to determine.
   suggest.hidden = !rank?.directions.length;
+  suggest.textContent = `What would determine it${rank?.deficiency ? "" : " better"}?`;
   fill($("messages"), messages.map(message),
     (design?.doubts ?? []).map((text) => make("li", {}, text)));
   const figured = [...box.querySelectorAll(":scope > .figure")].map((one) =>
