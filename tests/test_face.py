@@ -320,6 +320,26 @@ def test_an_experiment_shows_itself() -> None:
     assert html.count("<tr>") == html.count("</tr>") == 12
 
 
+def test_residuals_in_space_are_drawn_as_seen() -> None:
+    """The picture shows what an eye to the right of the front and above it sees of each vector."""
+    experiment = bp.quickstart()
+    readings = bp.simulate(experiment)
+    readings.loc[10, "x_mm"] += 0.002
+    found = bp.fit(experiment, readings)
+    name = found.largest[0].position
+    (own,) = (one for one in found.residual_vectors() if one.label == name)
+    turn, rise = np.radians([-35.0, 24.0])
+    seen = np.array([np.cos(turn), np.sin(turn) * np.sin(rise)])
+    k = int(np.hypot(*own.residuals.T).argmax())
+    assert own.names[k] == found.largest[0].ball == readings.ball[10]
+    away = own.residuals[k] / np.hypot(*own.residuals[k])
+    assert abs(away @ seen) / np.hypot(*seen) > 0.9
+    (axes, *_) = found.plot().axes
+    inside = [line for line in axes.lines if line.get_transform() == axes.transData]
+    edges = [line for line in inside if len(line.get_xdata()) == 2]
+    assert len(edges) == 12 and not axes.axison
+
+
 def test_other_results_draw_themselves(tmp_path: Path) -> None:
     curve = bp.spline(TABLE, y="finish_error", points="12-32")
     for k, plot in enumerate(

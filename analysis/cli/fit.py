@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ..estimators.estimator_choice import (
+    DRAWN,
     ESTIMATORS,
     TAKE,
     fit_readings,
@@ -18,6 +19,7 @@ from ..results.groupings import GROUPINGS
 from .common import (
     add_json,
     add_page,
+    add_picture,
     add_workers,
     day,
     map_path,
@@ -53,6 +55,11 @@ def add_options(parser: ArgumentParser) -> None:
     _add_estimators(parser)
     _add_components(parser)
     _add_trials(parser)
+    add_picture(
+        parser,
+        "--plot",
+        help=("draw the residuals as magnified vectors (.svg, .png or .pdf)"),
+    )
     add_output(
         parser,
         "-o",
@@ -160,6 +167,8 @@ def run(options: Namespace) -> int:
     if options.trials and isinstance(result, Fit) and result.converged:
         result = _with_trials(options, result, experiment)
     contents: dict[Path | None, Writer] = {options.report: result.report}
+    if result.converged:
+        contents[options.plot] = result.plot
     if options.output and isinstance(result, Fit) and result.converged:
         fitted = result.to_map(options.date)
         contents[options.output] = partial(write_map, fitted)
@@ -212,5 +221,7 @@ def _refuse_misused(options: Namespace) -> None:
         raise UsageError("-o writes the map of the full estimator; leave it out")
     if options.date and not options.output:
         raise UsageError("--date applies to -o only; leave it out")
+    if options.plot and options.estimator not in DRAWN:
+        raise UsageError("--plot draws residuals by the full estimator or reversal; leave it out")
     if options.report and options.estimator != "full":
         raise UsageError("--report writes the page of the full estimator; leave it out")

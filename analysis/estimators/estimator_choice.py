@@ -26,6 +26,8 @@ OF_DISTANCES = ("distances", "cresto", "kruth")
 OF_LENGTHS = ("length-equations", "sphere-then-metric")
 COMPARED = (*OF_DISTANCES, *OF_LENGTHS, "reversal")
 """Estimators that are compared with the full one."""
+DRAWN = ("full", "reversal")
+"""Estimators that draw their residuals."""
 
 # Options that only some estimators take.
 TAKE: dict[str, tuple[str, ...]] = {

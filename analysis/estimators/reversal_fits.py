@@ -89,6 +89,7 @@ def fit_reversal(
         offsets,
         design.positions.names[k],
         design.positions.names[m],
+        means[k] + design.positions.origins[k],
         reversal,
         tuple(
             ParameterEstimate(name, value, u, unit)

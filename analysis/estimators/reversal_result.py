@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -22,12 +23,13 @@ from ..presentation.formatting import (
 )
 from ..presentation.result import FitResult
 from ..presentation.table_columns import MainTable, table_lines
+from ..presentation.vectors import Vectors, draw_vectors
 from ..results.estimates import ParameterEstimate
 from ..results.fits import Fit
 from ..results.text_blocks import MOST_BALLS, coordinates_data
 
 if TYPE_CHECKING:
-    pass
+    from matplotlib.figure import Figure
 
 # Error of the first-order equations, in standard uncertainties of a result, that causes a warning.
 NOTICEABLE = 0.5
@@ -50,12 +52,13 @@ class ReversalFit(FitResult):
     """The reversal, and the full estimate of the same readings.
 
     `first` and `second` are positions, the second turned by about 90 degrees clockwise from the
-    first; the balls that are read in `both` (k,) are the only ones that the reversal uses.
-    `names` and `coordinates` (n, 2) are the balls by the reversal in the plate's own `axes`,
-    NaN for others. `full` is the estimate by multiple redundancy with the same share of the
-    scale difference, and `redundant` its alpha, beta, gamma (unless `scale` is "none") and
-    offsets as the reversal defines them, with standard uncertainties. `without_offsets` is the
-    p-value of the hypothesis of no offsets; NaN if they are parameters.
+    first; `places` (k, 2) are the readings in the first, of the balls that are read in `both` (k,),
+    the only ones that the reversal uses. `names` and `coordinates` (n, 2) are the balls by the
+    reversal in the plate's own `axes`, NaN for others. `full` is the estimate by multiple
+    redundancy with the same share of the scale difference, and `redundant` its alpha, beta, gamma
+    (unless `scale` is "none") and offsets as the reversal defines them, with standard
+    uncertainties. `without_offsets` is the p-value of the hypothesis of no offsets; NaN if they are
+    parameters.
     """
 
     label: str
@@ -64,6 +67,7 @@ class ReversalFit(FitResult):
     offsets: bool
     first: str
     second: str
+    places: Array
     found: Reversal
     estimates: tuple[ParameterEstimate, ...]
     axes: PlateAxes
@@ -96,6 +100,11 @@ class ReversalFit(FitResult):
     def names_of_both(self) -> tuple[str, ...]:
         """The balls that are read in both positions."""
         return tuple(self.names[ball] for ball in self.both)
+
+    def residual_vectors(self) -> tuple[Vectors, ...]:
+        """Readings in the first position less those that the second predicts."""
+        label = f"{self.first}, less what {self.second} predicts"
+        return (Vectors(label, self.places, self.found.residuals, self.names_of_both),)
 
     @property
     def observed(self) -> ObservedReadings:
@@ -190,6 +199,9 @@ class ReversalFit(FitResult):
             "unit": "unit",
         }
         return columns, self.estimates
+
+    def plot(self, path: str | Path | None = None) -> Figure:
+        return draw_vectors(self.residual_vectors(), self.title, path)
 
     def _neglected(self) -> str:
         """A sentence about the error of the first-order equations."""

@@ -67,6 +67,6 @@ if TYPE_CHECKING:
     )
     from .table import Block, Entry, Row, Table
     from .table_columns import ROUNDING, MainTable, by_axis, table_csv, table_lines
-    from .vectors import draw_vectors
+    from .vectors import Vectors, draw_vectors
 
 __getattr__, __dir__ = lazily(__name__, __file__)

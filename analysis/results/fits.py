@@ -13,7 +13,9 @@ from ballplate.presentation.files import write_file
 from ballplate.presentation.formats import as_html
 from ballplate.presentation.formatting import Data, given, picked
 from ballplate.presentation.result import FitResult
+from ballplate.presentation.scenes import box_edges, projection
 from ballplate.presentation.table_columns import MainTable, table_lines
+from ballplate.presentation.vectors import Vectors, draw_vectors
 from ballplate.rank.verdicts import Verdict
 from ballplate.results.adjustments import Adjustment, few_degrees_of_freedom, freedom_words
 from ballplate.results.diagnosis import Suspicion, has_exact_values, lack_of_fit
@@ -39,7 +41,7 @@ from ballplate.results.groupings import GROUPINGS, Grouping
 from ballplate.results.map_of_fit import counted_twice, map_of
 from ballplate.results.plates import PlateCoordinates
 from ballplate.results.prediction import by_label, length_headline, rank_words
-from ballplate.results.residuals import Residual, residual_groups
+from ballplate.results.residuals import Residual, reading_residuals, residual_groups
 from ballplate.results.text_blocks import (
     adjustment_data,
     adjustment_lines,
@@ -74,6 +76,7 @@ if TYPE_CHECKING:
     from ballplate.results.sigmas_by_campaign import CampaignSigmas
     from ballplate.simulator.experiment.model import Experiment
     from ballplate.simulator.maps.fitted_map import FittedMap
+    from matplotlib.figure import Figure
 
 
 REWEIGHTED = (
@@ -463,6 +466,41 @@ class Fit(FitResult):
             self, plate, tuple(names), coverage_factor, about
         )
         return certificate
+
+    def residual_vectors(self) -> tuple[Vectors, ...]:
+        """Residuals of a converged fit, by position; in three dimensions projected, seen from the
+        front and above.
+        """
+        design = self.design
+        view, _ = projection(design.dimension)
+        readings, residuals, _ = reading_residuals(design, self.solution, self.observed.x)
+        places = self.observed.x[design.plate_readings]
+        return tuple(
+            Vectors(
+                design.positions.names[k],
+                places[of_position] @ view.T,
+                residuals[of_position] @ view.T,
+                tuple(design.balls.names[ball] for ball in readings.ball[of_position]),
+            )
+            for k in np.unique(readings.position)
+            for of_position in [readings.position == k]
+        )
+
+    def plot(self, path: str | Path | None = None) -> Figure:
+        design, vectors = self.design, self.residual_vectors() if self.converged else ()
+        if not vectors:
+            reason = (
+                "no ball of a plate was read"
+                if self.converged
+                else f"the estimate has {self.solution.status}"
+            )
+            raise ValueError(f"there are no residuals to draw: {reason}")
+        if design.dimension == 2:
+            return draw_vectors(vectors, self.title, path)
+        view, towards = projection(3)
+        volume = design.machine.volume
+        edges, _ = box_edges(volume.lower, volume.upper, towards)
+        return draw_vectors(vectors, self.title, path, edges @ view.T)
 
     @property
     def cautions(self) -> tuple[str, ...]:

@@ -61,10 +61,11 @@ def test_a_fit_without_scatter_says_so(
     path.write_text(quickstart(truth, target), encoding="utf-8")
     assert main(["simulate", str(path), "--exact", "-o", str(readings)]) == 0
     capsys.readouterr()
-    assert main(["fit", str(path), str(readings)]) == 0
+    picture = tmp_path / "residuals.svg"
+    assert main(["fit", str(path), str(readings), "--plot", str(picture)]) == 0
     said = capsys.readouterr()
     told = "sigma is zero within rounding, since the readings agree exactly with the model"
-    assert told in said.err and "--sigma given" in said.err
+    assert told in said.err and "--sigma given" in said.err and picture.exists()
     start = said.out.index("largest residuals")
     assert [line.split()[-1] for line in said.out[start:].splitlines()[1:4]] == ["-"] * 3
     assert main(["fit", str(path), str(readings), "--json"]) == 0
@@ -93,7 +94,7 @@ def test_from_python(tmp_path: Path) -> None:
     assert not fit.covariance("machine").to_numpy().any()
     assert np.isnan(fit.correlation("machine").to_numpy()).all()
     assert fit.correct([[0.1, 0.2, 0.3]]).standard_uncertainties.tolist() == [[0.0] * 3]
-    assert len(fit.to_frame())
+    assert len(fit.to_frame()) and fit.plot() is not None
     noisy = bp.fit(experiment, bp.simulate(experiment))
     assert not noisy.without_scatter and not any("sigma is zero" in one for one in noisy.cautions)
 

@@ -59,7 +59,7 @@ RECIPES = (
         "fit dummy.yaml dummy-readings.csv --variant 'with scale' --estimator reversal --scale x"
         " --no-offsets"
     ),
-    "fit angles.yaml angles-readings.csv --variant 'any angles'",
+    "fit angles.yaml angles-readings.csv --variant 'any angles' --plot out.svg",
     "certificate small.yaml small-readings.csv --sigma given -o out.html",
     (
         "certificate small.yaml small-readings.csv -o out.xml --about date=2026-11-02 --about"

@@ -13,6 +13,7 @@ from ballplate.presentation import (
     MUTED,
     PAPER,
     SERIES,
+    Vectors,
     blank_axes,
     box,
     box_edges,
@@ -127,7 +128,7 @@ def draw_points(
         view, towards = projection(3)
         edges = box_edges(volume.lower, volume.upper, towards)[0] @ view.T
     places, vectors = (array[is_determined] @ view.T for array in (errors.points, errors.errors))
-    return draw_vectors(places, vectors, title, path, edges)
+    return draw_vectors((Vectors("", places, vectors),), title, path, edges, "errors")
 
 
 def _face(axes: Axes, face: Array, colour: str, width: float, is_near: bool) -> None:

@@ -9,14 +9,19 @@ import sys
 from pathlib import Path
 
 import ballplate as bp
+import numpy as np
 import pytest
 from ballplate.cli import main
-from ballplate.results.prediction import Prediction
+from ballplate.results.fits import Fit
 
 from tests.extensions.pages import wording
 
 pytest.importorskip("matplotlib", reason="pictures need matplotlib")
-MACHINE = "designs/park/machines/npl-like.yaml"
+
+REAL = (
+    Path("designs/hocken_borchardt/real.yaml"),
+    Path("designs/hocken_borchardt/real-readings.csv"),
+)
 PLACES = {
     "planes": ["z"],
     "levels": ["100 mm", "400 mm"],
@@ -25,23 +30,40 @@ PLACES = {
 
 
 @pytest.fixture(scope="module")
-def planned() -> Prediction:
-    return bp.check(bp.quickstart())
+def planar() -> Fit:
+    return bp.fit(bp.load(REAL[0], "with scale"), REAL[1])
 
 
-def test_a_figure_is_the_picture_of_the_command(tmp_path: Path) -> None:
-    """The same bytes from the method and from the command."""
-    command, method = tmp_path / "command.svg", tmp_path / "method.svg"
-    assert main(["map", MACHINE, "--grid", "2,2,2", "--plot", str(command)]) == 0
-    figure = bp.map(MACHINE, grid=(2, 2, 2)).plot(method)
-    assert method.read_bytes() == command.read_bytes()
+def test_a_figure_is_the_picture_of_the_command(planar: Fit, tmp_path: Path) -> None:
+    """The same bytes from the method, and from the figure that it gives back when a notebook shows
+    it.
+    """
+    arguments = [
+        "fit",
+        *map(str, REAL),
+        "--variant",
+        "with scale",
+        "--plot",
+        str(tmp_path / "command.svg"),
+    ]
+    assert main(arguments) == 0
+    figure = planar.plot(tmp_path / "method.svg")
+    assert (tmp_path / "method.svg").read_bytes() == (tmp_path / "command.svg").read_bytes()
     assert "magnified" in str(figure.get_label())
 
 
-def test_a_notebook_shows_a_figure(planned: Prediction) -> None:
+def test_vectors_begin_where_balls_were_read(planar: Fit) -> None:
+    """Of the drawn markers each is at the place of a reading, in millimetres."""
+    axes = planar.plot().axes[0]
+    markers = [line.get_xydata()[::3] for line in axes.lines if line.get_markevery() == 3]
+    drawn = np.array(sorted(np.concatenate(markers).tolist()))
+    np.testing.assert_allclose(drawn, sorted((1e3 * planar.observed.x).tolist()))
+
+
+def test_a_notebook_shows_a_figure(planar: Fit) -> None:
     from matplotlib.image import imread
 
-    figure = planned.plot()
+    figure = planar.plot()
     image = imread(io.BytesIO(figure._repr_png_()), format="png")
     # Opaque and white at its corner, as dark letters need it, with something drawn on it.
     assert image[0, 0].min() == 1.0 and image[..., :3].min() < 0.2
@@ -61,16 +83,20 @@ def test_predictions_and_plans_draw_their_positions(tmp_path: Path) -> None:
     assert {campaign.title_of(one) for one in campaign.chosen} <= drawn
 
 
-def test_what_cannot_be_drawn_is_refused(planned: Prediction, tmp_path: Path) -> None:
+def test_what_cannot_be_drawn_is_refused(planar: Fit, tmp_path: Path) -> None:
+    experiment = bp.quickstart()
+    other = bp.fit(experiment, bp.simulate(experiment), estimator="distances")
+    with pytest.raises(ValueError, match=wording.BY_THE_FULL_ESTIMATOR_AND_REVERSAL):
+        other.plot()
     with pytest.raises(ValueError, match=wording.SHOULD_END_IN_ONE_OF_SVG):
-        planned.plot(tmp_path / "picture.jpg")
+        planar.plot(tmp_path / "picture.jpg")
 
 
 def test_a_missing_matplotlib_is_named_with_the_command(
-    planned: Prediction, monkeypatch: pytest.MonkeyPatch
+    planar: Fit, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     for name in [one for one in sys.modules if one.partition(".")[0] == "matplotlib"]:
         monkeypatch.delitem(sys.modules, name)
     monkeypatch.setitem(sys.modules, "matplotlib", None)
     with pytest.raises(ImportError, match=r"python -m pip install 'ballplate\[report\]'"):
-        planned.plot()
+        planar.plot()

@@ -2,6 +2,7 @@
 
 AND_CHOSEN_ONES_MORE = "… and 16 chosen ones more"
 APPLY_TO_SWEEPS_ONLY = "apply to sweeps only"
+BY_THE_FULL_ESTIMATOR_AND_REVERSAL = "by the full estimator and reversal only"
 CAMPAIGN_OF_QUICKSTART = "<Campaign of quickstart: 7 of "
 IN_EITHER_COLOUR_DARKER_IS_LARGER = "in either colour darker is larger"
 NEITHER_AN_EXPERIMENT_NOR_THE_PATH = "neither an experiment nor the path"
