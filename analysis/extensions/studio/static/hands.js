@@ -19,7 +19,8 @@ export class Hands {
     on("pointerup", (event) => this.release(event, false));
     on("pointercancel", (event) => this.release(event, true));
     on("pointerleave", () => view.hover(null));
-    on("dblclick", (event) => this.put(this.pixel(event)));
+    // Where it was pressed: this event itself is in whole pixels.
+    on("dblclick", () => this.from && this.put(this.from));
     on("contextmenu", (event) => event.preventDefault());
     on("wheel", (event) => {
       event.preventDefault();
