@@ -21,6 +21,7 @@ from .spatial import figure_of
 from .uncertainty_sections import (
     expansion,
     lengths_words,
+    misses_target,
     scale_section,
     task_table,
     uncertainty_table,
@@ -111,12 +112,8 @@ def figures_wide(content: Iterable[Html]) -> Html:
 
 
 def _is_good(run: QuotedData) -> bool:
-    shares = [quantity.get("within_target") for quantity in run.data["quantities"].values()]
-    missed = any(share is not None and share < 1.0 for share in shares)
-    missed |= any(
-        quantity["within_target"] is False for quantity in run.data.get("tasks", {}).values()
-    )
-    return run.data["as_expected"] and not run.data["weakly_determined"] and not missed
+    is_sure = run.data["as_expected"] and not run.data["weakly_determined"]
+    return is_sure and not misses_target(run.data)
 
 
 def _verdict(run: QuotedData, target: str, lengths: QuotedData) -> Html:

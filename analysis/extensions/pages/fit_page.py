@@ -27,6 +27,7 @@ from .uncertainty_sections import (
     estimates_table,
     expansion,
     lengths_words,
+    misses_target,
     task_table,
     uncertainty_table,
 )
@@ -135,7 +136,6 @@ def _results(fit: QuotedData, contents: FitContents) -> list[PageSection]:
 
 def _is_good(data: Mapping[str, Any]) -> bool:
     """True if the page has no warning."""
-    shares = [quantity.get("within_target") for quantity in data["quantities"].values()]
     wrong = (
         data["degrees_of_freedom"] <= 0
         or data["complaint"]
@@ -145,9 +145,7 @@ def _is_good(data: Mapping[str, Any]) -> bool:
         or data.get("assumptions", {}).get("contradicted")
         or data["warnings"]
     )
-    missed = any(share is not None and share < 1.0 for share in shares)
-    missed |= any(quantity["within_target"] is False for quantity in data.get("tasks", {}).values())
-    return not wrong and not missed
+    return not wrong and not misses_target(data)
 
 
 def _verdict(fit: QuotedData, contents: FitContents) -> Html:

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from typing import Any
+
 from ballplate.presentation import shown_unit, uncertainty_words
 
 from .elements import Html, folded, joined, note, sentence, table
@@ -185,3 +188,10 @@ def estimates_table(result: QuotedData, names: list[str], name: str, caption: st
     heads = ["parameter", "value", "u", f"U, k = {k:g}", "unit"]
     made = table(name, caption, heads, rows, (0, 4), is_long=len(rows) > 40)
     return folded(caption, made, is_open=len(rows) <= 12) if rows else Html()
+
+
+def misses_target(data: Mapping[str, Any]) -> bool:
+    """True if a quantity or a measuring task of a result's data is not within its target."""
+    shares = [quantity.get("within_target") for quantity in data["quantities"].values()]
+    tasks = [task["within_target"] for task in data.get("tasks", {}).values()]
+    return False in tasks or any(share is not None and share < 1.0 for share in shares)

@@ -259,9 +259,7 @@ def _with_entry(text: _Text, into: _Span, value: Any, key: str | None = None) ->
             insert_at = into.end - 1
             return whole[:insert_at] + written + whole[insert_at:]
         _, first, last = into.entries[-1]
-        line_start = max(
-            (line_end.end() for line_end in LINE_END.finditer(whole, 0, first.start)), default=0
-        )
+        line_start = _line_start(whole, first.start)
         indent = whole[line_start : first.start]
         if indent.strip() or len(into.entries) < 2:
             return f"{whole[: last.end]}, {written}{whole[last.end :]}"
@@ -306,7 +304,7 @@ def _reordered(whole: str, span: _Span, order: Sequence[int]) -> str:
     bounds = [(entry.start, entry.end) for _, _, entry in span.entries]
     if not span.is_flow:
         ends = [_line_end(whole, end) for _, end in bounds]
-        first = max((end.end() for end in LINE_END.finditer(whole, 0, bounds[0][0])), default=0)
+        first = _line_start(whole, bounds[0][0])
         # What stands above an entry, after the line of the one before, goes with it; what stands
         # above the first is about all.
         starts = [first, *(end + len(_break(whole, end)) for end in ends[:-1])]
@@ -321,9 +319,7 @@ def _without(text: _Text, above: _Span, span: _Span, change: TextChange) -> str:
     whole = text.text
     k = next(k for k, (_, _, value) in enumerate(above.entries) if value is span)
     key = above.entries[k][1]
-    line_start = max(
-        (line_end.end() for line_end in LINE_END.finditer(whole, 0, key.start)), default=0
-    )
+    line_start = _line_start(whole, key.start)
     if not above.is_flow and not whole[line_start : key.start].strip():
         start, end = line_start, _line_end(whole, span.end)
         following = LINE_END.match(whole, end)
@@ -354,6 +350,11 @@ def _keep_what_is_told(text: _Text, span: _Span, start: int, end: int, change: T
                 f"{subject} here would be lost by the change; change it by hand",
                 format_path(change.steps),
             )
+
+
+def _line_start(text: str, index: int) -> int:
+    """Index of the start of the line that an index is in."""
+    return max((line_end.end() for line_end in LINE_END.finditer(text, 0, index)), default=0)
 
 
 def _line_end(text: str, start: int) -> int:

@@ -72,22 +72,21 @@ class Action:
     @property
     def position(self) -> Position:
         """The position that is named."""
+        return self.position_of(self["position"])
+
+    def position_of(self, name: Any) -> Position:
+        """Return the position of a name.
+
+        :raises ActionError: there is none.
+        """
         places = {place.name: place for place in self.draft.positions}
-        return places[_known("position", self["position"], places)]
+        return places[_known("position", name, places)]
 
     @property
     def entry(self) -> Steps:
         """The path of the position that is named, which may not be understood."""
         names = [str(entry.get("name")) for entry in entries_of(self.draft)]
         return ("positions", names.index(_known("position", self["position"], names)))
-
-    @property
-    def path(self) -> Steps:
-        """The path of a value."""
-        path = self["path"]
-        if not isinstance(path, list) or not path:
-            raise ActionError("a path is a list of keys and indices")
-        return tuple(step if isinstance(step, int) else str(step) for step in path)
 
     def vector(self, name: str) -> Array:
         """Return an argument with a co-ordinate for each axis."""
@@ -183,7 +182,7 @@ def _put(action: Action) -> Outcome:
     """
     draft = action.draft
     if action.get("like") is not None:
-        place = replace(action, arguments={"position": action["like"]}).position
+        place = action.position_of(action["like"])
     else:
         place = draft.positions[-1] if draft.positions else _whole(draft)
     place = replace(place, name=free_name(draft, place.name), enabled=True)
@@ -266,7 +265,7 @@ def _switched_on(action: Action) -> Outcome:
 def _repaired(action: Action) -> Outcome:
     """Apply the edits of a suggested repair to the file."""
     needed = [
-        Edit(replace(action, arguments=edit).path, to_list(edit["value"]), bool(edit["is_new"]))
+        Edit(_steps(edit["path"]), to_list(edit["value"]), bool(edit["is_new"]))
         for edit in action["edits"]
     ]
     return [*changes_of(action.draft, needed)]
@@ -277,36 +276,42 @@ def _planned(action: Action) -> Outcome:
     switched off and stay in the file, as does the pool, less the certificates, which could be had
     twice otherwise.
     """
-    data, names = to_python(action.draft.tree), action.get("calibration", ())
+    data = to_python(action.draft.tree)
     chosen = {str(settings["name"]): settings for settings in to_list(action["positions"])}
     read = {
         str(entry.get("name")): k
         for k, entry in enumerate(entries_of(action.draft))
         if entry.get("enabled", True)
     }
-    new = [name for name in chosen if name not in read]
-    count = len(data.get("positions") or ())
+    new, count = [name for name in chosen if name not in read], len(data.get("positions") or ())
     index = read | {name: count + k for k, name in enumerate(new)}
-    order = [*range(count + len(new))]
-    for k, name in zip(sorted(index[name] for name in chosen), chosen, strict=True):
-        order[k] = index[name]
+    off = [TextChange(("positions", read[k], "enabled"), False) for k in read if k not in chosen]
+    further = [chosen[name] | {"name": free_name(action.draft, name)} for name in new]
+    return [
+        *off,
+        *(TextChange(("positions",), settings, "append") for settings in further),
+        *_in_sequence(count + len(new), [index[name] for name in chosen]),
+        *_had(data, action.get("calibration", ())),
+    ]
+
+
+def _in_sequence(count: int, sequence: Sequence[int]) -> list[TextChange]:
+    """Return the change that puts some of `count` positions in sequence, at the places that they
+    have together; none if they are.
+    """
+    order = [*range(count)]
+    for place, k in zip(sorted(sequence), sequence, strict=True):
+        order[place] = k
+    return [] if order == [*range(count)] else [TextChange(("positions",), order, "order")]
+
+
+def _had(data: Any, names: Container[str]) -> list[TextChange]:
+    """Return the changes that make calibration of items of the pool."""
     priced = (data.get("pool") or {}).get("calibration") or ()
     had = [k for k, item in enumerate(priced) if item["name"] in names]
-    entries = [
-        *(("positions", chosen[name] | {"name": free_name(action.draft, name)}) for name in new),
-        *(
-            ("calibration", {key: priced[k][key] for key in priced[k] if key not in PRICED})
-            for k in had
-        ),
-    ]
+    items = [{key: priced[k][key] for key in priced[k] if key not in PRICED} for k in had]
     return [
-        *(
-            TextChange(("positions", read[name], "enabled"), False)
-            for name in read
-            if name not in chosen
-        ),
-        *(TextChange((key,), to_list(entry), "append") for key, entry in entries),
-        *([TextChange(("positions",), order, "order")] if order != sorted(order) else []),
+        *(TextChange(("calibration",), to_list(item), "append") for item in items),
         *_without(data, ("pool", "calibration"), had),
     ]
 
@@ -361,7 +366,7 @@ def _set(action: Action) -> Outcome:
     """Set a value at a path, in the form of a file; an absent value removes it, and one at a last
     step of + is a further entry of a list.
     """
-    steps, text = action.path, str(action["value"])
+    steps, text = _steps(action["path"]), str(action["value"])
     if steps[-1] == "+":
         return [TextChange(steps[:-1], value_of(text), "append")]
     if not text.strip():
@@ -372,6 +377,16 @@ def _set(action: Action) -> Outcome:
 def _written(action: Action) -> Outcome:
     """Replace the text."""
     return str(action["text"])
+
+
+def _steps(path: Any) -> Steps:
+    """Return the path of a value.
+
+    :raises ActionError: it is none.
+    """
+    if not isinstance(path, list) or not path:
+        raise ActionError("a path is a list of keys and indices")
+    return tuple(step if isinstance(step, int) else str(step) for step in path)
 
 
 def value_of(text: str) -> Any:

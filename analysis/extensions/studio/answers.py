@@ -19,6 +19,7 @@ from ballplate.extensions.pages.motions import (
 from ballplate.extensions.pages.page_facts import target_in_words
 from ballplate.extensions.repair.written import plane_of
 from ballplate.extensions.sweeps.error_map_uncertainty import LEVELS, in_slices, point_map
+from ballplate.planning import run_sheet
 from ballplate.presentation import Data, percent, picked, uncertainty_words
 from ballplate.rank import Verdict, verdict
 from ballplate.simulator.computing import single_threaded
@@ -118,6 +119,17 @@ def rows(quantities: Mapping[str, Quantity]) -> list[Data]:
     names = ("symbol", "description", "maximum", "average", "unit", "count", "undetermined")
     shown = [each for each in quantities.values() if ", " not in each.unit]
     return [picked(each, *names, "largest", "within_target") for each in shown]
+
+
+def hours_of(experiment: Experiment) -> Data:
+    """Return the `hours` that the positions of an experiment, read for planning, take in the order
+    of least change-over, and whether their times are `usual` ones, as the file states none.
+    """
+    planned = experiment if experiment.pool else experiment.with_({"pool": {}})
+    assert planned.pool is not None
+    drawn = [candidate for candidate in planned.pool.candidates if candidate.drawn]
+    hours = run_sheet(drawn, planned.pool.changes).hours
+    return {"hours": hours, "usual": planned is not experiment}
 
 
 def scene(experiment: Experiment, problems: Mapping[str, str]) -> dict[str, Any]:

@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 from ballplate.extensions.repair.positions import PLANES, probes_across
 from ballplate.extensions.repair.yamltext import TextChange
-from ballplate.planning import run_sheet
 from ballplate.presentation import Data
 from ballplate.simulator.experiment import Experiment, Position
 from ballplate.simulator.geometry import AXIS_INDEX, IN_PLANE_AXES, Axis, corners
@@ -22,17 +21,6 @@ MOST_OUTLINES, MOST_NAMED = 1000, 2000
 TENTH = 1e-4
 
 GROUP_KEYS = frozenset({"planes", "levels", "corners", "centres"})
-
-
-def hours_of(experiment: Experiment) -> Data:
-    """Return the `hours` that the positions of an experiment, read for planning, take in the order
-    of least change-over, and whether their times are `usual` ones, as the file states none.
-    """
-    planned = experiment if experiment.pool else experiment.with_({"pool": {}})
-    assert planned.pool is not None
-    drawn = [candidate for candidate in planned.pool.candidates if candidate.drawn]
-    hours = run_sheet(drawn, planned.pool.changes).hours
-    return {"hours": hours, "usual": planned is not experiment}
 
 
 def pool_of(experiment: Experiment) -> Data:

@@ -25,10 +25,10 @@ from ballplate.simulator.inputs import (
 from ballplate.uncertainty import uncertainties
 
 from .actions import draft_after
-from .answers import MAPS, motions, rows, scene, summary
+from .answers import MAPS, hours_of, motions, rows, scene, summary
 from .document import DesignDocument, data_of, variants_of
 from .drafts import draft_of, draft_with, evaluable, evaluable_of, problems
-from .filling import hours_of, pool_of
+from .filling import pool_of
 from .processes import Work
 
 Arguments = Mapping[str, Any]
@@ -128,10 +128,11 @@ def _matrix(document: DesignDocument, arguments: Arguments, report: Report) -> d
     information = optional_service("position_information")
     if information is None:
         return {}
-    experiment, candidates = evaluable_of(document), []
+    draft, candidates = draft_of(document), []
+    experiment = evaluable(draft)
     if settings := arguments.get("settings"):
         change = TextChange(("positions",), to_list(settings), "append")
-        candidates.append(evaluable(draft_with(draft_of(document), [change])))
+        candidates.append(evaluable(draft_with(draft, [change])))
     # A candidate that cannot be read is none.
     added = [each for each in candidates if len(each.positions) > len(experiment.positions)]
     data: dict[str, Any] = information(check(experiment), added).to_dict()

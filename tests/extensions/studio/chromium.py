@@ -10,7 +10,13 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+import pytest
+
 from tests.extensions.pages.browser import program
+
+pytest.importorskip("starlette", reason="the studio is an extra")
+INSTALL = "python -m pip install 'ballplate[test,browser]', and a Chromium"
+pytest.importorskip("playwright", reason=f"no browser is driven without it: {INSTALL}")
 
 # A picture in three dimensions without a graphics card.
 FLAGS = (
@@ -68,6 +74,13 @@ def chromium() -> str | None:
     return fetched if Path(fetched).exists() else None
 
 
+IN_BROWSER = (
+    pytest.mark.browser,
+    pytest.mark.skipif(chromium() is None, reason=f"no Chromium on this machine: {INSTALL}"),
+)
+"""Marks of tests that need a browser."""
+
+
 @contextmanager
 def tab(width: int = 1400, height: int = 900, touches: bool = False) -> Iterator:
     """A tab of a browser, on a touch screen or not, with `errors`, what went wrong in it, and
@@ -90,6 +103,12 @@ def tab(width: int = 1400, height: int = 900, touches: bool = False) -> Iterator
         page.set_default_timeout(60_000)
         yield page
         browser.close()
+
+
+def opened(page, studio: Studio) -> None:
+    """Open a studio's page, and wait for its design with its figures."""
+    page.goto(studio.address)
+    until(page, "!!window.studio?.state()?.design && !window.studio.state().pending")
 
 
 def until(page, expression: str, seconds: float = 60.0) -> None:

@@ -10,17 +10,9 @@ from pathlib import Path
 import pytest
 from ballplate.designs import shipped
 
-from tests.extensions.studio.chromium import Studio, chromium, settled, tab, until
+from tests.extensions.studio.chromium import IN_BROWSER, Studio, opened, settled, tab, until
 
-pytest.importorskip("starlette", reason="the studio is an extra")
-INSTALL = "python -m pip install 'ballplate[test,browser]', and a Chromium"
-pytest.importorskip("playwright", reason=f"no browser is driven without it: {INSTALL}")
-
-pytestmark = [
-    pytest.mark.browser,
-    pytest.mark.slow,
-    pytest.mark.skipif(chromium() is None, reason=f"no Chromium on this machine: {INSTALL}"),
-]
+pytestmark = [*IN_BROWSER, pytest.mark.slow]
 
 CALLS = """(() => { const { handlers } = window.studio.view; window.calls = [];
 for (const name of ['onDrag', 'onDrop', 'onPlace']) { const before = handlers[name];
@@ -38,8 +30,7 @@ def page(tmp_path: Path) -> Iterator:
     path = tmp_path / "plate.yaml"
     path.write_bytes(Path(shipped("quickstart.yaml")).read_bytes())
     with Studio(path) as studio, tab() as page:
-        page.goto(studio.address)
-        until(page, "!!window.studio?.state()?.design && !window.studio.state().pending")
+        opened(page, studio)
         page.click("#positions button.name >> nth=0")
         page.evaluate(CALLS)
         page.wait_for_timeout(200)

@@ -12,17 +12,9 @@ from pathlib import Path
 import pytest
 from ballplate.designs import shipped
 
-from tests.extensions.studio.chromium import Studio, chromium, settled, tab, until
+from tests.extensions.studio.chromium import IN_BROWSER, Studio, settled, tab, until
 
-pytest.importorskip("starlette", reason="the studio is an extra")
-INSTALL = "python -m pip install 'ballplate[test,browser]', and a Chromium"
-pytest.importorskip("playwright", reason=f"no browser is driven without it: {INSTALL}")
-
-pytestmark = [
-    pytest.mark.browser,
-    pytest.mark.slow,
-    pytest.mark.skipif(chromium() is None, reason=f"no Chromium on this machine: {INSTALL}"),
-]
+pytestmark = [*IN_BROWSER, pytest.mark.slow]
 
 # What can be pressed and is smaller than 24 pixels, other than links within sentences; radio buttons
 # are pressed with their labels.

@@ -7,17 +7,9 @@ from pathlib import Path
 import pytest
 from ballplate.designs import shipped
 
-from tests.extensions.studio.chromium import Studio, chromium, settled, tab, until
+from tests.extensions.studio.chromium import IN_BROWSER, Studio, opened, settled, tab, until
 
-pytest.importorskip("starlette", reason="the studio is an extra")
-INSTALL = "python -m pip install 'ballplate[test,browser]', and a Chromium"
-pytest.importorskip("playwright", reason=f"no browser is driven without it: {INSTALL}")
-
-pytestmark = [
-    pytest.mark.browser,
-    pytest.mark.slow,
-    pytest.mark.skipif(chromium() is None, reason=f"no Chromium on this machine: {INSTALL}"),
-]
+pytestmark = [*IN_BROWSER, pytest.mark.slow]
 
 TEXT = Path(shipped("quickstart.yaml")).read_text(encoding="utf-8")
 
@@ -27,11 +19,6 @@ def design(tmp_path: Path) -> Path:
     path = tmp_path / "plate.yaml"
     path.write_text(TEXT, encoding="utf-8")
     return path
-
-
-def opened(page, studio: Studio) -> None:
-    page.goto(studio.address)
-    until(page, "!!window.studio?.state()?.design && !window.studio.state().pending")
 
 
 def act(page, **action: object) -> dict:

@@ -14,17 +14,9 @@ import pytest
 from ballplate.designs import shipped
 
 from tests.extensions.studio import wording
-from tests.extensions.studio.chromium import Studio, chromium, settled, tab, until
+from tests.extensions.studio.chromium import IN_BROWSER, Studio, settled, tab, until
 
-pytest.importorskip("starlette", reason="the studio is an extra")
-INSTALL = "python -m pip install 'ballplate[test,browser]', and a Chromium"
-pytest.importorskip("playwright", reason=f"no browser is driven without it: {INSTALL}")
-
-pytestmark = [
-    pytest.mark.browser,
-    pytest.mark.slow,
-    pytest.mark.skipif(chromium() is None, reason=f"no Chromium on this machine: {INSTALL}"),
-]
+pytestmark = [*IN_BROWSER, pytest.mark.slow]
 
 # Nothing sticks out of the page, other than inside parts that scroll by themselves.
 OUTSIDE = """[...document.querySelectorAll('body *')].filter(one =>

@@ -10,16 +10,9 @@ from typing import Any
 import ballplate as bp
 import pytest
 
-from tests.extensions.studio.chromium import Studio, chromium, settled, tab, until
+from tests.extensions.studio.chromium import IN_BROWSER, Studio, settled, tab, until
 
-pytest.importorskip("starlette", reason="the studio is an extra")
-pytest.importorskip("playwright", reason="no browser is driven without it")
-
-pytestmark = [
-    pytest.mark.browser,
-    pytest.mark.long,
-    pytest.mark.skipif(chromium() is None, reason="no Chromium on this machine"),
-]
+pytestmark = [*IN_BROWSER, pytest.mark.long]
 
 STATE = "window.studio.state()"
 

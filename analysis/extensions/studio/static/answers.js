@@ -234,7 +234,6 @@ function assumed(found) {
 const SHOWN_UNITS = { m: "µm", rad: "µrad", 1: "ppm" };
 function quantities(found) {
   const { kept } = page.state;
-  const units = (unit) => unit.split(", ").map((one) => SHOWN_UNITS[one] ?? one).join(", ");
   const cell = (row, key) => {
     const before = kept?.quantities.find(({ symbol }) => symbol === row.symbol)?.[key];
     return [micro(row[key]), before === undefined ? null
@@ -246,7 +245,7 @@ function quantities(found) {
       one.undetermined && one.undetermined < one.count
         ? ` (${one.undetermined} of ${one.count} undetermined)` : ""),
     ...(one.average === null && !kept ? [make("td", { colspan: "2" }, "undetermined")]
-      : [cell(one, "average"), cell(one, "maximum")]), units(one.unit)];
+      : [cell(one, "average"), cell(one, "maximum")]), SHOWN_UNITS[one.unit] ?? one.unit];
   fill($("quantities"),
     table(["standard uncertainty of", "average", "max.", ""], found.map(row)));
 }
