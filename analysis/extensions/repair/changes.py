@@ -11,13 +11,12 @@ from enum import IntEnum
 import numpy as np
 from ballplate.simulator.design import (
     Calibration,
-    CoordinateCalibration,
     DistanceCalibration,
     Indices,
     Volume,
 )
 from ballplate.simulator.experiment import Experiment, Position, Probe, ReadingGroup
-from ballplate.simulator.geometry import ArtefactSettings, BallLayout, Pose, ball_coordinates, pairs
+from ballplate.simulator.geometry import BallLayout, Pose, ball_coordinates, pairs
 from ballplate.simulator.machines import Array
 
 
@@ -29,8 +28,6 @@ class ChangeKind(IntEnum):
     READ_MORE = 2
     CERTIFICATE = 3
     ADD_POSITION = 4
-    ARTEFACT = 5
-    MODEL = 6
 
 
 # What a calibrated distance, and setting up a position, take as many readings for.
@@ -47,8 +44,6 @@ KINDS = {
     ChangeKind.READ_MORE: "more readings in a position",
     ChangeKind.CERTIFICATE: "calibration",
     ChangeKind.ADD_POSITION: "more positions",
-    ChangeKind.ARTEFACT: "more balls",
-    ChangeKind.MODEL: "fewer coefficients",
 }
 
 
@@ -202,61 +197,6 @@ def ball_set(layout: BallLayout, chosen: Indices) -> str | None:
     if len(wanted) == len(layout.names):
         return "all"
     return "corners" if layout.corner_set and wanted == set(layout.corner_set) else None
-
-
-def with_artefact(
-    experiment: Experiment, name: str, settings: ArtefactSettings
-) -> Experiment | None:
-    """Return the experiment with another artefact of that name, if the statements on its balls
-    still apply.
-    """
-    old, new = experiment.layouts[name], settings.layout()
-    places = []
-    for place in experiment.positions:
-        if place.artefact == name:
-            if any(ball_set(old, group.ball_indices) != "all" for group in place.readings):
-                return None
-            every = np.arange(len(new.names))
-            groups = tuple(
-                replace(group, balls=new.names, ball_indices=every) for group in place.readings
-            )
-            place = replace(place, readings=groups)
-        places.append(place)
-    items = []
-    for item in experiment.calibration:
-        if item.artefact == name:
-            carried = _carried_over(item, old, new)
-            if carried is None:
-                return None
-            item = carried
-        items.append(item)
-    return replace(
-        experiment,
-        artefacts={**experiment.artefacts, name: settings},
-        layouts={**experiment.layouts, name: new},
-        positions=tuple(places),
-        calibration=tuple(items),
-    )
-
-
-def _carried_over(item: Calibration, old: BallLayout, new: BallLayout) -> Calibration | None:
-    if isinstance(item, DistanceCalibration):
-        chosen = pair_set(old, item.pairs)
-        if (
-            chosen is None
-            or chosen not in (*new.pair_sets, "all")
-            or item.certified
-            or item.standard_uncertainty is None
-        ):
-            return None
-        return distances(item, new, pairs(new, chosen))
-    if isinstance(item, CoordinateCalibration):
-        balls = ball_set(old, item.balls)
-        if balls is None or item.certified:
-            return None
-        indices = np.arange(len(new.names)) if balls == "all" else np.array(new.corner_set, np.intp)
-        return replace(item, balls=indices, values=new.coordinates[indices][:, list(item.axes)])
-    return None
 
 
 def distances(

@@ -11,7 +11,6 @@ from .certificates import certificates
 from .changes import Change, ChangeKind, with_calibration, with_position
 from .moves import more_readings, moves, repeats
 from .positions import positions
-from .reductions import fewer_coefficients, more_balls
 
 Generator = Callable[[Experiment], Iterator[Change]]
 
@@ -32,7 +31,6 @@ def offers(experiment: Experiment, is_deficient: bool = True) -> dict[ChangeKind
         makers.append((ChangeKind.POOL, pool_additions))
     else:
         makers += [(ChangeKind.CERTIFICATE, certificates), (ChangeKind.ADD_POSITION, positions)]
-    makers += [(ChangeKind.ARTEFACT, more_balls), (ChangeKind.MODEL, fewer_coefficients)]
     by_kind: dict[ChangeKind, list[Change]] = {
         kind: [] for kind, _ in sorted(makers, key=lambda maker: maker[0])
     }

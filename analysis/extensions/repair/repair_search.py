@@ -6,7 +6,7 @@ design computed in full; every member is necessary.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from math import inf
 
@@ -77,13 +77,12 @@ class Repair:
         return scale is not None and scale.rests_on_offsets
 
     @property
-    def order(self) -> tuple[bool, bool, float, float]:
-        """Sort key: first repairs in more than name without a reduced model, then by U6 with
-        uncertain offsets, then by time.
+    def order(self) -> tuple[bool, float, float]:
+        """Sort key: first repairs in more than name, then by U6 with uncertain offsets, then by
+        time.
         """
         u6 = inf if self.loosened is None else self.loosened.total / self.loosened.count
-        asks_for_less = any(change.kind == ChangeKind.MODEL for change in self.changes)
-        return bool(self.weak) or self.is_faint, asks_for_less, float(comparable(u6)), self.seconds
+        return bool(self.weak) or self.is_faint, float(comparable(u6)), self.seconds
 
 
 @dataclass(frozen=True)
@@ -144,8 +143,7 @@ class _Search:
         steps = counted(candidates.items(), "kinds of changes", len(candidates), report)
         for kind, changes in steps:
             sound = sum(self.is_sound(self.judge(change)) for change in best.values())
-            if sound >= self.most or (kind == ChangeKind.MODEL and sound > 1):
-                # To ask for less is the last resort.
+            if sound >= self.most:
                 break
             whole, part = self.singles(kind, changes)
             singles += [*whole, *part]
@@ -197,38 +195,20 @@ class _Search:
         offered: Mapping[ChangeKind, Sequence[Change]],
         best: Mapping[ChangeKind, ChangeSet],
     ) -> Iterator[ChangeSet]:
-        """Return sets of changes if the only sound repairs reduce the model: additions first, then
-        moves too.
+        """Return sets of changes of several kinds if no kind is enough: additions first, then
+        moves, then both.
         """
-
-        def is_enough(some: Iterable[ChangeSet]) -> bool:
-            return any(self.is_sound(self.judge(change)) for change in some)
-
-        if is_enough(change for kind, change in best.items() if kind < ChangeKind.ARTEFACT):
+        if any(self.is_sound(self.judge(changes)) for changes in best.values()):
             return
-        additions = [change for changes in offered.values() for change in changes]
-        together = self.set_of_additions(additions)
+        together = self.set_of_additions([change for kind in offered for change in offered[kind]])
         if together:
             yield together
-            if is_enough([together]):
+            if self.is_sound(self.judge(together)):
                 return
-        for kind in (
-            ChangeKind.MOVE,
-            *(() if is_enough(best.values()) else (ChangeKind.ARTEFACT, ChangeKind.MODEL)),
-        ):
-            changes = [
-                change
-                for second_kind in offered
-                if second_kind <= kind
-                for change in self.thinned(self.useful(offered[second_kind]))
-            ]
-            together = self.greedy(
-                offered.get(ChangeKind.MOVE, []) if kind == ChangeKind.MOVE else changes
-            )
-            together = together or (self.greedy(changes) if kind == ChangeKind.MOVE else ())
-            if together:
-                yield together
-                return
+        every = [change for kind in offered for change in self.thinned(self.useful(offered[kind]))]
+        together = self.greedy(offered[ChangeKind.MOVE]) or self.greedy(every)
+        if together:
+            yield together
 
     def useful(self, changes: Sequence[Change]) -> list[Change]:
         """Return changes, without those that add only known directions."""
@@ -400,7 +380,7 @@ class _Search:
         for k in range(self.before.deficiency):
             for change in order:
                 after = self.judge((change,))
-                if change.kind < ChangeKind.MODEL and 0 < after.deficiency < self.before.deficiency:
+                if 0 < after.deficiency < self.before.deficiency:
                     gone = removed(open_errors, after.open_errors)
                     if k in gone:
                         by_change[change] = gone

@@ -63,12 +63,9 @@ class Edit:
 def edits(before: Experiment, after: Experiment) -> tuple[Edit, ...]:
     """Return the changes that turn the file of `before` into that of `after`.
 
-    Positions, calibration, probes, sizes of artefacts and of the error model are compared.
+    Positions, calibration and probes are compared.
     """
     changes = []
-    for name, artefact in after.artefacts.items():
-        changes += _fields(("artefacts", name), before.artefacts[name], artefact)
-    changes += _fields(("error_model",), before.error_model, after.error_model)
     for name, probe in after.probes.items():
         if name not in before.probes:
             changes.append(Edit(("probes", name), [written_length(v) for v in probe.offset]))
@@ -115,13 +112,6 @@ def edits(before: Experiment, after: Experiment) -> tuple[Edit, ...]:
 def lacks_probes(settings: Mapping[str, Any]) -> bool:
     """True if a position in a file omits the probes that read it."""
     return any("probes" not in group for group in settings.get("readings", [settings]))
-
-
-def _fields(steps: tuple[Step, ...], before: Any, after: Any) -> list[Edit]:
-    if before == after:
-        return []
-    old, new = before.model_dump(), after.model_dump()
-    return [Edit((*steps, key), to_list(value)) for key, value in new.items() if value != old[key]]
 
 
 def position_settings(experiment: Experiment, position: Position) -> dict[str, Any]:

@@ -19,7 +19,6 @@ from ballplate.extensions.repair.covering import different
 from ballplate.extensions.repair.judging import examine, judge
 from ballplate.extensions.repair.mending import mended, to_write
 from ballplate.extensions.repair.offers import offers
-from ballplate.extensions.repair.reductions import fewer_coefficients
 from ballplate.extensions.repair.repair_search import Repair, Repairs, repairs
 from ballplate.extensions.repair.repair_tables import repair_lines
 from ballplate.extensions.repair.screening import rank_of, seen_by
@@ -222,23 +221,18 @@ evaluation: {points: {random: 20, seed: 1}, probe: down}
 """
 
 
-def test_a_model_is_not_made_poorer_where_more_readings_help(tmp_path: Path) -> None:
+def test_more_readings_help_two_level_positions(tmp_path: Path) -> None:
     path = tmp_path / "flat.yaml"
     path.write_text(FLAT)
     experiment = load(path)[0]
     found = repairs(experiment)
     assert found is not None and found.complete
     for one in found.complete:
-        assert not any(change.kind is ChangeKind.MODEL for change in one.changes)
         problem = dense.planned(lay_out(apply_all(one.changes, experiment)), 4, 4)
         whole = dense.jacobian(
             lambda step, of=problem: dense.residuals(of, step), problem.parameters
         )  # type: ignore[misc]
         assert dense.spread(whole).deficiency == 0
-    # Where a poorer model is offered, its words say what becomes of the rest.
-    words = [one.words for one in offers(experiment)[ChangeKind.MODEL]]
-    assert words and all(one.endswith(wording.HOLDING_THE_OTHERS_AT_ZERO) for one in words)
-    assert not any(wording.ESTIMATE_COEFFICIENT_OF_ROTATIONAL in one for one in words)
 
 
 def test_words_name_errors_and_positions() -> None:
@@ -382,24 +376,6 @@ def loaded(said: dict[str, Any], folder: Path) -> Experiment:
     path.write_text(yaml.safe_dump(said), encoding="utf-8")
     (found,) = load(path)
     return found
-
-
-def test_coefficients_are_reduced_along_each_axis_of_polynomials(tmp_path: Path) -> None:
-    said = one_plane()
-    said["error_model"] = {"kind": "empirical", "basis": {"y": {"order": 3}},
-                           "coefficients": {"x": 4, "z": 3}}  # fmt: skip
-    changes = list(fewer_coefficients(loaded(said, tmp_path)))
-    assert [one.words.partition(" instead")[0] for one in changes] == [
-        "estimate 3 coefficients along x",
-        "estimate 2 coefficients along x",
-        "estimate 2 coefficients along z",
-    ]
-    changed = [one.apply(loaded(said, tmp_path)).error_model for one in changes]
-    for model, counts in zip(
-        changed, ({"x": 3, "z": 3}, {"x": 2, "z": 3}, {"x": 4, "z": 2}), strict=True
-    ):
-        said["error_model"]["coefficients"] = counts
-        assert model == loaded(said, tmp_path).error_model
 
 
 @pytest.mark.parametrize("trap", sorted(TRAPS))

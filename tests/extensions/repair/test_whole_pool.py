@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from ballplate.cli import main
 from ballplate.extensions.repair import whole_pool
-from ballplate.extensions.repair.changes import ChangeKind, apply_all
+from ballplate.extensions.repair.changes import apply_all
 from ballplate.extensions.repair.whole_pool import PoolGap, pool_gap, spanning
 from ballplate.planning.information import pool_information
 from ballplate.results.checked_designs import planned_uncertainty
@@ -89,11 +89,9 @@ def test_what_the_whole_pool_leaves_open_is_that_of_a_dense_computation(
     read = {one.name for one in some.positions}
     others = tuple(one for one in whole.positions if one.name not in read)
     for one in found.cures:
-        # A cure may be a poorer error model, which the dense computation would have to be told.
-        if not any(change.kind is ChangeKind.MODEL for change in one.changes):
-            cured = apply_all(one.changes, some)
-            assert dense_deficiency(cured) == 0
-            assert dense_deficiency(replace(cured, positions=cured.positions + others)) == 0
+        cured = apply_all(one.changes, some)
+        assert dense_deficiency(cured) == 0
+        assert dense_deficiency(replace(cured, positions=cured.positions + others)) == 0
 
 
 def test_turns_that_single_positions_leave_open_are_counted(tmp_path: Path) -> None:

@@ -8,7 +8,6 @@ CANNOT_BE_WRITTEN_AS_IT_WAS = "cannot be written in this form"
 CHANGES_THAT_WOULD_DETERMINE = "changes that would determine it"
 DIFF_CANNOT_BE_COMBINED = "--diff cannot be combined with --format json"
 EMPTY_ADD_POSITIONS = "positions: empty; add positions, or choose some from the pool"
-ESTIMATE_COEFFICIENT_OF_ROTATIONAL = "estimate 1 coefficient of rotational"
 EVEN_ALL_CANDIDATES_TOGETHER_LEAVE_DIRECTIONS = (
     "even all 8 candidates together leave 2 directions undetermined (EAZ, ECZ, EYZ)"
 )
@@ -25,7 +24,6 @@ EVERY_BAR_LIES_PARALLEL_TO_THE_XZ = (
     "squareness to X and Z"
 )
 FULL_RANK_AND_NOTHING_IS_WEAKLY = "full rank, and no weak direction; average U6 0.2"
-HOLDING_THE_OTHERS_AT_ZERO = "holding the others at zero"
 NOTHING_DETERMINES_THE_SCALE_OF_NOR = (
     "nothing determines the scale of Y nor its squareness to X and Z nor a combination of "
     "the scale of X and the scale of Z"
