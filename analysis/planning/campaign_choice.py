@@ -171,7 +171,7 @@ def _campaign(
     gap = None
     gap_of = optional_service("pool_gap") if information.deficiency else None
     if gap_of is not None:
-        gap = gap_of(steady, pool.candidates, information, report)
+        gap = gap_of(steady, pool.candidates, information)
     try:
         wanted = criterion(information, experiment, request.criterion)
     except ExperimentError as error:

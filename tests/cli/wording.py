@@ -58,10 +58,7 @@ ESTIMATOR_DISTANCES_LENGTHS_OF_STANDARDS_AGAINST = (
     "estimator distances (12 lengths of standards) against"
 )
 EVERY_BAR_LIES_PARALLEL = "every bar lies parallel to the xy plane"
-EVERY_BAR_LIES_PARALLEL_TO_THE_XY = (
-    "reason: every bar lies parallel to the xy plane: nothing determines the scale of Z "
-    "nor its squareness"
-)
+EVERY_BAR_LIES_PARALLEL_TO_THE_XY = "reason: every bar lies parallel to the xy plane"
 EXX_POSITIONING_ERROR = "EXX (positioning error of X, quadratic)"
 FAR_OUTSIDE_THE_VOLUME = "far outside the volume; check the unit"
 FINISHED_CELLS_ARE_IN_NEW_SQLITE = "finished cases are in new.sqlite"

@@ -16,7 +16,6 @@ from ballplate.rank import relative_changes
 from ballplate.simulator.computing import comparable
 from ballplate.simulator.design import Design, Lengths, SharedLayout
 from ballplate.simulator.geometry import without_rigid_motion
-from ballplate.simulator.inputs import listed
 from ballplate.simulator.machines import Array
 
 AXES = "xyz"
@@ -45,11 +44,8 @@ def bar_reasons(design: Design, layout: SharedLayout, open_: Array) -> tuple[str
             f"no length is known ({names}): the overall scale of the machine is undetermined"
             " until one is calibrated"
         )
-    unseen = _less(strains, overall) if is_free else strains
-    missing = _what_is_missing(design, strains) if unseen.shape[1] else ""
-    if missing:
-        lines = _told(strains, design.dimension, is_free)
-        reasons.append(f"{missing}: nothing determines {lines}")
+    if strains.shape[1] > is_free:
+        reasons += filter(None, [_what_is_missing(design, strains)])
     return tuple(reasons)
 
 
@@ -110,47 +106,6 @@ def _what_is_missing(design: Design, strains: Array) -> str:
     return f"the {who} are too few or too similar"
 
 
-def _told(strains: Array, d: int, without_one: bool) -> str:
-    """Return text for scales and squareness that are separately undetermined, and for mixtures of
-    others, one of these omitted.
-    """
-    pairs = list(combinations_with_replacement(range(d), 2))
-    pure = [
-        pair
-        for pair, unit in zip(pairs, np.eye(len(pairs)), strict=True)
-        if _is_among(unit, strains)
-    ]
-    scales = [AXES[i].upper() for i, j in pure if i == j]
-    square = [(AXES[i].upper(), AXES[j].upper()) for i, j in pure if i < j]
-    words = []
-    if len(scales) == 1 and square and all(scales[0] in pair for pair in square):
-        axes_named = [a if b == scales[0] else b for a, b in square]
-        words.append(f"the scale of {scales[0]} nor its squareness to {' and '.join(axes_named)}")
-    else:
-        if scales:
-            words.append(f"the {'scales' if len(scales) > 1 else 'scale'} of {listed(scales)}")
-        if square:
-            words.append(f"the squareness of {listed([f'{b} to {a}' for a, b in square])}")
-    more = strains.shape[1] - len(pure) - without_one
-    if more > 0:
-        touched = np.abs(strains).max(axis=1) > MISSING
-        for pair in pure:
-            touched[pairs.index(pair)] = False
-        names = [
-            (
-                f"the scale of {AXES[i].upper()}"
-                if i == j
-                else f"the squareness of {AXES[j].upper()} to {AXES[i].upper()}"
-            )
-            for (i, j), component in zip(pairs, touched, strict=True)
-            if component
-        ]
-        words.append(
-            f"{'a combination' if more == 1 else f'{more} combinations'} of {listed(names)}"
-        )
-    return " nor ".join(words)
-
-
 def _axis(vector: Array) -> str:
     k = int(comparable(np.abs(vector)).argmax())
     if abs(vector[k]) > 1.0 - MISSING**2:
@@ -192,12 +147,6 @@ def _unit_strain(form: Array) -> Array:
 def _is_among(strain: Array, span: Array) -> bool:
     """True if a strain of length one is a mixture of orthonormal ones."""
     return bool(np.linalg.norm(strain - span @ (span.T @ strain)) < 10 * MISSING)
-
-
-def _less(span: Array, direction: Array) -> Array:
-    """Orthonormal columns that span what of `span` is orthogonal to a direction in it."""
-    coefficients = span.T @ direction
-    return span @ _null_space(coefficients[None])
 
 
 def _null_space(rows: Array, size: float | None = None) -> Array:

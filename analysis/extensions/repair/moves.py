@@ -8,7 +8,7 @@ from itertools import product
 
 import numpy as np
 from ballplate.simulator.experiment import Experiment, Position, Probe
-from ballplate.simulator.geometry import AXIS_INDEX, QUARTER_TURNS, TwoSpheresSettings
+from ballplate.simulator.geometry import AXIS_INDEX, QUARTER_TURNS
 from ballplate.simulator.inputs import format_length
 from ballplate.simulator.machines import Array
 
@@ -22,7 +22,7 @@ from .changes import (
     with_pose,
     with_repeats,
 )
-from .placing import along_rotation, bars, clean, is_plate, middle_of, pitch
+from .placing import clean, is_plate, middle_of, pitch
 from .written import plane_of
 
 AXES = "xyz"
@@ -35,15 +35,11 @@ NEW_TIP = 1.5
 
 
 def moves(experiment: Experiment) -> Iterator[Change]:
-    """Positions that are read anyway, turned, shifted or laid otherwise."""
+    """Positions that are read anyway, turned or shifted."""
     volume = experiment.machine.volume
     for place in experiment.positions:
         layout = experiment.layouts[place.artefact]
-        for words, pose in (
-            *_turned(experiment, place),
-            *_shifted(experiment, place),
-            *_laid(experiment, place),
-        ):
+        for words, pose in (*_turned(experiment, place), *_shifted(experiment, place)):
             new = moved(place, *pose)
             if is_inside(new, layout, volume, experiment.probes):
                 description = words.format(f'position "{place.name}"')
@@ -82,21 +78,6 @@ def _shifted(experiment: Experiment, place: Position) -> Iterator[tuple[str, tup
                 level = format_length(place.pose.origin[axis] + by[axis])
                 words = f"move {{}} to the level {AXES[axis]} = {level}"
             yield words, (place.pose.rotation.copy(), clean(place.pose.origin + by))
-
-
-def _laid(experiment: Experiment, place: Position) -> Iterator[tuple[str, tuple[Array, Array]]]:
-    """A bar in other directions, about its middle."""
-    if not isinstance(experiment.artefacts[place.artefact], TwoSpheresSettings):
-        return
-    middle = middle_of(experiment.layouts[place.artefact])[: experiment.dimension]
-    centre = place.pose.rotation @ middle + place.pose.origin
-    for words, along in bars(experiment.dimension):
-        rotation = along_rotation(along)
-        if np.abs(rotation[:, 0] - place.pose.rotation[:, 0]).max() > 1e-9:
-            yield (
-                f"lay the bar of {{}} {words}",
-                (rotation, np.round(centre - rotation @ middle, 5) + 0.0),
-            )
 
 
 def more_readings(experiment: Experiment) -> Iterator[Change]:

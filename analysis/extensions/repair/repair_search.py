@@ -19,11 +19,11 @@ from ballplate.simulator.machines import Array
 from ballplate.uncertainty import OFFSET_TRIAL, PairSummary, lengths_with_offsets
 
 from .changes import EFFORT, Change, ChangeKind, apply_all, go_together, is_inside
-from .covering import covering_pairs, covering_set, different
+from .covering import covering_set
 from .judging import Examined, Judged, examine, judge, removed, work
 from .offers import allowed, offers
 from .scale import scale_certificate
-from .screening import rank_of, seen_by, weakest_of
+from .screening import rank_of, seen_by
 from .written import Edit, edits
 
 # Changes that are made together.
@@ -41,8 +41,6 @@ FEWEST_TOGETHER, MOST_TOGETHER = 3, 6
 WORK, FEWEST, MOST = 5e6, 12, 80
 # A smallest singular value below this fraction of what it was is a repair in name only.
 FAINT = 0.01
-# Sets of candidates that are verified before others are looked for.
-MOST_VERIFIED = 8
 
 
 @dataclass(frozen=True, eq=False)
@@ -305,29 +303,8 @@ class _Search:
     def set_of_additions(self, changes: Sequence[Change]) -> ChangeSet:
         """Return several additions that together determine every direction; possibly empty."""
         additions = [change for change in changes if change in self.seen and self.ranks[change]]
-        nominal: ChangeSet = ()
-        for together in self.cheapest_sets(additions):
-            after = self.judge(together)
-            if self.is_sound(after):
-                return together
-            nominal = nominal or (together if not after.deficiency else ())
-        return nominal
-
-    def cheapest_sets(self, additions: Sequence[Change]) -> list[ChangeSet]:
-        """Sets of additions that remove all null directions, the cheapest pairs first, then one
-        that is built up.
-        """
-        few = different(additions, self.seen)
-        sets = [
-            (few[i], few[k])
-            for i, k in covering_pairs([self.seen[change] for change in few])
-            if self.may_be((few[i], few[k]))
-        ]
-        weakest = comparable([weakest_of([self.seen[change] for change in pair]) for pair in sets])
-        order = sorted(range(len(sets)), key=lambda k: (sum(map(effort, sets[k])), -weakest[k]))
-        sets = [sets[k] for k in order]
-        built = covering_set(additions, self.seen, effort, self.may_be)
-        return [*sets[:MOST_VERIFIED], *([built] if len(built) > 1 else [])]
+        together = covering_set(additions, self.seen, effort, self.may_be)
+        return together if len(together) > 1 and not self.judge(together).deficiency else ()
 
     def may_be(self, changes: Sequence[Change]) -> bool:
         """True if changes are compatible, within the pool's limits and within the volume."""

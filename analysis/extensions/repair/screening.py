@@ -142,10 +142,3 @@ def rank_of(triangles: Sequence[Array]) -> int:
     if not triangles:
         return 0
     return int((np.linalg.svd(np.concatenate(list(triangles)), compute_uv=False) > SEEN).sum())
-
-
-def weakest_of(triangles: Sequence[Array]) -> float:
-    """Return the singular value, in standard deviations, of the direction that the triangles
-    determine least.
-    """
-    return float(np.linalg.svd(np.concatenate(list(triangles)), compute_uv=False)[-1])

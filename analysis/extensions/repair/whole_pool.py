@@ -1,4 +1,4 @@
-"""Parameters that all candidates of a pool together leave undetermined, and their cure."""
+"""Parameters that all candidates of a pool together leave undetermined."""
 
 from __future__ import annotations
 
@@ -10,25 +10,18 @@ from ballplate.planning import Information
 from ballplate.presentation import Data
 from ballplate.rank import Verdict, changed_names
 from ballplate.results import check
-from ballplate.simulator.computing import Report, comparable, unreported
+from ballplate.simulator.computing import comparable
 from ballplate.simulator.experiment import Candidate, Experiment, Position, with_chosen
 from ballplate.simulator.inputs import ExperimentError, listing
 
-from .repair_search import Repair, repairs
-from .repair_tables import changes_in_words
-
-# Names of errors, and cures, that are told.
-MOST_NAMES, MOST_CURES = 8, 2
+# Names of errors that are told.
+MOST_NAMES = 8
 
 # Positions that stand for all of a pool.
 MOST_SPANNING = 16
 
-# The search for changes takes about observations times parameters, so often as each direction is
-# looked at and this much besides; beyond the most of that, a few seconds, there is none.
-BESIDES, MOST_WORK = 20, 9e6
-
-# What a design with candidates, or the search for changes of it, may fail with.
-UNTOLD = (ExperimentError, AssertionError, np.linalg.LinAlgError)
+# What a design with candidates may fail with.
+UNTOLD = (ExperimentError, np.linalg.LinAlgError)
 
 # In units of what the whole pool knows: what is not known; and what a few candidates are to know of
 # everything, as a part of their fair share.
@@ -38,15 +31,11 @@ FAINT, EVEN = 1e-9, 0.1
 @dataclass(frozen=True, eq=False)
 class PoolGap:
     """Directions that all `candidates` of a pool leave undetermined, by the `verdict` of a design
-    with a subset that leaves the same; `cures` would determine all directions, otherwise `partial`
-    ones some, if they were `sought`.
+    with a subset that leaves the same.
     """
 
     candidates: int
     verdict: Verdict
-    cures: tuple[Repair, ...]
-    partial: tuple[Repair, ...]
-    sought: bool
 
     @property
     def words(self) -> str:
@@ -64,28 +53,15 @@ class PoolGap:
         """Text of the cure."""
         if self.verdict.as_expected:
             return "the file expects that"
-        if not self.sought:
-            return (
-                "changes that would determine it were not looked for in so large a design; check"
-                " --suggest looks for them in a file without a pool"
-            )
-        cures = self.cures or self.partial
-        if not cures:
-            return "no change was found that would determine it"
-        all_of_it = "it" if self.cures else "part of it"
-        remedies = "; or ".join(changes_in_words(cure) for cure in cures[:MOST_CURES])
         return (
-            f"changes that would determine {all_of_it}, added to the pool or to the design:"
-            f" {remedies}"
+            "add candidates that determine them; ballplate check --suggest proposes changes of a"
+            " design without a pool"
         )
 
     def to_dict(self) -> Data:
         return {
             "deficiency": self.verdict.deficiency,
             "undetermined": [str(direction) for direction in self.verdict.null],
-            "cures": [changes_in_words(cure) for cure in self.cures],
-            "partial_cures": [changes_in_words(partial_cure) for partial_cure in self.partial],
-            "cures_sought": self.sought,
         }
 
     def refusing(self, error: ExperimentError) -> ExperimentError:
@@ -97,17 +73,13 @@ class PoolGap:
 
 
 def pool_gap(
-    experiment: Experiment,
-    candidates: Sequence[Candidate],
-    information: Information,
-    report: Report = unreported,
+    experiment: Experiment, candidates: Sequence[Candidate], information: Information
 ) -> PoolGap | None:
     """Return the directions that the candidates of a pool (the first in `information`) leave
-    undetermined together, and their cure, if both computations agree.
+    undetermined together, if both computations agree.
 
     A few candidates with the rank of all represent all: they leave the same directions
-    undetermined, and a change that determines these with the few does so with all, whose
-    observations include theirs. The rank computed from the few must equal that of the pool.
+    undetermined. The rank computed from the few must equal that of the pool.
     """
     open_count = information.deficiency + information.balls_open
     # Words beside a plan, which is as good without them: nothing wrong with them is a reason to
@@ -122,16 +94,7 @@ def pool_gap(
         information.pose_open[k] for k in few
     ):
         return None
-    size = judged.observations * judged.parameters * (judged.deficiency + BESIDES)
-    is_sought = size <= MOST_WORK and not judged.as_expected
-    try:
-        repairs_found = repairs(design, report=report) if is_sought else None
-    except UNTOLD:
-        repairs_found = None
-    cures, partial = (
-        ((), ()) if repairs_found is None else (repairs_found.complete, repairs_found.partial)
-    )
-    return PoolGap(len(candidates), judged, cures, partial, is_sought)
+    return PoolGap(len(candidates), judged)
 
 
 def spanning(information: Information, candidates: Sequence[Candidate]) -> tuple[int, ...]:

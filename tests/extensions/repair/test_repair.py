@@ -15,7 +15,6 @@ import pytest
 import yaml
 from ballplate.extensions.repair import repair_search
 from ballplate.extensions.repair.changes import Change, ChangeKind, apply_all
-from ballplate.extensions.repair.covering import different
 from ballplate.extensions.repair.judging import examine, judge
 from ballplate.extensions.repair.mending import mended, to_write
 from ballplate.extensions.repair.offers import offers
@@ -458,24 +457,6 @@ def test_changes_that_lead_out_of_the_volume_do_not_go_together() -> None:
         inside[fits] += 1
         assert search.may_be(pair) == fits
     assert min(inside.values()) > 10
-
-
-def test_additions_that_say_the_same_are_taken_once() -> None:
-    """What rows say does not depend on how they are turned, nor whether a number in them is small
-    and differs by rounding.
-    """
-    rng = np.random.default_rng(2)
-
-    def change(cost: float) -> Change:
-        return Change(ChangeKind.CERTIFICATE, "", cost, frozenset(), lambda one: one)
-
-    size = np.array([1e-3, 1e-1, 1e1, 1e3])
-    said = [rng.normal(size=(6, 4)) * size for _ in range(3)]
-    turn = np.linalg.qr(rng.normal(size=(6, 6)))[0]
-    first, turned, dearer, other, last = (change(cost) for cost in (1.0, 1.0, 2.0, 1.0, 1.0))
-    seen = {first: said[0], turned: turn @ said[0], dearer: said[0], other: said[1], last: said[2]}
-    every = [first, turned, dearer, other, last]
-    assert different(every, seen) == [first, dearer, other, last]
 
 
 def pool_of(experiment: Experiment, seconds: list[float], at_most: tuple[AtMost, ...] = ()) -> Pool:

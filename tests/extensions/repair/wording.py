@@ -5,29 +5,18 @@ ADD_OF_THE_POOL_MIN = 'add "aside" of the pool (30 min)'
 A_COMMENT_HERE_WOULD = "a comment here would be lost"
 A_NEW_PROBE = "a new probe too"
 CANNOT_BE_WRITTEN_AS_IT_WAS = "cannot be written in this form"
-CHANGES_THAT_WOULD_DETERMINE = "changes that would determine it"
+ADD_CANDIDATES = "add candidates that determine them"
 DIFF_CANNOT_BE_COMBINED = "--diff cannot be combined with --format json"
 EMPTY_ADD_POSITIONS = "positions: empty; add positions, or choose some from the pool"
 EVEN_ALL_CANDIDATES_TOGETHER_LEAVE_DIRECTIONS = (
     "even all 8 candidates together leave 2 directions undetermined (EAZ, ECZ, EYZ)"
 )
-EVERY_BAR_LIES_PARALLEL = (
-    "every bar lies parallel to the xy plane: nothing determines the squareness of Z to X "
-    "and Z to Y"
-)
+EVERY_BAR_LIES_PARALLEL = "every bar lies parallel to the xy plane"
 EVERY_BAR_LIES_PARALLEL_TO_THE_PLANE = (
-    "every bar lies parallel to the plane perpendicular to (0.707, -0.707, 0): nothing "
-    "determines 3 combinations"
+    "every bar lies parallel to the plane perpendicular to (0.707, -0.707, 0)"
 )
-EVERY_BAR_LIES_PARALLEL_TO_THE_XZ = (
-    "every bar lies parallel to the xz plane: nothing determines the scale of Y nor its "
-    "squareness to X and Z"
-)
+EVERY_BAR_LIES_PARALLEL_TO_THE_XZ = "every bar lies parallel to the xz plane"
 FULL_RANK_AND_NOTHING_IS_WEAKLY = "full rank, and no weak direction; average U6 0.2"
-NOTHING_DETERMINES_THE_SCALE_OF_NOR = (
-    "nothing determines the scale of Y nor its squareness to X and Z nor a combination of "
-    "the scale of X and the scale of Z"
-)
 NO_CHANGES_WERE_FOUND = "no changes were found"
 NO_CHANGES_WERE_FOUND_THAT_DETERMINE = "repair: no changes were found that determine everything; "
 NO_SELECTION_DETERMINES_ANY = "no selection determines any of it"
@@ -43,10 +32,5 @@ SMALLEST_SINGULAR_VALUE = "smallest singular value 0.0"
 THE_EXISTING_FILE_IS_UNCHANGED = "the existing file is unchanged"
 THE_FILE_EXPECTS = "the file expects that"
 THE_FILE_HAS_CHANGED_MEANWHILE = "the file has changed meanwhile and is not overwritten"
-THE_SCALE_OF_NOR_ITS_SQUARENESS = (
-    "the scale of Y nor its squareness to X nor a combination of the scale of X and the scale of Z"
-)
 THE_SCALE_RESTS_ON_PROBE_2 = "warning: the scale rests on probe offsets"
 THE_SCALE_RESTS_ON_PROBE_OFFSETS = "the scale rests on probe offsets"
-WERE_NOT_LOOKED_FOR_IN_SO = "were not looked for in so large a design"
-WITH_A_NEW_PROBE = "with a new probe too"
