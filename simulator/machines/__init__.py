@@ -10,7 +10,6 @@ from ballplate.simulator.inputs.faces import lazily
 if TYPE_CHECKING:
     from .arrangement import ARRANGEMENTS, AXES, Arrangement
     from .bases import Basis
-    from .basis_settings import SplineSettings
     from .curves import NAMES, Points, SmoothedPoints, curves_model
     from .custom import CustomModelError, module_source
     from .description import (
@@ -23,7 +22,7 @@ if TYPE_CHECKING:
         true_volumetric,
     )
     from .empirical import USUAL_OFFSET, EmpiricalModel
-    from .empirical_settings import EmpiricalSettings, has_polynomials
+    from .empirical_settings import EmpiricalSettings
     from .error_names import AXIS_ERRORS, SQUARENESS_ERRORS, SquarenessError
     from .kinematic import ErrorFunction, KinematicModel, carried_vectors, error_function
     from .kinematic_settings import FunctionsSettings, KinematicSettings
