@@ -459,6 +459,7 @@ if TYPE_CHECKING:
         grid,
         map_path,
         number,
+        page_path,
         percentage,
         print_json,
         print_lines,

@@ -220,10 +220,11 @@ def write_noted(options: Namespace, contents: Contents) -> None:
 
 def add_page(parser: Any, help: str) -> None:
     """Add an option that names a page to be written."""
-    add_output(parser, "--report", metavar="FILE", type=_page, help=f"{help} (.html)")
+    add_output(parser, "--report", metavar="FILE", type=page_path, help=f"{help} (.html)")
 
 
-def _page(text: str) -> Path:
+def page_path(text: str) -> Path:
+    """Read the name of a page from the command line."""
     if Path(text).suffix.lower() not in (".html", ".htm"):
         raise ArgumentTypeError(f'a page\'s name ends in .html, unlike "{text}"')
     return Path(text)

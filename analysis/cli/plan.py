@@ -17,6 +17,7 @@ from .common import (
     argument_type,
     count,
     number,
+    page_path,
     show,
     single,
     whole,
@@ -115,8 +116,8 @@ def add_options(parser: ArgumentParser) -> None:
         output,
         "--sheet",
         metavar="FILE",
-        type=_sheet_name,
-        help="write the run sheet: .html to print, or .txt",
+        type=page_path,
+        help="write the run sheet as a page to print (.html)",
     )
     output.add_argument(
         "--curve", action="store_true", help="plan for smaller and larger budgets as well"
@@ -124,7 +125,7 @@ def add_options(parser: ArgumentParser) -> None:
     add_picture(
         output,
         "--plot",
-        help="draw the choice, its lower bound, the improvement by each candidate and the curve",
+        help="draw the choice in the volume, its lower bound and the curve",
     )
     add_force(output)
     add_json(parser)
@@ -169,10 +170,6 @@ def _hours(text: str) -> float:
     if not 0.0 < value < 1e5:
         raise ArgumentTypeError(f'expected hours above zero, such as 7.5, not "{text}"')
     return value
-
-
-def _sheet_name(text: str) -> Path:
-    return Path(service("sheet_name")(text))
 
 
 @argument_type
@@ -229,7 +226,7 @@ def _write(campaign: Campaign, options: Namespace) -> None:
     if options.output is not None:
         contents[options.output] = campaign.to_yaml(options.output.parent)
     if options.sheet is not None:
-        contents[options.sheet] = campaign.sheet_text(options.sheet.suffix.lower())
+        contents[options.sheet] = campaign.sheet_page()
     if options.plot is not None:
         # Numbered as on the run sheet.
         contents[options.plot] = replace(campaign, chosen=campaign.sheet.chosen).plot

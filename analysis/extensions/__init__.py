@@ -83,7 +83,6 @@ SHIPPED = (
         },
         functions=_from("interface", "sheet"),
         services={
-            **_from("sheet_command", "sheet_name"),
             **_from("campaign_picture", "draw_campaign"),
             **_from("sheet", "Sheet"),
             **_from("drift_orders", "DriftOrders"),

@@ -93,12 +93,9 @@ class Campaign(Selection, Result):
             with_times=True,
         )
 
-    def sheet_text(self, form: str = ".txt") -> str:
-        """The run sheet as .html to print, or .txt.
-
-        :raises ValueError: another form.
-        """
-        return self.to_print.text(form)
+    def sheet_page(self) -> str:
+        """Return the run sheet as a page of HTML to print."""
+        return str(self.to_print.page())
 
     @property
     def to_print(self) -> Any:

@@ -38,7 +38,7 @@ PLAN = (
     "-o",
     "choice.yaml",
     "--sheet",
-    "sheet.txt",
+    "sheet.html",
 )
 TRIALS = ("run", DESIGNS / "npl/6.2.7.yaml", "--trials", "1000000")
 
@@ -95,7 +95,7 @@ ENDING = {
 }
 OUTPUTS = (
     "choice.yaml",
-    "sheet.txt",
+    "sheet.html",
     "page.html",
     "table.csv",
     "points.csv",

@@ -209,7 +209,7 @@ def test_the_file_written_takes_the_complete_readings(
     pool: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     readings = readings_of(pool, ["side", "low"], 5)
-    rest, sheet, data = (pool.with_name(name) for name in ("rest.yaml", "rest.txt", "rest.csv"))
+    rest, sheet, data = (pool.with_name(name) for name in ("rest.yaml", "rest.html", "rest.csv"))
     options = ["--done", readings, "--hours", "1.2", "--workers", "1", "-o", rest, "--sheet", sheet]
     assert command("plan", pool, *options) == 0
     told = capsys.readouterr().out

@@ -107,7 +107,7 @@ def test_composed_names_alone_become_short_and_none_is_there_twice(pool: Path) -
 
 
 def test_the_file_and_the_sheet_take_probes_in_the_same_order(pool: Path) -> None:
-    sheet = pool.with_name("day.txt")
+    sheet = pool.with_name("day.html")
     said = planned(pool, "day.yaml", "--positions", "6", "--sheet", str(sheet))
     steps = said["run_sheet"]["steps"]  # type: ignore[index, call-overload]
     written = poses(pool.with_name("day.yaml"))

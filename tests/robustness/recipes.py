@@ -17,14 +17,14 @@ RECIPES = (
     "run small.yaml --trials 4 --seed 3 --workers 1",
     "run bar-bell.yaml --variant 'length known' --until 30% --trials 20 --workers 1",
     "plan pool.yaml --positions 2 --workers 1 -o out.yaml --sheet sheet.html",
-    "plan pool.yaml --hours 2 --criterion A --curve --workers 1 --sheet sheet.txt",
+    "plan pool.yaml --hours 2 --criterion A --curve --workers 1 --sheet sheet.html",
     (
         "plan pool.yaml --done planned-readings.csv --from planned.yaml --positions 1 --workers 1"
         " --json"
     ),
     (
         "plan pool.yaml --done planned-readings.csv --from planned.yaml --moved --readings 12 --workers 1 --sheet"
-        " sheet.txt -o out.yaml"
+        " sheet.html -o out.yaml"
     ),
     "next small.yaml small-readings.csv",
     "next planned.yaml planned-readings.csv --goal 'U6 average 1 um' --json",

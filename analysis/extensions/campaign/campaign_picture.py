@@ -1,17 +1,15 @@
-"""Plot of a planned campaign: criterion against limit, improvements by candidates, chosen
-positions.
-"""
+"""Plot of a planned campaign: criterion against limit, and chosen positions."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
-from ballplate.planning import DESCRIPTIONS, HOUR, Budget, Gain, Selection, Spent
+from ballplate.planning import DESCRIPTIONS, HOUR, Budget, Selection, Spent
 from ballplate.presentation import (
     DASHES,
     INK,
@@ -27,7 +25,6 @@ from ballplate.presentation import (
     save,
     scene,
 )
-from ballplate.simulator.experiment import Candidate
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -36,14 +33,9 @@ if TYPE_CHECKING:
 
 # Points: of the drawing, its parts and what stands around them.
 WIDTH, LEFT, RIGHT, BELOW, ABOVE = 480.0, 56.0, 16.0, 44.0, 26.0
-CURVE, SCENE, ROW, LEGEND, UNDER, LINE = 180.0, 330.0, 17.0, 42.0, 4.0, 16.0
-# Room for a position's number on the left of the gains, and for their values on the right.
-NUMBERS, VALUES = 26.0, 74.0
+CURVE, SCENE, LEGEND, LINE = 180.0, 330.0, 42.0, 16.0
 
 CHOSEN, BOUND, TARGET = "chosen", "bound of any choice", "target"
-
-# Candidates that are drawn, of the chosen ones and of those left out, and the letters of a name.
-MOST_CHOSEN, MOST_LEFT_OUT, MOST_LETTERS = 24, 5, 66
 
 # Values further apart than this are drawn on a logarithmic axis; a target further off than this is
 # told in words.
@@ -51,17 +43,15 @@ WIDE, FAR = 5.0, 4.0
 
 
 def draw_campaign(selection: Selection, path: str | Path | None = None) -> Figure:
-    """Draw the criterion against the limit, the improvement by each candidate, and the positions;
-    save to the path, if any.
+    """Draw the criterion against the limit, and the chosen positions; save to the path, if any.
 
     :raises ImportError: matplotlib is missing.
     :raises ValueError: the file name has no known picture format.
     :raises OSError: the file cannot be written.
     """
-    rows, marks = _rows(selection), _marks(selection)
-    bars = ROW * max(len(rows), 1)
+    marks = _marks(selection)
     top = CURVE + LEGEND + BELOW if selection.curve else LINE
-    total = SCENE + UNDER + bars + ABOVE + top + ABOVE
+    total = SCENE + top + ABOVE
     with drawing(total, WIDTH) as figure:
         unit = "" if selection.unit == "1" else ", µm"
         _title(figure, total - 14.0, f"{DESCRIPTIONS[selection.criterion]}{unit}")
@@ -74,14 +64,6 @@ def draw_campaign(selection: Selection, path: str | Path | None = None) -> Figur
         else:
             values = "; ".join(f"{mark.name}: {mark.text}" for mark in marks)
             _title(figure, total - ABOVE - 0.5 * LINE, values)
-        bottom = SCENE + UNDER
-        axes = placed_axes(figure, NUMBERS, bottom, WIDTH - NUMBERS - VALUES, bars)
-        _title(
-            figure,
-            bottom + bars + 14.0,
-            f"how much larger {selection.criterion} is without each of the chosen ones",
-        )
-        _bars(axes, rows)
         axes = placed_axes(figure, 0.0, 0.0, WIDTH, SCENE)
         axes.set_axis_off()
         axes.set_aspect("equal")
@@ -260,106 +242,3 @@ def _plain_numbers(axis: Axis, is_logarithmic: bool) -> None:
         axis.set_minor_formatter(NullFormatter())
     else:
         axis.set_major_locator(MaxNLocator(nbins=6, steps=[1, 2, 5, 10]))
-
-
-@dataclass(frozen=True)
-class _Row:
-    """A candidate with its improvement: `size` None if unavailable."""
-
-    mark: str
-    name: str
-    text: str
-    size: float | None
-    colour: str
-
-
-def _rows(selection: Selection) -> list[_Row]:
-    """Return chosen candidates with their numbers, largest improvement first, then other
-    candidates.
-    """
-    numbers = {name: k + 1 for k, name in enumerate(selection.prediction.design.positions.names)}
-    rows = [_row(selection, gain, numbers) for gain in selection.gains[:MOST_CHOSEN]]
-    if len(selection.gains) > MOST_CHOSEN:
-        rows.append(
-            _Row(
-                "", f"… and {len(selection.gains) - MOST_CHOSEN} chosen ones more", "", None, MUTED
-            )
-        )
-    rows += [
-        _Row(
-            _shown(_place(selection, candidate, numbers)),
-            selection.title_of(candidate),
-            "read already",
-            None,
-            _colour(_place(selection, candidate, numbers)),
-        )
-        for candidate in selection.done[: max(MOST_CHOSEN - len(selection.gains), 0)]
-    ]
-    left_out = [gain for gain in selection.left_out if not math.isnan(gain.relative)]
-    if left_out:
-        rows.append(_Row("", "left out; increase without each", "", None, MUTED))
-    return rows + [_row(selection, gain, {}) for gain in left_out[:MOST_LEFT_OUT]]
-
-
-def _row(selection: Selection, gain: Gain, numbers: Mapping[str, int]) -> _Row:
-    place = _place(selection, gain.candidate, numbers)
-    size = None if math.isnan(gain.relative) else gain.relative
-    size_text = (
-        "–" if size is None else "needed" if math.isinf(size) else f"{number(100 * size, 2)} %"
-    )
-    return _Row(_shown(place), selection.title_of(gain.candidate), size_text, size, _colour(place))
-
-
-def _place(selection: Selection, candidate: Candidate, numbers: Mapping[str, int]) -> int | None:
-    """Return the number of a candidate on the plot, by its short name if it has one."""
-    return numbers.get(selection.names.get(candidate.name, candidate.name))
-
-
-def _shown(place: int | None) -> str:
-    return "" if place is None else str(place)
-
-
-def _colour(place: int | None) -> str:
-    return MUTED if place is None else SERIES[0]
-
-
-def _bars(axes: Axes, rows: Sequence[_Row]) -> None:
-    """Draw bars behind the names; necessary candidates have full length and another pattern."""
-    sizes = np.array([row.size for row in rows if row.size is not None and math.isfinite(row.size)])
-    full = float(sizes.max(initial=0.0)) or 1.0
-    axes.set_xlim(0.0, 1.0)
-    axes.set_ylim(max(len(rows), 1) - 0.5, -0.5)
-    axes.set_axis_off()
-    for k, row in enumerate(rows):
-        if row.size is not None:
-            is_needed = math.isinf(row.size)
-            axes.barh(
-                k,
-                1.0 if is_needed else max(row.size, 0.0) / full,
-                height=0.78,
-                color=row.colour,
-                alpha=0.3,
-                hatch="//" if is_needed else None,
-                linewidth=0,
-            )
-        is_candidate = bool(row.text)
-        name = row.name if len(row.name) <= MOST_LETTERS else row.name[: MOST_LETTERS - 1] + "…"
-        axes.text(0.008, k, name, va="center", fontsize=9.0, color=INK if is_candidate else MUTED)
-        _write_beside(axes, row.text, k, 1.0)
-        _write_beside(axes, row.mark, k, 0.0, -6.0)
-
-
-def _write_beside(
-    axes: Axes, text: str, row: int, x: float, points: float = VALUES - RIGHT + 2.0
-) -> None:
-    """Write a text a number of points to the right of a location."""
-    axes.annotate(
-        text,
-        (x, row),
-        (points, 0.0),
-        textcoords="offset points",
-        ha="right",
-        va="center",
-        fontsize=9.0,
-        annotation_clip=False,
-    )

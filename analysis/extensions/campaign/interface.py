@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 def sheet(experiment: Experiment | PathLike) -> Sheet:
     """Return a run sheet of an experiment, a table to fill in, and points for a program.
 
-    `text()` is the run sheet, `template()` the CSV file of readings with empty cells, and
+    `page()` is the run sheet to print, `template()` the CSV file of readings with empty cells, and
     `points()` the nominal centres of the balls; that of a plan is its `to_print`.
 
     >>> import ballplate as bp

@@ -20,7 +20,6 @@ from ballplate.simulator.experiment import Candidate, ChangeTimes, Experiment
 from ballplate.simulator.inputs import refused, to_python
 
 from .reading_lists import planned_readings, points_csv, points_dmis, template_csv
-from .sheet_forms import sheet_text
 from .sheet_head import offsets
 from .sheet_page import sheet_page
 
@@ -53,17 +52,9 @@ class Sheet(Result):
         """One row for each position, times in seconds."""
         return list(sheet_data(self.sheet)["steps"])
 
-    def text(self, form: str = ".txt") -> str:
-        """The run sheet as .html to print, or .txt.
-
-        :raises ValueError: another form.
-        """
-        sheet, experiment = self.sheet, self.experiment
-        if form == ".html":
-            return sheet_page(sheet, experiment, experiment.title)
-        if form == ".txt":
-            return sheet_text(sheet, experiment, experiment.title)
-        raise ValueError(f'"{form}" is no form of a run sheet; give .html or .txt')
+    def page(self) -> str:
+        """Return the run sheet as a page of HTML to print."""
+        return sheet_page(self.sheet, self.experiment, self.experiment.title)
 
     def template(self) -> str:
         """Return the CSV file of readings in order with empty cells, for `fit`."""

@@ -12,12 +12,13 @@ from ballplate.cli import (
     add_json,
     add_output,
     argument_type,
+    page_path,
     show,
     single,
     write_noted,
 )
 
-SHEETS, DMIS, POINTS = (".html", ".txt"), (".dmi", ".dmis"), (".csv",)
+DMIS, POINTS = (".dmi", ".dmis"), (".csv",)
 
 DESCRIPTION = (
     "Write what goes to the laboratory with a design: a run sheet to print and tick off, a CSV"
@@ -34,8 +35,8 @@ def add_options(parser: ArgumentParser) -> None:
         "-o",
         "--output",
         metavar="FILE",
-        type=sheet_name,
-        help="write the run sheet: .html to print, or .txt",
+        type=page_path,
+        help="write the run sheet as a page to print (.html)",
     )
     add_output(
         parser,
@@ -58,13 +59,6 @@ def add_options(parser: ArgumentParser) -> None:
     )
     add_force(parser)
     add_json(parser)
-
-
-def sheet_name(text: str) -> Path:
-    """Read the name of a run sheet from the command line."""
-    if not text.lower().endswith(SHEETS):
-        raise ArgumentTypeError(f'a run sheet\'s name ends in {", ".join(SHEETS)}, unlike "{text}"')
-    return Path(text)
 
 
 def _points(text: str) -> Path:
@@ -98,7 +92,7 @@ def run(options: Namespace) -> int:
     sheet = sheet_of(single(options, planning=True))
     texts = {}
     if options.output is not None:
-        texts[options.output] = sheet.text(options.output.suffix.lower())
+        texts[options.output] = sheet.page()
     if options.readings is not None:
         texts[options.readings] = sheet.template()
     if options.points is not None:

@@ -12,10 +12,11 @@ from ballplate.simulator.design import Design
 from ballplate.simulator.geometry import BallLayout
 from ballplate.simulator.machines import Array
 
-from .drawings import LONGEST_NAME
-
 # Sizes in the drawings' own units, of which a page has about 700 from side to side.
 PLATE, VOLUME, MARGIN = 340.0, 660.0, 34.0
+
+# A name longer than this is replaced by a number.
+LONGEST_NAME = 9
 
 # Room for a ball with its name, in an artefact no larger than this.
 ROOM, LARGEST = 42.0, 620.0

@@ -10,9 +10,8 @@ from ballplate.simulator.experiment import Experiment, Position, lay_out, with_c
 from ballplate.simulator.geometry import BallLayout
 from ballplate.simulator.inputs import number_of
 
-from .drawings import LONGEST_NAME, place_drawing
 from .reading_lists import sequence
-from .sheet_drawings import artefact_drawing, volume_drawing
+from .sheet_drawings import LONGEST_NAME, artefact_drawing, volume_drawing
 from .sheet_head import BLANKS, NOTES, known_fields, stylus_rows
 from .sheet_words import set_up_rows
 
@@ -54,19 +53,16 @@ svg { display: block; max-width: 100%; height: auto; }
 .tick:checked { background: #222; }
 .time { flex: none; white-space: nowrap; }
 .change { border: 1px solid #999; background: #eee; padding: 0.1em 0.5em; }
-.words { display: flex; gap: 1em; align-items: flex-start; break-inside: avoid; }
-.words dl { flex: 1; min-width: 0; display: grid; grid-template-columns: 6em 1fr;
-  gap: 0.1em 0.8em; margin: 0.5em 0; }
+.words { display: grid; grid-template-columns: 6em 1fr; gap: 0.1em 0.8em; margin: 0.5em 0;
+  break-inside: avoid; }
 .words dt { color: #555; }
 .words dd { margin: 0; }
-.words svg { flex: none; width: 170px; }
 .probe { margin: 0.5em 0 0.1em; break-after: avoid; }
 ol.balls { list-style: none; margin: 0; padding: 0; display: grid;
   grid-template-columns: repeat(auto-fill, minmax(min(100%, var(--width)), 1fr));
   gap: 0.15em 0.6em; }
 ol.balls i { display: inline-block; width: 0.8em; height: 0.8em; border: 1px solid #555;
   margin-right: 0.25em; vertical-align: -0.05em; }
-@media (max-width: 40em) { .words { display: block; } }
 @media print {
   body { margin: 0; padding: 0; max-width: none; font-size: 10pt; }
   td { overflow-wrap: anywhere; }
@@ -74,7 +70,6 @@ ol.balls i { display: inline-block; width: 0.8em; height: 0.8em; border: 1px sol
   .step .fields { grid-template-columns: 1fr 1fr 1fr 2fr; }
   .wide { overflow: visible; }
   .change { background: none; }
-  .words { display: flex; }
   svg.volume { max-height: 112mm; }
 }
 """
@@ -242,10 +237,7 @@ def _step(number: int, step: Step, sheet: RunSheet, experiment: Experiment) -> s
     kind = "step done" if step.done else "step"
     body = ""
     if not step.done:
-        body = (
-            f'<div class="words"><dl>{items}</dl>{place_drawing(step.candidate, experiment)}</div>'
-            f"{_readings(step)}{_fields(dict.fromkeys(NOTES, ''))}"
-        )
+        body = f'<dl class="words">{items}</dl>{_readings(step)}{_fields(dict.fromkeys(NOTES, ""))}'
     return (
         f'<section class="{kind}"><div class="head">'
         f'<input type="checkbox" class="tick" aria-label="position {number} done"{checked}>'

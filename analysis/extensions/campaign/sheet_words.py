@@ -1,4 +1,4 @@
-"""Words and times of a run sheet that all its forms share."""
+"""Set-up of a position in words, for a run sheet."""
 
 from __future__ import annotations
 

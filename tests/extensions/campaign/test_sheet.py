@@ -122,31 +122,14 @@ def of_page(text: str) -> list[tuple[str, str, str]]:
     return parser.found
 
 
-def of_text(text: str) -> list[tuple[str, str, str]]:
-    found, position, probe = [], "", ""
-    for line in text.splitlines():
-        if match := re.match(r"\[ \] [0-9]+ ([^,]+)", line):
-            position = match[1]
-        elif match := re.fullmatch(r"    with (.*):", line):
-            probe = match[1]
-        else:
-            for boxes, ball in re.findall(r"((?:\[ \])+) (\S+)", line):
-                found += [(position, probe, ball)] * boxes.count("[ ]")
-    return found
-
-
-@pytest.mark.parametrize(("form", "of"), [(".html", of_page), (".txt", of_text)])
-def test_every_reading_is_on_the_sheet_once_and_in_order(
-    form: str, of: object, sheet: Sheet
-) -> None:
-    assert callable(of)
-    assert of(sheet.text(form)) == [
+def test_every_reading_is_on_the_sheet_once_and_in_order(sheet: Sheet) -> None:
+    assert of_page(sheet.page()) == [
         (position, probe, ball) for position, ball, probe, _ in expected()
     ]
 
 
 def test_the_page_asks_for_nothing_and_lets_no_text_out(sheet: Sheet) -> None:
-    page = sheet.text(".html")
+    page = sheet.page()
     parser = Boxes()
     parser.feed(page)
     assert not parser.open
@@ -163,9 +146,8 @@ def test_the_page_asks_for_nothing_and_lets_no_text_out(sheet: Sheet) -> None:
         assert part in style
 
 
-@pytest.mark.parametrize("form", [".html", ".txt"])
-def test_the_head_has_what_is_filled_in_by_hand(form: str, sheet: Sheet) -> None:
-    text = sheet.text(form)
+def test_the_head_has_what_is_filled_in_by_hand(sheet: Sheet) -> None:
+    text = sheet.page()
     for name in ("machine", "operator", "date", "temperature", "design.yaml", "ballplate ", "page"):
         assert name in text
     # Offsets of the styli, and the angles of (30, 0, -40): atan(3/4) from straight down.
@@ -173,8 +155,7 @@ def test_the_head_has_what_is_filled_in_by_hand(form: str, sheet: Sheet) -> None
     assert re.search(r"right\s+30\s+0\s+-40\s+36\.87°\s+0°", flat)
 
 
-@pytest.mark.parametrize("form", [".html", ".txt"])
-def test_angles_of_a_head_are_those_of_the_file(form: str, tmp_path: Path) -> None:
+def test_angles_of_a_head_are_those_of_the_file(tmp_path: Path) -> None:
     path = tmp_path / "design.yaml"
     # A tip straight down by 30 mm, tilted by 90 deg towards -y and then turned by 90 deg, is at +x.
     probes = "{down: [0 mm, 0 mm, -40 mm], right: {A: 90 deg, B: 90 deg}}"
@@ -184,7 +165,7 @@ def test_angles_of_a_head_are_those_of_the_file(form: str, tmp_path: Path) -> No
             f"head: {{tip: [0 mm, 0 mm, -30 mm]}}\nprobes: {probes}",
         )
     )
-    flat = re.sub(r"<[^>]*>|\|", " ", sheet_of(load(path)[0]).text(form))
+    flat = re.sub(r"<[^>]*>|\|", " ", sheet_of(load(path)[0]).page())
     assert re.search(r"z, mm\s+A\s+B\s+from -z", flat)
     assert re.search(r"down\s+0\s+0\s+-40\s+–\s+–\s+0°", flat)
     assert re.search(r"right\s+30\s+\S+\s+\S+\s+90°\s+90°\s+90°", flat)
@@ -192,7 +173,7 @@ def test_angles_of_a_head_are_those_of_the_file(form: str, tmp_path: Path) -> No
 
 
 def test_the_drawing_of_an_artefact_has_its_balls_where_they_are(sheet: Sheet) -> None:
-    page = sheet.text(".html")
+    page = sheet.page()
     drawing = page[page.index('<svg class="artefact"') :]
     drawing = drawing[: drawing.index("</svg>")]
     circles = np.array(
@@ -207,7 +188,7 @@ def test_the_drawing_of_an_artefact_has_its_balls_where_they_are(sheet: Sheet) -
 
 
 def test_names_in_the_volume_are_on_their_outlines_and_cover_no_first_ball(sheet: Sheet) -> None:
-    page = sheet.text(".html")
+    page = sheet.page()
     drawing = page[page.index('<svg class="volume"') :]
     drawing = drawing[: drawing.index("</svg>")]
     corners = [
@@ -425,4 +406,4 @@ def test_every_shipped_design_has_a_sheet() -> None:
         sheet = sheet_of(experiment)
         count = sum(position.count for position in experiment.positions)
         assert len(planned_readings(sheet.sheet, experiment)) == count
-        assert len(of_page(sheet.text(".html"))) == count
+        assert len(of_page(sheet.page())) == count

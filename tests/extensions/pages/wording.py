@@ -1,6 +1,5 @@
 """The wording that the tests of pages expect: a rewording is entered here alone."""
 
-AND_CHOSEN_ONES_MORE = "… and 16 chosen ones more"
 APPLY_TO_SWEEPS_ONLY = "apply to sweeps only"
 BY_THE_FULL_ESTIMATOR_AND_REVERSAL = "by the full estimator and reversal only"
 CAMPAIGN_OF_QUICKSTART = "<Campaign of quickstart: 7 of "
