@@ -17,7 +17,7 @@ if TYPE_CHECKING:
         check_files,
         checked_design,
     )
-    from .choice import Gain, Selection
+    from .choice import Selection
     from .constraints import HOUR, Budget, Spent
     from .criteria import DESCRIPTIONS
     from .drift_times import in_time, without_drift
