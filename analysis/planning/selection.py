@@ -15,9 +15,10 @@ from ballplate.simulator.inputs.settings import number_of
 
 from ..presentation.formatting import aligned, number, picked
 from ..presentation.result import Result
+from ..results.text_blocks import target_lines
 from .choice import Gain, Selection
 from .constraints import HOUR, Spent
-from .criteria import DESCRIPTIONS
+from .criteria import DESCRIPTIONS, MAXIMUM
 from .drift_times import in_order_settings, in_time
 from .experiment_file import experiment_text
 from .run_sheet_tables import sheet_data, sheet_lines
@@ -132,6 +133,7 @@ class Campaign(Selection, Result):
                 "no choice within the limits is better by more than"
                 f" {100 * (1.0 - self.efficiency):.1f} %"
             )
+        lines += target_lines(self.prediction.lengths)
         if self.excluded:
             lines.append(
                 f"left out of {self.criterion}: {self.excluded} that no choice from this pool"
@@ -249,7 +251,8 @@ def _comparison(campaign: Campaign) -> list[str]:
         words = campaign.drawn_words + ("" if campaign.drawn_is_within else " (more than allowed)")
         rows.append([words, *_value(campaign, campaign.drawn), *_spent(campaign.drawn_spent)])
     if campaign.target is not None:
-        rows.append(["target (of u)", *_value(campaign, campaign.target), "", "", ""])
+        words = "target (of u)" if campaign.criterion.endswith(MAXIMUM) else "mean target (of u)"
+        rows.append([words, *_value(campaign, campaign.target), "", "", ""])
     return aligned(rows, [False, True, False, True, True, True])
 
 

@@ -19,6 +19,7 @@ from ballplate.planning.campaign_choice import Request, campaign
 from ballplate.planning.constraints import HOUR, Budget
 from ballplate.planning.remaining_candidates import offer
 from ballplate.planning.search import SelectionProblem
+from ballplate.presentation import percent
 from ballplate.results.checked_designs import predict
 from ballplate.simulator.computing.internal_error import InternalError
 from ballplate.simulator.computing.steps import ProgressStep
@@ -88,6 +89,11 @@ def test_never_worse_than_drawn_at_the_same_cost(drawn: Path) -> None:
     assert found.spent.positions <= 6 and found.spent.seconds <= found.drawn_spent.seconds + 1e-3
     assert found.bound <= found.value
     assert found.target == pytest.approx(2e-6 + 0.33e-6 / 0.1 * 0.3, rel=0.5)
+    # A choice whose average is below that of the target can miss it with many distances.
+    tables = "\n".join(found.lines()).partition("chosen: ")[0]
+    mean, share = tables.partition("mean target (of u)")[2].split("\n", 1)
+    assert float(mean.split()[0]) == pytest.approx(1e6 * found.target, rel=1e-3)
+    assert f": {percent(found.prediction.lengths.within_target)} of 190 lengths" in share
 
 
 @pytest.mark.parametrize("read", [1, 5])
