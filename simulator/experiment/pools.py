@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from ..design.lookup import ReadingCount, References
-from ..design.objects import Machine
+from ..design.objects import Machine, Volume
 from ..design.observations.calibration import Calibration
 from ..design.observations.radius import RadiusCalibration
 from ..geometry.ball_layouts import frozen
@@ -126,6 +126,7 @@ def resolve_candidates(
     result.forbidden = _forbidden(limits, references)
     bounds = None
     if machine is not None and machine.dimension == references.dimension:
+        result.forbidden = _through_walls(result.forbidden, machine.volume)
         bounds = Bounds(machine.volume, probes, reach, limits.edge, result.forbidden)
     all_drawn = len(positions) == written_count(root, "positions")
     result.complete = is_known and is_list and names_differ and all_drawn
@@ -399,6 +400,15 @@ def _forbidden(limits: LimitsSettings, references: References) -> Array:
         # Nothing enters a box that begins at infinity.
         boxes.append(np.full((2, d), np.inf) if is_faulty else ends)
     return np.reshape(boxes, (len(boxes), 2, d))
+
+
+def _through_walls(boxes: Array, volume: Volume) -> Array:
+    """Return boxes (n, 2, d), those that reach a wall of the volume without an end there: what lies
+    on the wall is within them, and does not touch them alone.
+    """
+    lower = np.where(boxes[:, 0] <= volume.lower, -np.inf, boxes[:, 0])
+    upper = np.where(boxes[:, 1] >= volume.upper, np.inf, boxes[:, 1])
+    return frozen(np.stack([lower, upper], axis=1))
 
 
 def _ends(region: RegionSettings, steps: Steps, references: References) -> Array:

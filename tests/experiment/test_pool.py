@@ -283,6 +283,19 @@ def test_candidates_in_forbidden_boxes_are_dropped(edge: str, tmp_path: Path) ->
     assert {key: n for key, n in pool.dropped.items() if "box" in key} == dropped
 
 
+def test_what_lies_on_a_wall_is_in_a_forbidden_box_that_reaches_it(tmp_path: Path) -> None:
+    """Two plates lie on the floor of the volume."""
+    for ends, count in (("0 mm, 200 mm", 2), ("1 mm, 200 mm", 0), ("-9 mm, 0 mm", 0)):
+        box = f"  limits: {{forbidden: [{{y: [350 mm, 450 mm], z: [{ends}]}}]}}\n"
+        text = replaced(LIMITS, box, replaced("level: 0 mm", "level: 300 mm"))
+        text = replaced("planes: [z, x]", "planes: [z]", text)
+        text = replaced(SOME_CORNERS, "corners: {x: 0 mm, y: [0 mm, 400 mm]}", text)
+        text = replaced(SOME_PROBES, "probes: [down]", text)
+        pool = pool_of(tmp_path, text)
+        names = [name for name in (one.name for one in pool.candidates) if "some z 0 mm" in name]
+        assert (len(names), pool.dropped.get("in a forbidden box", 0)) == (2 - count, count)
+
+
 def test_a_group_keeps_what_every_probe_can_read_from_inside_the_volume(tmp_path: Path) -> None:
     """By the positions of a file, one by one: a candidate is left just where the same position is
     accepted.
