@@ -31,7 +31,7 @@ if TYPE_CHECKING:
         uncertainty_words,
     )
     from .paper import escaped, on_paper, pitch
-    from .pictures import draw_box, draw_scene, scene_figure
+    from .pictures import draw_box, draw_scene
     from .result import FitResult, Result
     from .scenes import (
         MOST_BALLS,
@@ -39,7 +39,6 @@ if TYPE_CHECKING:
         TURN,
         Box,
         DrawnPosition,
-        Scene,
         box,
         box_edges,
         hull,

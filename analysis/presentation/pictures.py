@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -11,7 +9,7 @@ import numpy as np
 from ballplate.simulator.design.arrays import Design
 from ballplate.simulator.machines.protocol import Array
 
-from .scenes import Box, DrawnPosition, Scene, scene
+from .scenes import Box, DrawnPosition, Scene, names_fit, scene
 from .svg import (
     INK,
     MUTED,
@@ -37,15 +35,11 @@ def draw_design(design: Design, words: str, path: str | Path | None = None) -> F
     :raises ValueError: the suffix is of no picture format.
     :raises OSError: the file cannot be written.
     """
-    with scene_figure(scene(design)) as figure:
-        return save(figure, path, words)
-
-
-@contextmanager
-def scene_figure(drawn: Scene) -> Iterator[Figure]:
+    drawn = scene(design)
+    is_named = names_fit([place.name for place in drawn.places])
     with drawing(330.0) as figure:
-        draw_scene(blank_axes(figure), drawn, not drawn.is_named)
-        yield figure
+        draw_scene(blank_axes(figure), drawn, by_number=not is_named)
+        return save(figure, path, words)
 
 
 def draw_scene(axes: Axes, drawn: Scene, by_number: bool) -> None:

@@ -30,13 +30,10 @@ class DrawnPosition:
 
     number: int
     name: str
-    artefact: str
-    probes: tuple[str, ...]
     outline: Array
     balls: Array
     styli: Array
     depth: float
-    read: int
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,10 +59,6 @@ class Scene:
 
     box: Box
     places: tuple[DrawnPosition, ...]
-
-    @property
-    def is_named(self) -> bool:
-        return names_fit([place.name for place in self.places])
 
 
 def names_fit(names: Sequence[str]) -> bool:
@@ -96,13 +89,10 @@ def scene(design: Design) -> Scene:
             DrawnPosition(
                 k + 1,
                 name,
-                design.artefacts.names[design.positions.artefact[k]],
-                tuple(design.probes.names[probe] for probe in used),
                 hull(balls @ view.T),
                 balls[drawn] @ view.T,
                 styli @ view.T,
                 float(balls.mean(axis=0) @ towards) if design.dimension == 3 else 0.0,
-                len(first),
             )
         )
     places.sort(key=lambda place: -place.depth)

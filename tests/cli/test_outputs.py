@@ -649,17 +649,6 @@ def test_every_reason_is_told_at_once(
     )
 
 
-def test_a_page_without_its_extra_is_told_before_the_store_is_read(
-    files: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    from ballplate.extensions.sweeps import store
-
-    monkeypatch.setattr(store, "open_store", lambda *_: pytest.fail("has begun"))
-    monkeypatch.setitem(sys.modules, "matplotlib", None)
-    told = "pictures need matplotlib; install it with: python -m pip install 'ballplate[report]'"
-    refused(["sweep", "--report", str(files / "store.sqlite")], capsys, 3, told)
-
-
 def test_a_file_to_which_standard_output_goes(files: Path, tmp_path: Path) -> None:
     path = tmp_path / "l.csv"
     arguments = line("run --lengths", files, {"-o": path}, "--force")

@@ -3,15 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-from ballplate.presentation import number
 
 from .charts import Chart, Trace, chart_svg, figure, figures, legend
 from .elements import Html, element, joined, note, table
+from .level_maps import MapPoint, level_map
 from .quoted import QuotedData
-
-SHADES = 8
-# Of a map: width of a cell, its height, and the room around.
-CELL, ROW, LEFT, BELOW, ABOVE = 46.0, 26.0, 46.0, 32.0, 18.0
 
 
 def lengths_section(lengths: QuotedData, target: str) -> Html:
@@ -76,73 +72,24 @@ def lengths_section(lengths: QuotedData, target: str) -> Html:
 def _map(lengths: QuotedData, chosen: list[int], k: float, of_target: bool, words: str) -> Html:
     """Return the map of a level, with a value per point."""
     name, factor = ("maximum_ratio", k) if of_target else ("maximum", 1e6 * k)
-    every = [point[name] for point in lengths.data["by_point"]]
-    finite = [factor * point for point in every if point is not None]
-    low, high = (min(finite), max(finite)) if finite else (0.0, 1.0)
-    places = np.array([lengths.data["by_point"][i]["point"][:2] for i in chosen])
-    x, y = np.unique(places[:, 0]), np.unique(places[:, 1])
-    parts = []
-    for i, place in zip(chosen, places, strict=True):
-        column, row = np.searchsorted(x, place[0]), len(y) - 1 - np.searchsorted(y, place[1])
-        left_edge, top = LEFT + CELL * column, ABOVE + ROW * row
+    by_point = lengths.data["by_point"]
+    finite = [factor * point[name] for point in by_point if point[name] is not None]
+    points = []
+    for i in chosen:
+        x, y = by_point[i]["point"][:2]
         # What is known of some of its lengths would hide that others are unknown.
-        value = None if lengths.data["by_point"][i]["undetermined"] else every[i]
-        kind = "open"
-        if value is not None:
-            kind = _shade(factor * value, low, high, 1.0 if of_target else np.inf)
-        parts.append(
-            Html(
-                f'<rect class="{kind}" x="{left_edge:g}" y="{top:g}" width="{CELL:g}"'
-                f' height="{ROW:g}"/>'
-            )
-        )
-        shown = "–" if value is None else number(factor * value, 3)
-        parts.append(
-            element(
-                "text",
-                shown,
-                class_="place" if value is not None else None,
-                x=f"{left_edge + CELL / 2:g}",
-                y=f"{top + ROW / 2 + 3.5:g}",
-                text_anchor="middle",
-                data_path=None if value is None else lengths.at("by_point", i, name).path,
-                data_value=None if value is None else repr(value),
-                data_factor=None if value is None else repr(factor),
-            )
-        )
-    bottom = ABOVE + ROW * len(y)
-    for j, value in enumerate(x.tolist()):
-        parts.append(_label(LEFT + CELL * (j + 0.5), bottom + 12, f"{1e3 * value:.5g}", "middle"))
-    for j, value in enumerate(y.tolist()):
-        parts.append(_label(LEFT - 5, bottom - ROW * (j + 0.5) + 3.5, f"{1e3 * value:.5g}", "end"))
-    parts.append(_label(LEFT + CELL * len(x) / 2, bottom + 26, "x, mm", "middle"))
-    parts.append(_label(LEFT - 5, ABOVE - 6, "y, mm", "end"))
-    return element(
-        "svg",
-        joined(parts),
-        class_="map",
-        viewBox=f"0 0 {LEFT + CELL * len(x) + 6:g} {bottom + BELOW:g}",
-        role="img",
-        aria_label=words,
-    )
-
-
-def _shade(value: float, low: float, high: float, limit: float) -> str:
-    """A step of colour among values from `low` to `high`; above a limit, one of another colour.
-
-    >>> [_shade(value, 0.2, 3.0, 1.0) for value in (0.2, 1.0, 1.1, 3.0)]
-    ['heat-0', 'heat-7', 'over-0', 'over-7']
-    """
-    is_over = value > limit
-    first, last = (max(low, limit), high) if is_over else (low, min(high, limit))
-    # Equal values but for rounding have no order to show.
-    share = (value - first) / (last - first) if last - first > 1e-9 * last else 0.0
-    name = "over" if is_over else "heat"
-    return f"{name}-{min(int(SHADES * (share + 1e-9)), SHADES - 1)}"
-
-
-def _label(x: float, y: float, text: str, anchor: str) -> Html:
-    return element("text", text, x=f"{x:g}", y=f"{y:g}", text_anchor=anchor)
+        value = None if by_point[i]["undetermined"] else by_point[i][name]
+        if value is None:
+            points.append(MapPoint(x, y, None))
+            continue
+        attributes = {
+            "data_path": lengths.at("by_point", i, name).path,
+            "data_value": repr(value),
+            "data_factor": repr(factor),
+        }
+        points.append(MapPoint(x, y, factor * value, attributes))
+    ends = (min(finite), max(finite)) if finite else (0.0, 1.0)
+    return level_map(points, ends, words, 1.0 if of_target else np.inf)
 
 
 def _by_length(lengths: QuotedData, target: str) -> Html:

@@ -102,7 +102,6 @@ def sweep_report(
     Designs with error models in Python are drawn only with `run_modules`. A page can `compare` the
     sweep with the newest one of another store.
 
-    :raises ImportError: a library for pages is not installed.
     :raises ValueError: the two sweeps cannot be compared.
 
     >>> import tempfile
@@ -134,9 +133,9 @@ def sweep_report(
     from ballplate.presentation import FORMATS
 
     from .report.results import read_results
-    from .report.tables import report_tables
+    from .report.tables import text_tables
     from .store import open_store
 
     with closing(open_store(Path(store))) as opened:
         results = read_results(opened, sweep)
-        return FORMATS[form](results.title, report_tables(results))
+        return FORMATS[form](results.title, text_tables(results))

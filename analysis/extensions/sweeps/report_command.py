@@ -8,7 +8,7 @@ from contextlib import closing
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ballplate.cli import PICTURE, UsageError, add_force, add_output, complain, write
+from ballplate.cli import UsageError, add_force, add_output, complain, write
 
 from .export_command import add_store, warn_of_damage, warn_of_other_methods
 from .interface import FORMS
@@ -79,9 +79,6 @@ def run(options: Namespace) -> int:
         endings = ", ".join(SUFFIXES)
         raise UsageError(f"{output} should end in one of {endings}; or state --format")
     form = options.format or SUFFIXES.get(suffix, "html")
-    if form == "html" and PICTURE.is_missing:
-        complain(f"ballplate sweep --report: {PICTURE.told}")
-        return BAD_FILE
     if options.compare is not None and form != "html":
         raise UsageError("--compare is for the page; leave it out, or name a page with -o")
     with closing(open_store(options.store)) as store:
@@ -99,9 +96,9 @@ def run(options: Namespace) -> int:
         else:
             from ballplate.presentation import FORMATS
 
-            from .report.tables import report_tables
+            from .report.tables import text_tables
 
-            text = FORMATS[form](results.title, report_tables(results))
+            text = FORMATS[form](results.title, text_tables(results))
         if not results.count("done") and not is_damaged:
             text_of_count = f"0 of {len(results.cells)} cases done"
             complain(f"{store.path}: {text_of_count}; to continue, run ballplate sweep again")

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from ballplate.presentation import number
-from ballplate.simulator.machines import Array, Integers
+from ballplate.simulator.machines import Integers
 
 from .results import ReportAxis, ReportedSweep
 
@@ -63,83 +63,54 @@ def axis_worths(results: ReportedSweep, column: str, rows: Integers) -> list[Axi
     """Return the effect of each axis with several values on a column, from `rows` with
     determined values.
     """
-    value, chosen = results.figure(column)[rows], results.chosen[rows]
+    value, chosen = results.figure(column)[rows].tolist(), results.chosen[rows]
     worths = []
     for k, axis in enumerate(results.axes):
         if len(axis.labels) < 2:
             continue
         other_axes = [i for i in range(len(results.axes)) if i != k]
         planned = len(np.unique(results.cells[:, other_axes], axis=0))
-        _, group = np.unique(chosen[:, other_axes], axis=0, return_inverse=True)
+        settings: dict[tuple[int, ...], dict[int, float]] = {}
+        for setting, place, average in zip(
+            map(tuple, chosen[:, other_axes].tolist()), chosen[:, k].tolist(), value, strict=True
+        ):
+            settings.setdefault(setting, {})[place] = average
         kind = _worth_of_numbers if axis.numbers else _worth_of_texts
-        worths.append(kind(axis, value, group.ravel(), chosen[:, k], planned))
+        worths.append(kind(axis, list(settings.values()), planned))
     return worths
 
 
 def _worth_of_numbers(
-    axis: ReportAxis,
-    value: Array,
-    group: Integers,
-    place: Integers,
-    planned: int,
+    axis: ReportAxis, settings: Sequence[dict[int, float]], planned: int
 ) -> AxisWorth:
     """Compare the smallest value of the axis that is determined anywhere with the largest."""
-    ranks = np.argsort(np.argsort(np.array(axis.numbers), kind="stable"))[place]
-    order, starts, ends = _grouped(group, ranks)
-    first, last = order[starts], order[ends]
-    lowest, highest = (ranks.min(), ranks.max()) if len(ranks) else (0, 0)
-    has_both = (ranks[first] == lowest) & (ranks[last] == highest) & (first != last)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        ratios = value[last] / value[first]
-    has_both &= np.isfinite(ratios)
-    least = np.minimum.reduceat(value[order], starts) if len(starts) else value[:0]
-    at_ends = np.minimum(value[first], value[last])
-    between = int((has_both & (least < at_ends * (1.0 - SAME))).sum())
-    labels = [axis.labels[i] for i in np.argsort(axis.numbers, kind="stable")]
-    labels_of_ends = (labels[lowest], labels[highest])
-    return _worth(axis, labels_of_ends, ratios[has_both], planned, between=between)
+    places = sorted({place for averages in settings for place in averages} or {0})
+    first, *_, last = sorted([*places, places[0]], key=lambda place: axis.numbers[place])
+    ratios, between = [], 0
+    for averages in settings:
+        if first != last and last in averages and averages.get(first, 0.0) > 0.0:
+            ratios.append(averages[last] / averages[first])
+            at_ends = min(averages[first], averages[last])
+            between += min(averages.values()) < at_ends * (1.0 - SAME)
+    ends = axis.labels[first], axis.labels[last]
+    return AxisWorth(axis.name, ends, *_range(ratios), len(ratios), planned, between)
 
 
 def _worth_of_texts(
-    axis: ReportAxis,
-    value: Array,
-    group: Integers,
-    place: Integers,
-    planned: int,
+    axis: ReportAxis, settings: Sequence[dict[int, float]], planned: int
 ) -> AxisWorth:
     """Compare all values of the axis that are determined in a setting, two at least."""
-    order, starts, ends = _grouped(group, place)
-    if not len(starts):
-        return _worth(axis, None, value, planned)
-    least, most = (kind.reduceat(value[order], starts) for kind in (np.minimum, np.maximum))
-    with np.errstate(divide="ignore", invalid="ignore"):
-        ratios = most / least
-    several = (starts != ends) & np.isfinite(ratios)
+    ratios = []
     # The best value is the smallest in every comparison, and takes part in all.
-    smallest = value[order] <= np.repeat(least, ends - starts + 1) * (1.0 + SAME)
-    compared = np.repeat(several, ends - starts + 1)
-    wins = np.bincount(place[order][smallest & compared], minlength=len(axis.labels))
-    best = np.flatnonzero(wins == several.sum())
-    name = axis.labels[best[0]] if len(best) == 1 and several.any() else ""
-    return _worth(axis, None, ratios[several], planned, best=name)
+    best = set(range(len(axis.labels)))
+    for averages in settings:
+        least = min(averages.values())
+        if len(averages) > 1 and least > 0.0:
+            ratios.append(max(averages.values()) / least)
+            best &= {place for place in averages if averages[place] <= least * (1.0 + SAME)}
+    name = axis.labels[best.pop()] if len(best) == 1 and ratios else ""
+    return AxisWorth(axis.name, None, *_range(ratios), len(ratios), planned, best=name)
 
 
-def _grouped(group: Integers, place: Integers) -> tuple[Integers, Integers, Integers]:
-    """Return an order by group and value, and the first and last index of each group in it."""
-    order = np.lexsort((place, group))
-    starts = np.flatnonzero(np.r_[True, np.diff(group[order]) != 0]) if len(order) else order
-    return order, starts, np.r_[starts[1:], len(order)][: len(starts)] - 1
-
-
-def _worth(
-    axis: ReportAxis,
-    ends: tuple[str, str] | None,
-    ratios: Sequence[float] | Array,
-    planned: int,
-    between: int = 0,
-    best: str = "",
-) -> AxisWorth:
-    if not len(ratios):
-        return AxisWorth(axis.name, ends, np.nan, np.nan, 0, planned)
-    low, high = float(min(ratios)), float(max(ratios))
-    return AxisWorth(axis.name, ends, low, high, len(ratios), planned, between, best)
+def _range(ratios: Sequence[float]) -> tuple[float, float]:
+    return (min(ratios), max(ratios)) if ratios else (np.nan, np.nan)

@@ -3,39 +3,39 @@
 from __future__ import annotations
 
 from collections import Counter
+from dataclasses import replace
 from itertools import groupby
 from pathlib import PurePosixPath
 
 import numpy as np
 from ballplate.extensions.pages.charts import figure, figures
+from ballplate.extensions.pages.design_views import volume_view
 from ballplate.extensions.pages.document import Page, PageSection, facts_list, written
 from ballplate.extensions.pages.elements import Html, element, folded, joined, note, sentence
+from ballplate.extensions.pages.level_maps import MapPoint, level_map
+from ballplate.extensions.pages.spatial import still_figure
 from ballplate.presentation import (
     MOST_BALLS,
     Block,
     Entry,
     Row,
-    Scene,
     Table,
     micro,
     number,
     percent,
-    scene,
     uncertainty_words,
 )
 from ballplate.simulator.computing import Report, counted, unreported
+from ballplate.simulator.design import Design
 from ballplate.simulator.experiment import Experiment, lay_out
-from ballplate.uncertainty import DESCRIPTIONS
 
 from ..error_map_uncertainty import error_map
 from ..store import Store
-from ..store_columns import symbol_column
 from .answer import answer
 from .cells import NoExperimentError, experiments
-from .design_pictures import scene_svg, slice_svg, slice_words
 from .heatmaps import heat_maps
 from .page_elements import groups_element, heat_element, table_element
-from .plots import plot_svg
+from .plots import plot_figure
 from .results import ReportedSweep, best_and_worst, cell_list, criterion
 from .series import plots
 from .store_comparison import StoreComparison
@@ -65,8 +65,6 @@ def page(
     """Return the page of a sweep.
 
     Experiments with code in Python are drawn only with `run_modules`; `report` receives progress.
-
-    :raises ImportError: matplotlib is not installed.
     """
     along_axes = _plots(results, report)
     designs, drawn_map = _designs(store, results, run_modules, report)
@@ -162,14 +160,11 @@ def _facts(results: ReportedSweep) -> list[tuple[str, str]]:
         if len(labels) > LISTED:
             labels = [*labels[: LISTED - 1], f"… {labels[-1]} ({len(labels)} values)"]
         facts.append((f"Axis {axis.name}", ", ".join(labels)))
-    cells = f"{len(results.cells)}: {results.count('done')} done, "
-    cells += f"{results.count('failed')} failed, {results.left} left"
     if results.found.damaged:
         damaged = sorted(results.found.damaged)
         reason = results.found.damaged[damaged[0]]
-        cells += f", {len(damaged)} unreadable: {cell_list(damaged)} ({reason})"
+        facts.append(("Unreadable cases", f"{cell_list(damaged)} ({reason})"))
     facts += [
-        ("Cases", cells),
         ("Recorded", ", ".join(stored["record"])),
         (
             "Monte Carlo",
@@ -191,8 +186,7 @@ def _facts(results: ReportedSweep) -> list[tuple[str, str]]:
 def _plots(results: ReportedSweep, report: Report) -> Html:
     """Return plots against each axis, folded unless of the quantity that cells are judged by."""
     drawn = plots(results)
-    judged = (criterion(results) or ("", ""))[1]
-    count = 0
+    judged = (criterion(results) or ("", ""))[0]
     parts = []
     for axis, axis_plots in groupby(
         counted(drawn, "plots", len(drawn), report), lambda plot: plot.axis.name
@@ -200,20 +194,12 @@ def _plots(results: ReportedSweep, report: Report) -> Html:
         of_judged: list[Html] = []
         of_others: list[Html] = []
         for plot in axis_plots:
-            count += 1
-            caption = f"{plot.symbol}, {DESCRIPTIONS[plot.symbol]}, against {axis}. {plot.note}"
-            pictures = of_judged if symbol_column(plot.symbol) == judged else of_others
-            pictures.append(figure(caption.rstrip(), plot_svg(plot, f"plot{count}")))
+            pictures = of_judged if plot.measure.figure == judged else of_others
+            pictures.append(plot_figure(plot))
         parts += [element("h3", f"Against {axis}"), figures(*of_judged)]
         if of_others:
             summary = f"Other quantities against {axis}"
             parts.append(folded(summary, figures(*of_others), is_lengthy=len(of_others) > 4))
-    if any(len(line.actual) for plot in drawn for line in plot.panels[0].lines):
-        words = (
-            "Bars of Monte Carlo: average times ratio of actual to linearised errors, ± one"
-            " standard error."
-        )
-        parts.append(note(words))
     return joined(parts)
 
 
@@ -240,38 +226,35 @@ def _designs(
         text = f", {number(1e6 * value, 3)} µm" if not np.isnan(value) else ""
         text += f", {open_:.0f} undetermined" if open_ else ""
         heading = f"{which} average of {symbol}{text}: case {cell}, {results.label(cell)}"
-        designs += [element("h3", heading), _drawn_design(experiment, cell, k)]
+        designs += [element("h3", heading), _drawn_design(experiment, cell)]
     return joined(designs), _drawn_map(built[0], results, cells[0])
 
 
-def _drawn_design(experiment: Experiment, cell: int, k: int) -> Html:
+def _drawn_design(experiment: Experiment, cell: int) -> Html:
     """Return the picture of a cell's design, and the positions as a table."""
     design = lay_out(experiment)
-    drawn = scene(design)
-    sizes = " x ".join(f"{1000 * size:.6g}" for size in design.machine.volume.size)
-    words = f"Volume of {sizes} mm with {len(drawn.places)} positions, which the table below lists."
     caption = (
-        "Positions in the volume: balls that are read (circles), and from one ball the styli to the"
-        " machine's reference point (squares)."
+        "Positions in the volume by name, or by number as in the list: balls that are read, at"
+        f" most {MOST_BALLS} of each, and from one ball the styli to the machine's reference point."
     )
-    if not drawn.is_named:
-        caption += " Positions are numbered as in the table."
-    if any(place.read > MOST_BALLS for place in drawn.places):
-        caption += " Only some of the balls are drawn."
-    picture = figure(caption, scene_svg(drawn, f"scene{k}", words))
-    positions = table_element(_positions(drawn, cell))
-    is_open = len(drawn.places) <= MOST_POSITIONS
-    return joined([figures(picture), folded("List of positions", positions, is_open=is_open)])
+    picture = still_figure(replace(volume_view(design), caption=caption))
+    table = _positions(design, cell)
+    listed = table_element(table)
+    is_open = table.size <= MOST_POSITIONS
+    return joined([figures(picture), folded("List of positions", listed, is_open=is_open)])
 
 
-def _positions(drawn: Scene, cell: int) -> Table:
-    rows = [
-        Row(
-            (str(place.number), place.name, place.artefact, ", ".join(place.probes)),
-            (Entry(str(place.read)),),
-        )
-        for place in sorted(drawn.places, key=lambda place: place.number)
-    ]
+def _positions(design: Design, cell: int) -> Table:
+    rows: list[Row] = []
+    readings = design.readings
+    for k, name in enumerate(design.positions.names):
+        mine = readings.position == k
+        if not mine.any():
+            continue
+        artefact = design.artefacts.names[design.positions.artefact[k]]
+        probes = ", ".join(design.probes.names[probe] for probe in np.unique(readings.probe[mine]))
+        count = len(np.unique(readings.ball[mine]))
+        rows.append(Row((str(len(rows) + 1), name, artefact, probes), (Entry(str(count)),)))
     headings = ("number", "position", "artefact", "probes")
     caption = f"Positions of case {cell}"
     return Table(f"positions-{cell}", caption, headings, ("balls read",), (Block("", tuple(rows)),))
@@ -286,17 +269,24 @@ def _drawn_map(experiment: Experiment, results: ReportedSweep, cell: int) -> Htm
         f" {experiment.evaluation.probe}, in µm."
     )
     if any(np.isnan(level_slice.values).any() for level_slice in drawn.slices):
-        words += " Hatched regions are undetermined."
+        words += " It is undetermined at points with –."
     if drawn.within is not None:
         words += (
             f" Of the distances between all points of this grid {percent(drawn.within)} are known"
             " to within the target uncertainty, by the"
             f" {uncertainty_words(experiment.coverage_factor)}."
         )
+    values = np.stack([1e6 * level_slice.values for level_slice in drawn.slices])[:, ::4, ::4]
+    known = values[np.isfinite(values)]
+    ends = (float(known.min()), float(known.max())) if len(known) else (0.0, 1.0)
     pictures = []
-    for k, level_slice in enumerate(drawn.slices):
-        slice_text = slice_words(level_slice)
-        caption = slice_text[0].upper() + slice_text[1:] + "."
-        label = f"Map of standard uncertainties, {slice_text}"
-        pictures.append(figure(caption, slice_svg(drawn, level_slice, f"slice{k}", label)))
+    for level_slice, of_level in zip(drawn.slices, values, strict=True):
+        level = "" if level_slice.level is None else f", z = {1e3 * level_slice.level + 0.0:.6g} mm"
+        label = f"Map of standard uncertainties in µm{level}"
+        points = [
+            MapPoint(x, y, value if np.isfinite(value) else None)
+            for y, row in zip(drawn.y[::4].tolist(), of_level.tolist(), strict=True)
+            for x, value in zip(drawn.x[::4].tolist(), row, strict=True)
+        ]
+        pictures.append(figure(f"{label}. Darker is larger.", level_map(points, ends, label)))
     return joined([sentence(words), figures(*pictures)])

@@ -10,7 +10,7 @@ from ballplate.simulator.computing import evenly_spread
 from ballplate.simulator.machines import Array, Integers
 
 from ..store_columns import symbol_column
-from .measures import STATISTICS, Measure, trial_symbols, uncertainty_measures
+from .measures import Measure, uncertainty_measures
 from .results import ReportAxis, ReportedSweep, criterion, partly_open, ranked
 
 # Limits: distinguishable lines, values along an axis, pictures of one quantity for settings of
@@ -22,7 +22,7 @@ MOST_LINES, MOST_PLACES, MOST_PICTURES, MOST_POINTS = 6, 200, 4, 1000
 class SeriesLine:
     """Values along an axis, each of a single cell.
 
-    `actual` and `error` are Monte Carlo's value and its standard error, empty without trials.
+    `actual` and `error` are Monte Carlo's value and its standard error, NaN without trials.
     """
 
     label: str
@@ -33,24 +33,15 @@ class SeriesLine:
 
 
 @dataclass(frozen=True, eq=False)
-class Panel:
-    """Lines of one measure."""
-
-    measure: Measure
-    lines: tuple[SeriesLine, ...]
-
-
-@dataclass(frozen=True, eq=False)
 class Plot:
-    """Average and maximum of a quantity against an axis; `note` describes the lines.
+    """Average of a quantity against an axis; `note` describes the lines.
 
     `is_scattered` if no two cells share the values of the other axes: then cells are points.
     """
 
     axis: ReportAxis
-    symbol: str
-    unit: str
-    panels: tuple[Panel, ...]
+    measure: Measure
+    lines: tuple[SeriesLine, ...]
     note: str
     is_scattered: bool = False
 
@@ -58,31 +49,25 @@ class Plot:
 def plots(results: ReportedSweep) -> list[Plot]:
     """Return plots for each axis with numbers and each quantity with one unit.
 
-    Lines are values of a second axis. The quantity that cells are judged by has a picture for each
-    setting of the further axes.
+    Lines are values of a second axis. The quantity that cells are judged by comes first, with a
+    picture for each setting of the further axes.
     """
-    by_symbol: dict[str, dict[str, Measure]] = {}
-    for measure in uncertainty_measures(results):
-        if measure.statistic in STATISTICS and " or " not in measure.unit:
-            by_symbol.setdefault(measure.symbol, {})[measure.statistic] = measure
-    judged = criterion(results)
-
-    def is_judged(symbol: str) -> bool:
-        return judged is not None and judged[1] == symbol_column(symbol)
-
+    judged = (criterion(results) or ("", ""))[0]
+    measures = [
+        measure
+        for measure in uncertainty_measures(results)
+        if measure.statistic == "average" and " or " not in measure.unit
+    ]
+    measures.sort(key=lambda measure: measure.figure != judged)
     drawn = []
     for k, axis in enumerate(results.axes):
         if len(axis.numbers) < 2:
             continue
         pictures = _pictures(results, k)
-        for symbol in sorted(by_symbol, key=is_judged, reverse=True):
-            measures = by_symbol[symbol]
-            if len(measures) < 2:
-                continue
-            for picture in pictures if is_judged(symbol) else pictures[:1]:
-                pair = measures["average"], measures["maximum"]
-                plot = _plot(results, k, picture, symbol, pair)
-                if any(np.isfinite(line.y).any() for panel in plot.panels for line in panel.lines):
+        for measure in measures:
+            for picture in pictures if measure.figure == judged else pictures[:1]:
+                plot = _plot(results, k, picture, measure)
+                if any(np.isfinite(line.y).any() for line in plot.lines):
                     drawn.append(plot)
     return drawn
 
@@ -174,37 +159,25 @@ def _picture(
     return _Picture(tuple(labelled_lines), note)
 
 
-def _plot(
-    results: ReportedSweep, k: int, picture: _Picture, symbol: str, measures: Sequence[Measure]
-) -> Plot:
+def _plot(results: ReportedSweep, k: int, picture: _Picture, measure: Measure) -> Plot:
     axis = results.axes[k]
     x = np.array(axis.numbers)[results.chosen[:, k]]
-    left_out = partly_open(results, symbol)
-    panels = []
-    for measure in measures:
-        values = np.where(left_out, np.nan, measure.factor * results.figure(measure.figure))
-        actual, error = _actual(results, measure)
-        lines = [
-            SeriesLine(
-                label,
-                x[rows],
-                values[rows],
-                *((actual[rows], error[rows]) if len(actual) else (actual, error)),
-            )
-            for label, rows in picture.lines
-        ]
-        panels.append(Panel(measure, tuple(lines)))
+    left_out = partly_open(results, measure.symbol)
+    values = np.where(left_out, np.nan, measure.factor * results.figure(measure.figure))
+    actual, error = _actual(results, measure)
+    lines = tuple(
+        SeriesLine(label, x[rows], values[rows], actual[rows], error[rows])
+        for label, rows in picture.lines
+    )
     note = picture.note
     if any(left_out[rows].any() for _, rows in picture.lines):
         note = f"{note} Cases with undetermined values are left out.".strip()
-    return Plot(axis, symbol, measures[0].unit, tuple(panels), note, picture.is_scattered)
+    return Plot(axis, measure, lines, note, picture.is_scattered)
 
 
 def _actual(results: ReportedSweep, measure: Measure) -> tuple[Array, Array]:
-    """Return Monte Carlo's value of an average and its standard error; empty without trials."""
+    """Return Monte Carlo's value of an average and its standard error; NaN without trials."""
     name = symbol_column(measure.symbol)
-    if measure.statistic != "average" or measure.symbol not in trial_symbols(results):
-        return np.zeros(0), np.zeros(0)
     # Monte Carlo may follow a sample of the distances, with another average but the same ratio.
     average = measure.factor * results.figure(measure.figure)
     ratio, error = (results.figure(f"{name}_actual_ratio{end}") for end in ("", "_standard_error"))

@@ -18,7 +18,6 @@ def sweep_page(
 ) -> str:
     """Return a sweep of a store as HTML, compared with the newest sweep of another store if given.
 
-    :raises ImportError: a library for pages is not installed.
     :raises ValueError: the two sweeps cannot be compared.
     """
     with closing(open_store(store)) as opened:

@@ -9,6 +9,7 @@ from ballplate.montecarlo import MonteCarloEstimate, with_error
 from ballplate.presentation import Block, Entry, Row, Table, number, percent
 
 from ..store_columns import symbol_column
+from .answer import answer
 from .measures import (
     STATISTICS,
     Measure,
@@ -17,13 +18,12 @@ from .measures import (
     trial_measures,
     uncertainty_measures,
 )
-from .results import ReportedSweep, criterion, partly_open, ranked
+from .results import ReportedSweep, partly_open
 
 DIGITS = 3
 
 # Limits of a readable table: columns, blocks and rows.
 MOST_COLUMNS, MOST_BLOCKS, MOST_ROWS = 12, 12, 200
-MOST_BEST = 10
 
 NOT_DONE = "left"
 UNREADABLE = "unreadable"
@@ -43,8 +43,6 @@ def report_tables(results: ReportedSweep) -> tuple[Table, ...]:
         if measures
         else []
     )
-    if not in_columns and len(results.frame) > 1:
-        tables = [*_best(results), *tables]
     of_trials = trial_measures(results, in_columns)
     if of_trials:
         caption = "Monte Carlo and the uncertainties"
@@ -60,20 +58,10 @@ def report_tables(results: ReportedSweep) -> tuple[Table, ...]:
     return tuple(tables)
 
 
-def _best(results: ReportedSweep) -> list[Table]:
-    """Return a table of the best cells."""
-    judged = criterion(results)
-    if judged is None:
-        return []
-    criterion_measures = [
-        measure
-        for measure in uncertainty_measures(results, of_parts=False)
-        if measure.symbol == judged[1]
-    ]
-    measures = [*rank_measures(results), *criterion_measures]
-    rows = ranked(results)[:MOST_BEST].tolist()
-    note = f"Sorted by the number of undetermined values, then by average {judged[1]}."
-    return [_rows_table(results, "best", "Best cases", measures, (note,), rows)] if rows else []
+def text_tables(results: ReportedSweep) -> tuple[Table, ...]:
+    """Return the tables of a report without a page; those of many cases begin with the best."""
+    found = None if _fits_columns(results) else answer(results)
+    return (*([found.settings] if found else []), *report_tables(results))
 
 
 def _fits_columns(results: ReportedSweep) -> bool:
@@ -143,16 +131,15 @@ def _rows_table(
     caption: str,
     measures: Sequence[Measure],
     notes: tuple[str, ...],
-    rows: Sequence[int] | None = None,
 ) -> Table:
-    """Return a table with a row for each cell, up to MOST_ROWS, or for some of them."""
+    """Return a table with a row for each cell, up to MOST_ROWS."""
     cell_rows = []
-    for row in range(min(len(results.frame), MOST_ROWS)) if rows is None else rows:
+    for row in range(min(len(results.frame), MOST_ROWS)):
         cell = results.cell(row)
         entries = tuple(_entry(results, measure, cell, row) for measure in measures)
         cell_rows.append(Row((str(cell), *results.labels(row)), entries))
     more = len(results.frame) - len(cell_rows)
-    if more > 0 and rows is None:
+    if more > 0:
         notes = (
             f"Cases not shown here: {more}; ballplate sweep --export gives all.",
             *notes,
