@@ -474,7 +474,6 @@ if TYPE_CHECKING:
     from .notes import complain, note, warn
     from .outputs import (
         PARQUET,
-        PICTURE,
         Needed,
         Output,
         OutputAction,

@@ -53,7 +53,6 @@ if TYPE_CHECKING:
         MUTED,
         PAPER,
         SERIES,
-        WIDTH,
         blank_axes,
         common_legend,
         drawing,
