@@ -7,10 +7,10 @@ read in any order, and the first position needs no change.
 Within a place, positions are edges of a graph of probes, from their first to their last probe, and
 a change of probe is a further edge: the fewest that complete one route follow from the nodes of
 odd degree and the connected components (Euler). Places are ordered by dynamic programming over
-sets (Held and Karp, J. SIAM 10 (1962) 196), each visited once. This is exact for any number of
-positions unless returning to a place pays: a second visit costs `plane` and saves at most two
-changes of probe. If `plane` is shorter, and beyond `MOST_PLACES`, the order is approximate, with a
-lower bound.
+sets (Held and Karp, J. SIAM 10 (1962) 196). This is exact for any number of positions unless
+returning to a place pays: a second visit costs `plane` and saves at most two changes of probe. If
+`plane` is shorter, sets of positions are enumerated up to `MOST_POSITIONS`; beyond, and beyond
+`MOST_PLACES`, the order is approximate, with a lower bound.
 """
 
 from __future__ import annotations
@@ -25,8 +25,9 @@ import numpy as np
 from ballplate.simulator.experiment.model import Candidate, ChangeTimes, Position
 from ballplate.simulator.machines.protocol import Array, Integers
 
-# Places of which all sets are gone through; of more only so many sets of each size are followed.
-MOST_PLACES, MOST_SETS = 12, 500
+# Positions of which all sets are gone through, and places; of more places only so many sets of each
+# size are followed.
+MOST_POSITIONS, MOST_PLACES, MOST_SETS = 12, 12, 500
 
 
 @dataclass(frozen=True)
@@ -80,7 +81,8 @@ def changeover(kinds: Collection[Setup], changes: ChangeTimes, first: Setup | No
     120.0
     """
     counted = frozenset(
-        (kind, _enough(len(kind.probes), count)) for kind, count in Counter(kinds).items()
+        (kind, _enough(len(kind.probes), count, _comes_back(changes)))
+        for kind, count in Counter(kinds).items()
     )
     return _least(counted, changes, first)
 
@@ -90,7 +92,12 @@ def _least(kinds: frozenset[tuple[Setup, int]], changes: ChangeTimes, first: Set
     return _task(kinds, changes, first, is_paid=True).seconds
 
 
-def _enough(probes: int, count: int) -> int:
+def _comes_back(changes: ChangeTimes) -> bool:
+    """True if returning to a place may save changes of probe."""
+    return 0.0 < changes.plane <= 2.0 * changes.probe
+
+
+def _enough(probes: int, count: int, comes_back: bool) -> int:
     """Return the number of positions of a class beyond which the cost no longer depends on the
     number.
 
@@ -100,11 +107,15 @@ def _enough(probes: int, count: int) -> int:
     """
     if probes == 1:
         return 1
+    if comes_back:
+        return count
     return 2 - count % 2 if probes == 2 else min(count, probes - 1 + probes // 2)
 
 
 # Sets of probes, each with the number of positions that are read with it.
 _Content = tuple[tuple[tuple[int, ...], int], ...]
+# A position: place, set of probes, first and last probe.
+_Step = tuple[int, tuple[int, ...], int, int]
 # The connected part that each probe belongs to, -1 where nothing is read with it, and the probes of
 # odd degree as binary digits.
 _Graph = tuple[tuple[int, ...], int]
@@ -195,11 +206,30 @@ class _Task:
             tuple((some, len(kinds)) for some, kinds in member.items()) for member in self.members
         ]
 
+    @cached_property
+    def positions(self) -> list[tuple[int, tuple[int, ...]]]:
+        """Place and probes of each position; those of one probe, read together, occur once."""
+        return [
+            (place, probes)
+            for place, content in enumerate(self.contents)
+            for probes, count in content
+            for _ in range(_enough(len(probes), count, comes_back=True))
+        ]
+
+    @cached_property
+    def comes_back(self) -> bool:
+        """True if an order that returns to a place may be the cheapest."""
+        is_possible = len(self.contents) > 1 and _comes_back(self.changes)
+        return is_possible and self.by_places > self.bound
+
+    @property
+    def is_small(self) -> bool:
+        return len(self.positions) <= MOST_POSITIONS
+
     @property
     def is_exact(self) -> bool:
         """True if no order is cheaper than the best one found."""
-        may_return = len(self.contents) > 1 and 0.0 < self.changes.plane <= 2.0 * self.changes.probe
-        return len(self.contents) <= MOST_PLACES and not (may_return and self.seconds > self.bound)
+        return self.is_small if self.comes_back else len(self.contents) <= MOST_PLACES
 
     @cached_property
     def bound(self) -> float:
@@ -211,6 +241,14 @@ class _Task:
         least = float((self.begin[:, None] + self.changes.probe * changed).min(initial=np.inf))
         # The first place may be the one where it begins.
         return least + self.changes.plane * (len(self.contents) - 1) + float(self.entry.min())
+
+    @property
+    def seconds(self) -> float:
+        """Cost of the best order, in seconds."""
+        if not self.contents:
+            return 0.0
+        is_single = self.comes_back and self.is_small
+        return float(self.by_positions[0][-1].min()) if is_single else self.by_places
 
     @cached_property
     def within(self) -> list[Array]:
@@ -256,26 +294,85 @@ class _Task:
         return min(options)
 
     @cached_property
-    def seconds(self) -> float:
-        """Cost of the best order, in seconds."""
-        if not self.contents:
-            return 0.0
+    def by_places(self) -> float:
+        """Least cost if each place is visited once."""
         return self.next_place((1 << len(self.contents)) - 1, self.begin, self.entry)[0]
+
+    @cached_property
+    def by_positions(self) -> tuple[Array, Array]:
+        """Least cost by the set of positions read, to end in a place with a probe and begin there
+        with the next, (sets, places x probes).
+        """
+        size, count = len(self.names), len(self.positions)
+        ended = np.full((1 << count, len(self.contents) * size), np.inf)
+        reached = ended.copy()
+        reached[0] = (self.begin + self.entry[:, None]).ravel()
+        sets = np.arange(1 << count)
+        sizes = np.array([subset.bit_count() for subset in range(1 << count)])
+        for size_taken in range(count + 1):
+            sets_of_size = sets[sizes == size_taken]
+            if size_taken:
+                reached[sets_of_size] = (ended[sets_of_size, :, None] + self.between).min(axis=1)
+            for k, (place, probes) in enumerate(self.positions):
+                before = sets_of_size[sets_of_size >> k & 1 == 0]
+                for first, last in _ends(probes):
+                    end, after = place * size + last, before | 1 << k
+                    cost = reached[before, place * size + first]
+                    ended[after, end] = np.minimum(ended[after, end], cost)
+        return ended, reached
+
+    @cached_property
+    def between(self) -> Array:
+        """Cost from each place and probe to every other."""
+        place, probe = np.divmod(np.arange(len(self.contents) * len(self.names)), len(self.names))
+        return self.changes.plane * (place[:, None] != place) + self.changes.probe * (
+            probe[:, None] != probe
+        )
 
     def visits(self) -> Iterator[Visit]:
         """The positions of the best order one by one."""
+        if not self.contents:
+            return
+        is_single = self.comes_back and self.is_small
         unvisited = [
             {probes: [*kinds] for probes, kinds in member.items()} for member in self.members
         ]
+        for place, probes, first, last in self.traced() if is_single else self.followed():
+            kinds = unvisited[place][probes]
+            # Of one probe, all are read together.
+            for _ in range(len(kinds) if is_single and len(probes) == 1 else 1):
+                yield Visit(kinds.pop(0), self.names[first], self.names[last])
+
+    def followed(self) -> Iterator[_Step]:
+        """Best order that visits each place once."""
         todo, begin, entry = (1 << len(self.contents)) - 1, self.begin, self.entry
         while todo:
             _, place, first, last = self.next_place(todo, begin, entry)
-            for probes, start, end in _route(self.contents[place], first, last, len(begin)):
-                kind = unvisited[place][probes].pop(0)
-                yield Visit(kind, self.names[start], self.names[end])
+            for step in _route(self.contents[place], first, last, len(begin)):
+                yield place, *step
             todo &= ~(1 << place)
             begin = np.where(np.arange(len(begin)) == last, 0.0, np.inf)
             entry = np.full(len(entry), self.changes.plane)
+
+    def traced(self) -> Iterator[_Step]:
+        """The best order of single positions, found from its end."""
+        ended, reached = self.by_positions
+        size, last_end, steps = len(self.names), len(ended) - 1, []
+        index = int(ended[last_end].argmin())
+        while last_end:
+            k, first = next(
+                (k, first)
+                for k, (place, probes) in enumerate(self.positions)
+                for first, last in _ends(probes)
+                if last_end >> k & 1
+                and place * size + last == index
+                and reached[last_end & ~(1 << k), place * size + first] == ended[last_end, index]
+            )
+            place, probes = self.positions[k]
+            steps.append((place, probes, first, index % size))
+            last_end &= ~(1 << k)
+            index = int((ended[last_end] + self.between[:, place * size + first]).argmin())
+        yield from reversed(steps)
 
 
 def _route(
@@ -314,7 +411,7 @@ def _probe_changes(content: _Content, size: int) -> Integers:
     graphs = {((-1,) * size, 0)}
     for probes, count in content:
         pairs = list(combinations(probes, 2)) or [(probes[0], probes[0])]
-        for _ in range(_enough(len(probes), count)):
+        for _ in range(_enough(len(probes), count, comes_back=False)):
             graphs = {_joined(graph, *pair) for graph in graphs for pair in pairs}
     changes = np.empty((size, size), np.int64)
     for first in range(size):
