@@ -395,19 +395,6 @@ class Search:
                 *cause_found.range,
             )
 
-    def offset(self, probe: int, excess: Array, statistic: float, limit: float) -> Suspect | None:
-        """Return a probe's offset as a suspect whose stated value was `excess` (d,) larger; None
-        if it is invisible.
-        """
-        all_patterns = self.patterns
-        columns = all_patterns.of_kind("probe")
-        columns = self._testable(columns[all_patterns.subject[columns] == probe])
-        if not len(columns):
-            return None
-        (suspect,) = self._suspects([_Chosen(columns, 0.0, (-1, -1), ())])
-        values = suspect.values + excess[all_patterns.axis[columns]]
-        return replace(suspect, values=values, statistic=statistic, limit=limit)
-
     def _alternatives(self, columns: Integers) -> tuple[tuple[int, ...], ...]:
         """Return patterns of other causes that leave the same residuals."""
         own_cause = cause(self.patterns, columns)

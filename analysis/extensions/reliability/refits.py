@@ -26,10 +26,12 @@ from ballplate.simulator.estimation import (
     linearise,
     linearised_fit,
 )
+from ballplate.simulator.geometry import AXIS_NAMES
+from ballplate.simulator.inputs import format_length, listing
 from ballplate.simulator.machines import Array, Integers
 
 from .bias_patterns import patterns
-from .cause_search import FAMILY, Search, clear_odds, unbeaten, variance
+from .cause_search import FAMILY, clear_odds, diagnosis, unbeaten, variance
 from .exact_values import diagnosis_of_all
 from .remainders import leftover
 from .suspects import Diagnosis, Refit
@@ -108,33 +110,14 @@ class _Refits:
     def _offset_diagnosis(self, mistakes: list[WrongOffsets], limit: float) -> Diagnosis | None:
         """Return the diagnosis with the first of some errors."""
         design, first = self.at.design, mistakes[0]
-        if not first.is_off:
-            words = tuple(mistake.words(design) for mistake in mistakes)
+        if first.is_off:
+            right = _exact(design, stated_offsets(design) + first.change, np.array(first.probes))
+            cure = "qualify the probe again"
+        else:
+            right = with_offsets(design, first.change)
             cure = "correct the offsets under probes, or the names of probes in the readings"
-            return self._named(words, cure, with_offsets(design, first.change), limit)
-        (probe,) = first.probes
-        exact = _exact(design, stated_offsets(design) + first.change, np.array([probe]))
-        searched = self._without(exact)
-        if searched is None:
-            return None
-        search, remainder = searched
-        log_p = self._log_p(search.sum_of_squares, design.dimension)
-        statistics = normal_equivalent(log_p), normal_equivalent(limit)
-        suspect = search.offset(probe, -first.change[probe], *statistics)
-        names = {mistake.probes[0]: design.probes.names[mistake.probes[0]] for mistake in mistakes}
-        if suspect:
-            biases = suspect.patterns
-            every = np.array(
-                [suspect.columns[0], *(mistake[0] for mistake in suspect.alternatives)]
-            )
-            distinguished = biases.subject[every[biases.kind[every] == "probe"]]
-            further = (
-                f"offset of probe {name}" for k, name in names.items() if k not in distinguished
-            )
-            suspect = replace(suspect, of_model=(*further, *suspect.of_model))
-            return replace(remainder, suspects=(suspect, *remainder.suspects))
-        words = tuple(f"the offset of probe {name} is another one" for name in names.values())
-        return self._named(words, "qualify the probe again", exact, limit)
+        words = tuple(_words(design, mistake) for mistake in mistakes)
+        return self._named(words, cure, right, limit)
 
     @property
     def total(self) -> float:
@@ -145,35 +128,40 @@ class _Refits:
         square = max(self.total - remaining, 0.0)
         return float(log_chance(square, self.total, dimensions, self.freedom, False))
 
-    def _without(self, design: Design) -> tuple[Search, Diagnosis] | None:
-        """Return the search with a corrected design, and its diagnosis; None if residuals remain
-        unexplained.
+    def _named(
+        self, words: tuple[str, ...], cure: str, design: Design, limit: float
+    ) -> Diagnosis | None:
+        """Return the diagnosis with an error in the file, and the causes that remain with a
+        corrected design; None if residuals remain unexplained.
         """
         solution = estimate(design, self.x)
         if solution.status != "converged":
             return None
         refitted = linearised_fit(design, solution)
-        search = Search(refitted, self.x, refitted.degrees_of_freedom, self.estimated)
-        remainder = search.diagnosis()
+        remaining, freedom = solution.factor.sum_of_squares, refitted.degrees_of_freedom
+        remainder = diagnosis(refitted, self.x, freedom, self.estimated)
         is_clear = remainder.unexplained is None and (
             self.first_order.unexplained or not remainder.suspects
         )
-        if is_clear or solution.factor.sum_of_squares < NEARLY_ALL * self.total:
-            return search, remainder
-        return None
-
-    def _named(
-        self, words: tuple[str, ...], cure: str, design: Design, limit: float
-    ) -> Diagnosis | None:
-        """Return the diagnosis with an error in the file, and the causes that remain without it."""
-        searched = self._without(design)
-        if searched is None:
+        if not is_clear and remaining >= NEARLY_ALL * self.total:
             return None
-        search, remainder = searched
-        remaining = search.sum_of_squares
         before, times = (math.sqrt(square / self.freedom) for square in (self.total, remaining))
         statistics = normal_equivalent(self._log_p(remaining, 1)), normal_equivalent(limit)
         return replace(remainder, refit=Refit(words, cure, before, times, *statistics))
+
+
+def _words(design: Design, mistake: WrongOffsets) -> str:
+    """Return an error in offsets; of a single offset by how much it is off."""
+    if not mistake.is_off:
+        return mistake.words(design)
+    (probe,) = mistake.probes
+    change = mistake.change[probe]
+    parts = (
+        f"{format_length(float(f'{change[k]:.3g}'))} along {AXIS_NAMES[k]}"
+        for k in np.flatnonzero(np.abs(change) > 0.01 * np.abs(change).max()).tolist()
+    )
+    name = design.probes.names[probe]
+    return f"the offset of probe {name} is another one, by {listing(parts)}"
 
 
 @dataclass(frozen=True)
