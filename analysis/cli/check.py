@@ -13,7 +13,7 @@ from ballplate.simulator.inputs.extensions import service
 
 from .common import add_file, add_formats, percentage
 from .interruption import signatures, written
-from .notes import complain, note, tell_notes, warn
+from .notes import note, tell_notes, warn
 from .outputs import UsageError
 
 if TYPE_CHECKING:
@@ -62,14 +62,6 @@ def add_options(parser: ArgumentParser) -> None:
         ),
     )
     parser.add_argument(
-        "--diff",
-        action="store_true",
-        help=(
-            "print the changes of --fix as a unified diff instead of writing them; the"
-            " exit status is 1 if there are any"
-        ),
-    )
-    parser.add_argument(
         "--goal",
         action="append",
         default=[],
@@ -108,24 +100,19 @@ def run(options: Namespace) -> int:
     from .progress_bars import progress
 
     goals = _goals(options)
-    is_repairing = options.fix or options.diff
-    if options.diff and options.format != "text":
-        raise UsageError(
-            f"--diff cannot be combined with --format {options.format}; give only one of them"
-        )
     wanted = Wanted(
-        goals, options.fail_weak, options.suggest or is_repairing, not options.no_modules
+        goals, options.fail_weak, options.suggest or options.fix, not options.no_modules
     )
     paths = matching_files(options.files)
     if options.format == "junit":
         service("junit_report")
-    if options.fix and not options.diff:
+    if options.fix:
         options.interruption.kept = partial(written, signatures(paths))
     files, statuses = [], [AS_EXPECTED]
     with progress(options) as shown:
         for checked in check_files(paths, options.variant, wanted, shown.show):
             shown.step_aside()
-            if is_repairing:
+            if options.fix:
                 checked, status = service("with_repairs")(checked, wanted, options)
                 statuses.append(status)
             files.append(checked)
@@ -176,10 +163,6 @@ def _print(checked: CheckedFile, options: Namespace) -> None:
         workspace = os.environ.get("GITHUB_WORKSPACE")
         for line in service("annotation_lines")(checked, Path(workspace) if workspace else None):
             print(line, flush=True)
-    elif options.diff:
-        for design in checked.designs:
-            for complaint in design.complaints:
-                complain(f"{checked.file}: {design.prediction.label}: {complaint}")
     elif options.format == "text":
         for design in checked.designs:
             print_lines(design.prediction.lines())

@@ -292,7 +292,7 @@ def _outputs(arguments: tuple[str, ...], folder: Path, before: dict[str, bytes])
     allowed = {_name(path, folder) for path in written} - {_name(path, folder) for path in read}
     if not getattr(options, "force", True):
         allowed -= before.keys()
-    if command == "check" and options.fix and not options.diff:
+    if command == "check" and options.fix:
         # The only files that are read and written, and asked for by that option.
         allowed |= {_name(path, folder) for path in options.files}
     for path in stores:

@@ -21,13 +21,15 @@ from ballplate.simulator.estimation import (
     linearise,
 )
 from ballplate.simulator.experiment import Experiment, lay_out
-from ballplate.simulator.machines import Array, Integers
 from ballplate.uncertainty import QUANTITIES, expansion, functions_of
 
 from .source_sums import SourceSums, source_sums, sources_of
 
 # Evaluation points of which all distances are looked at; of more, some are chosen evenly.
 MOST_PLACES = 200
+
+# Distances of which the derivatives are in memory.
+PAIRS_AT_ONCE = 1000
 
 # Figures side by side in a table of text.
 SIDE_BY_SIDE = 6
@@ -278,25 +280,13 @@ def _ends(distances: Distances, k: int) -> str:
 
 
 def _distances(linearisation: Linearisation, places: MeasuredPoints) -> Iterator[LinearFunctions]:
-    """Yield distances between all separate points, those from one point at a time."""
-    functions_of_places = linear_functions(linearisation, Coordinates(places))
-    as_drawn = functions_of_places.drawn or functions_of_places
-    now, drawn = (
-        places.at(linearisation.design, linearisation.state),
-        places.at(linearisation.design, linearisation.as_drawn.state),
-    )
-    n, d = now.shape
-    rows, of_drawn = functions_of_places.shared.reshape(n, d, -1), as_drawn.shared.reshape(n, d, -1)
-
-    def along(where: Array, derivatives: Array, k: int, later: Integers) -> Array:
-        unit = where[later] - where[k]
-        unit /= np.linalg.norm(unit, axis=1)[:, None]
-        return np.einsum("md,mds->ms", unit, derivatives[later] - derivatives[k])
-
-    for k in range(n - 1):
-        later = k + 1 + np.flatnonzero((drawn[k + 1 :] != drawn[k]).any(axis=1))
-        of_pairs = LinearFunctions(along(drawn, of_drawn, k, later))
-        yield LinearFunctions(along(now, rows, k, later), drawn=of_pairs)
+    """Yield distances between all separate points, some at a time."""
+    drawn = places.at(linearisation.design, linearisation.as_drawn.state)
+    pairs = np.stack(np.triu_indices(len(drawn), 1), axis=1)
+    pairs = pairs[(drawn[pairs[:, 0]] != drawn[pairs[:, 1]]).any(axis=1)]
+    for start in range(0, len(pairs), PAIRS_AT_ONCE):
+        some = pairs[start : start + PAIRS_AT_ONCE]
+        yield linear_functions(linearisation, Distances(places, some, ("",) * len(some)))
 
 
 def _mean_square(

@@ -38,7 +38,6 @@ from .rung_choice import (
     PolynomialGrid,
     first_adequate,
     limits_reached,
-    path,
     richer,
 )
 from .rungs import (
@@ -224,12 +223,11 @@ def compared_models(
     climbed = climb(experiment, observed, is_given, most)
     file = _of_file(experiment, observed.design.model, climbed)
     test = Comparison(is_given, observed.design.observation_count)
-    models = _shown(climbed, file, test)
+    models = _shown(climbed, fit_rung(experiment, observed, file), test)
     fits = []
     for model in models:
         fits.append(fit_rung(experiment, observed, model))
         report(ProgressStep(f"error models of {experiment.label}", len(fits), len(models)))
-    fits = _with_best_richer(experiment, observed, fits, climbed, file, test)
     chosen, richest = (
         next(fit for fit in fits if fit.model.words == wanted.model.words)
         for wanted in (climbed.chosen, climbed.richest)
@@ -282,25 +280,6 @@ def compared_models(
     )
 
 
-def _with_best_richer(
-    experiment: Experiment,
-    observed: ObservedReadings,
-    fits: list[RungFit],
-    climbed: Climb,
-    file: LadderModel,
-    test: Comparison,
-) -> list[RungFit]:
-    """Return the fits with those larger models that explain most, in addition to the chosen one
-    and the file's, by name.
-    """
-    fit_of_file = next(fit.fitted for fit in fits if fit.model.words == file.words)
-    named = {climbed.beaten.by, test.beaten(fit_of_file, richer(fit_of_file, climbed.every)).by}
-    missing = named - {fit.model.words for fit in fits}
-    more = [fit.model for fit in climbed.every if fit.model.words in missing]
-    fits = [*fits, *(fit_rung(experiment, observed, fit) for fit in more)]
-    return sorted(fits, key=lambda fit: fit.model.count)
-
-
 def _untested(design: Design) -> str:
     text = too_many_entries(design)
     return f"{text}: the residuals were not searched for structure" if text else ""
@@ -321,14 +300,27 @@ def _of_file(experiment: Experiment, model: ErrorModel, climbed: Climb) -> Ladde
     return made if made is not None and made.model == model else own_rung(experiment, model)
 
 
-def _shown(climbed: Climb, file: LadderModel, test: Comparison) -> list[LadderModel]:
-    """Models of a way up, the chosen one, empirical ones and the file's own, with the fewest
-    parameters first.
+def _shown(climbed: Climb, file: RungFit, test: Comparison) -> list[LadderModel]:
+    """Return the models to show, with the fewest parameters first: polynomials with as many
+    coefficients for all errors, or as many as the design determines, empirical ones, the file's,
+    and those that the verdict names.
     """
-    polynomials = [rung for rung in climbed.every if rung.model.numbers is not None]
-    models = [rung.model for rung in path(polynomials, test)]
-    models += [rung.model for rung in climbed.every if rung.model.numbers is None]
-    unique = {model.words: model for model in [*models, climbed.chosen.model, file]}
+    largest = climbed.grid.richest.model.numbers
+    named = {
+        climbed.beaten.by,
+        test.beaten(file.fitted, richer(file.fitted, climbed.every)).by,
+        climbed.richest.model.words,
+    }
+
+    def is_shown(model: LadderModel) -> bool:
+        if model.numbers is None or largest is None or model.words in named:
+            return True
+        n, m = model.numbers
+        is_even = m == min(n, largest[1]) or n == min(m, largest[0])
+        return is_even or model.numbers == POOREST
+
+    models = [rung.model for rung in climbed.every if is_shown(rung.model)]
+    unique = {model.words: model for model in [*models, climbed.chosen.model, file.model]}
     return sorted(unique.values(), key=lambda rung: rung.count)
 
 

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
-from ballplate.presentation import Data, FitResult, MainTable, aligned, chance_words, number, picked
+from ballplate.presentation import Data, FitResult, MainTable, chance_words, picked, table_lines
 from ballplate.simulator.readings import ObservedReadings
 
 # Chance, of all that is left out together, below which a prediction fails.
@@ -104,13 +105,19 @@ class Validation(FitResult):
     def lines(self) -> list[str]:
         test = "chi-squared" if self.sigma_is_given else "F"
         k = self.coverage_factor
-        heads = ["left out", "", "predicted", "rms error / u", f"{test}: p-value", "worst reading"]
-        rows = [[*heads, "error / u", "length, µm", f"U (k = {k:g})", ""]]
         failed = self.failed
-        for group in self.left_out:
-            rows.append(
-                [group.kind, group.name, *_cells(group, k), "<- failed" * (group in failed)]
-            )
+        columns = {
+            "left out": "kind",
+            "": "name",
+            "predicted": "predicted",
+            "rms error / u": (_error, 3),
+            f"{test}: p-value": (_chance, chance_words),
+            "worst reading": _worst,
+            "error / u": ("worst.standardised", 3),
+            "length, µm": ("lengths.change", 3),
+            f"U (k = {k:g}), µm": (lambda group: _expanded(group, k), 3),
+            " ": lambda group: "<- failed" * (group in failed),
+        }
         lines = [
             self.heading,
             (
@@ -120,7 +127,7 @@ class Validation(FitResult):
                 " with U of this change"
             ),
             "",
-            *aligned(rows, [False, False, True, True, True, False, True, True, True, False]),
+            *table_lines(columns, self.left_out),
         ]
         tested = sum(group.predicted > 0 for group in self.left_out)
         if not tested:
@@ -169,23 +176,25 @@ COLUMNS = {
 }
 
 
-def _cells(group: PredictedGroup, k: float) -> list[str]:
-    if not group.converged:
-        return ["", "", "", "not converged", "", "", ""]
-    if not group.predicted:
-        return ["nothing", "", "", "", "", "", ""]
-    worst, lengths = group.worst, group.lengths
-    error = (group.mean_square**0.5) / group.sigma if group.sigma > 0.0 else float("nan")
-    cells = [str(group.predicted), number(error, 3), chance_words(group.chance)]
-    if worst is None:
-        cells += ["", ""]
-    else:
-        where = "" if group.kind == "position" else f"{worst.position}: "
-        cells += [f"{where}{worst.ball} {worst.probe} {worst.axis}", f"{worst.standardised:.2f}"]
-    if lengths is None:
-        return [*cells, "undetermined", ""]
-    u = k * lengths.standard_uncertainty
-    return [*cells, number(1e6 * lengths.change, 3), number(1e6 * u, 3)]
+def _error(group: PredictedGroup) -> float:
+    """Return the root mean square of standardised errors; NaN without a prediction."""
+    is_known = group.predicted and group.sigma > 0.0
+    return group.mean_square**0.5 / group.sigma if is_known else math.nan
+
+
+def _chance(group: PredictedGroup) -> float:
+    return group.chance if group.predicted else math.nan
+
+
+def _worst(group: PredictedGroup) -> str:
+    if group.worst is None:
+        return ""
+    where = "" if group.kind == "position" else f"{group.worst.position}: "
+    return f"{where}{group.worst.ball} {group.worst.probe} {group.worst.axis}"
+
+
+def _expanded(group: PredictedGroup, k: float) -> float:
+    return k * group.lengths.standard_uncertainty if group.lengths else math.nan
 
 
 def _data(group: PredictedGroup) -> Data:

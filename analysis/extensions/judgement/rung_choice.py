@@ -226,25 +226,6 @@ def richer(model: FittedSum, every: list[FittedSum]) -> list[FittedSum]:
     return [rung for rung in every if contains(rung.model, model.model)]
 
 
-def path(every: list[FittedSum], test: Comparison) -> list[FittedSum]:
-    """A way from the poorest to the richest polynomials, one coefficient more at each step: from
-    the richest down by what is missed least.
-    """
-    by_numbers = {fit.model.numbers: fit for fit in every}
-    here_now = max(every, key=lambda fit: fit.model.numbers or POOREST)
-    steps = [here_now]
-    while True:
-        assert here_now.model.numbers is not None
-        n, m = here_now.model.numbers
-        fewer = [by_numbers.get(neighbour) for neighbour in ((n - 1, m), (n, m - 1))]
-        offers = [fit for fit in fewer if fit is not None]
-        if not offers:
-            return steps[::-1]
-        here = here_now
-        here_now = max(offers, key=lambda fit: (test.chance(fit, here), fit.degrees_of_freedom))
-        steps.append(here_now)
-
-
 def first_adequate(
     grid: PolynomialGrid, every: list[FittedSum], test: Comparison
 ) -> tuple[FittedSum, Beaten]:

@@ -13,6 +13,7 @@ from ballplate.simulator.geometry import BallLayout, BryanGaugeSettings, TwoSphe
 from ballplate.simulator.inputs import LengthFunction, format_length
 
 from .changes import Change, ChangeKind, distances, with_calibration
+from .written import length_function
 
 # Distances between two balls of a line.
 MOST_DISTANCES = 200
@@ -53,7 +54,7 @@ def certificates(experiment: Experiment) -> Iterator[Change]:
 def calibrated_distances(artefact: str, words: str, item: DistanceCalibration) -> Change:
     """The change of calibrating distances."""
     assert item.standard_uncertainty is not None
-    u = length_words(item.standard_uncertainty)
+    u = length_function(item.standard_uncertainty).replace(" um", " µm")
     change_words = f"calibrate the {words.replace('{}', artefact)} to {u}"
     touched = frozenset(
         f"distance {artefact} {min(pair)} {max(pair)}" for pair in item.pairs.tolist()
@@ -140,9 +141,3 @@ def row_pairs(layout: BallLayout) -> list[tuple[int, int]]:
     return [
         chosen_pairs[k] for k in np.linspace(0, len(chosen_pairs) - 1, MOST_DISTANCES).astype(int)
     ]
-
-
-def length_words(value: LengthFunction) -> str:
-    """Return an uncertainty, constant or growing with length, as text."""
-    constant = format_length(value.constant)
-    return f"{constant} + L/{1.0 / value.slope:.6g}" if value.slope else constant

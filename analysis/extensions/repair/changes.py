@@ -165,13 +165,6 @@ def with_pose(experiment: Experiment, name: str, pose: Pose) -> Experiment:
     return with_position(experiment, replace(_named(experiment, name), pose=pose))
 
 
-def with_repeats(experiment: Experiment, name: str, times: int) -> Experiment:
-    """Return the experiment with every reading of a position repeated `times` times as often."""
-    position = _named(experiment, name)
-    groups = tuple(replace(group, repeats=times * group.repeats) for group in position.readings)
-    return with_position(experiment, replace(position, readings=groups))
-
-
 def _named(experiment: Experiment, name: str) -> Position:
     return next(position for position in experiment.positions if position.name == name)
 

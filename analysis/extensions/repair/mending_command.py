@@ -1,10 +1,8 @@
-"""Repairs that `ballplate check` writes into files, or shows as a difference."""
+"""Repairs that `ballplate check` writes into files."""
 
 from __future__ import annotations
 
-import difflib
 from argparse import Namespace
-from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
@@ -29,13 +27,11 @@ BAD_FILE = 3
 def with_repairs(
     checked: CheckedFile, wanted: Wanted, options: Namespace
 ) -> tuple[CheckedFile, int]:
-    """Write the cheapest repair of each design into a checked file and return its new check; with
-    `options.diff` print the difference instead.
+    """Write the cheapest repair of each design into a checked file and return its new check.
 
     Unrepaired designs keep their suggestions. The number is the least exit status.
     """
     path = Path(checked.file)
-    repaired = set()
     messages: list[Message] = []
     statuses = []
     status = 0
@@ -55,33 +51,17 @@ def with_repairs(
             except ExperimentError as error:
                 messages += error.messages
                 continue
-            repaired.add(design.variant)
-            statuses.append(
-                f"{name}: {'would be ' * options.diff}repaired: {changes_in_words(repair)}"
-            )
-        if options.diff:
-            print("".join(difference(mark + text, mark + new, str(path))), end="", flush=True)
-            status, repaired = int(bool(repaired)), set()
-        elif repaired:
+            statuses.append(f"{name}: repaired: {changes_in_words(repair)}")
+        if new != text:
             status = _write(path, mark, text, new, options)
     except ExperimentError as error:
         status = BAD_FILE
         messages += error.messages
     for line in statuses if status != BAD_FILE else ():
         note(options, line)
-    after = {}
-    if repaired and not status:
-        names = [name for name in repaired if name is not None]
-        (again,) = check_files([path], names, replace(wanted, repairs=options.suggest))
-        after = {
-            design.variant: advised(replace(design, suggestions=_suggestions(design)))
-            for design in again.designs
-        }
-        messages += again.messages
-    designs = tuple(
-        after.get(checked_design.variant, _as_asked(checked_design, options.suggest))
-        for checked_design in checked.designs
-    )
+    if not status and new != text:
+        (checked,) = check_files([path], options.variant, wanted)
+    designs = tuple(_as_asked(design, options.suggest) for design in checked.designs)
     return replace(checked, designs=designs, messages=(*checked.messages, *messages)), status
 
 
@@ -124,29 +104,3 @@ def _write(path: Path, mark: str, text: str, new: str, options: Namespace) -> in
         {path: lambda place: place.write_bytes(content)}, True, options.interruption.held
     )
     return 0 if is_written else BAD_FILE
-
-
-def difference(text: str, new: str, file: str) -> Iterator[str]:
-    r"""Return the lines of a unified difference with their ends; empty if the texts are equal.
-
-    >>> print(*difference("a: 1\nb: 2", "a: 3\nb: 2", "f.yaml"), sep="", end="")
-    --- f.yaml
-    +++ f.yaml
-    @@ -1,2 +1,2 @@
-    -a: 1
-    +a: 3
-     b: 2
-    \ No newline at end of file
-    """
-    before, after = ([*_lines(content)] for content in (text, new))
-    for line in difflib.unified_diff(before, after, file, file):
-        yield line if line.endswith("\n") else f"{line}\n\\ No newline at end of file\n"
-
-
-def _lines(text: str) -> Iterator[str]:
-    """Lines as other programs have them, which end nowhere but at a line feed."""
-    start = 0
-    while start < len(text):
-        end = text.find("\n", start) + 1 or len(text)
-        yield text[start:end]
-        start = end

@@ -20,14 +20,12 @@ from .changes import (
     moved,
     with_further,
     with_pose,
-    with_repeats,
 )
 from .placing import clean, is_plate, middle_of, pitch
 from .written import plane_of
 
 AXES = "xyz"
 TURNS = {1: "one quarter-turn", 2: "half a turn", 3: "three quarter-turns"}
-TIMES = (2, 4, 9)
 # Offset of a probe that is to be added where the experiment's own have none.
 TIP = 0.05
 # What readings with it count for, as it has to be made.
@@ -106,17 +104,6 @@ def more_readings(experiment: Experiment) -> Iterator[Change]:
             apply = partial(with_further, name=place.name, more=more, probes=new)
             touched = frozenset({f"position {place.name} with {name}"})
             yield Change(ChangeKind.READ_MORE, words, cost, touched, apply, more, place.name)
-
-
-def repeats(experiment: Experiment) -> Iterator[Change]:
-    """Positions read several times."""
-    for times in TIMES:
-        for place in experiment.positions:
-            words = f'read position "{place.name}" {times} times'
-            cost = float((times - 1) * place.count)
-            touched = frozenset(f"position {place.name} with {name}" for name in experiment.probes)
-            apply = partial(with_repeats, name=place.name, times=times)
-            yield Change(ChangeKind.READ_MORE, words, cost, touched, apply)
 
 
 def new_tips(experiment: Experiment) -> dict[str, Probe]:

@@ -9,24 +9,20 @@ from ballplate.simulator.experiment import Experiment, Pool, Position, placed_on
 
 from .certificates import certificates
 from .changes import Change, ChangeKind, with_calibration, with_position
-from .moves import more_readings, moves, repeats
+from .moves import more_readings, moves
 from .positions import positions
 
 Generator = Callable[[Experiment], Iterator[Change]]
 
 
-def offers(experiment: Experiment, is_deficient: bool = True) -> dict[ChangeKind, list[Change]]:
+def offers(experiment: Experiment) -> dict[ChangeKind, list[Change]]:
     """Return changes within the volume, by class; additions are those of the pool, if the
     experiment has one.
-
-    Changes that only reduce uncertainties are offered if no observation is missing.
     """
     makers: list[tuple[ChangeKind, Generator]] = [
         (ChangeKind.MOVE, moves),
         (ChangeKind.READ_MORE, more_readings),
     ]
-    if not is_deficient:
-        makers.append((ChangeKind.READ_MORE, repeats))
     if experiment.pool is not None:
         makers.append((ChangeKind.POOL, pool_additions))
     else:

@@ -85,16 +85,10 @@ class Repair:
 
 @dataclass(frozen=True)
 class Repairs:
-    """Result of a search: `complete` repairs, `partial` ones of single directions, and the extent
-    of the search.
-
-    `tried` counts the changes judged by class, and `sets` sets of several.
-    """
+    """Result of a search: `complete` repairs, and `partial` ones of single directions."""
 
     complete: tuple[Repair, ...]
     partial: tuple[Repair, ...]
-    tried: Mapping[ChangeKind, int]
-    sets: int
 
 
 @single_threaded
@@ -116,14 +110,12 @@ def effort(change: Change) -> float:
 
 
 class _Search:
-    """One search: judged changes and their number."""
+    """One search, with the changes judged."""
 
     def __init__(self, base: Examined, most: int) -> None:
         self.most = most
         self.base = base
         self.before = base.judged
-        self.tried: dict[ChangeKind, set[Change]] = {}
-        self.sets = 0
         self.judged: dict[frozenset[Change], Judged | None] = {}
         self.seen: dict[Change, Array] = {}
         self.ranks: dict[Change, int] = {}
@@ -131,7 +123,7 @@ class _Search:
         self.at_most = int(np.clip(WORK / work(base), FEWEST, MOST))
 
     def run(self, report: Report) -> Repairs:
-        candidates = offers(self.base.experiment, self.before.deficiency > 0)
+        candidates = offers(self.base.experiment)
         self.seen = seen_by(
             self.base, [change for changes in candidates.values() for change in changes]
         )
@@ -162,12 +154,7 @@ class _Search:
             for change in complete
         )
         partial = () if is_single else self.of_single_directions(singles)
-        return Repairs(
-            complete,
-            partial,
-            {kind: len(self.tried[kind]) for kind in sorted(self.tried)},
-            self.sets,
-        )
+        return Repairs(complete, partial)
 
     def ranked(self, repairs: Sequence[Repair]) -> tuple[Repair, ...]:
         """Return the best repairs first; if even scale of the best rests on probe offsets, that
@@ -234,10 +221,6 @@ class _Search:
         key = frozenset(changes)
         if key not in self.judged:
             self.judged[key] = judge(self.base.experiment, changes)
-            if len(changes) == 1:
-                self.tried.setdefault(changes[0].kind, set()).add(changes[0])
-            else:
-                self.sets += 1
         return self.judged[key] or self.before
 
     def preference(self, changes: ChangeSet) -> tuple[bool, float, int, float]:
@@ -280,9 +263,6 @@ class _Search:
         null directions.
         """
         useful = self.useful(changes)
-        self.tried.setdefault(kind, set()).update(
-            change for change in changes if change in self.seen
-        )
         k = self.before.deficiency
         whole = [change for change in useful if change not in self.seen or self.ranks[change] == k]
         part = [change for change in useful if change in self.seen and self.ranks[change] < k]

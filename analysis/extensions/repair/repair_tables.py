@@ -31,8 +31,7 @@ def repair_lines(repairs: Repairs | None, judged: Verdict) -> list[str]:
         lines.append(f"repair {k}: {changes_in_words(repair)}: {_worth(repair, judged)}")
         lines += [f"repair {k}, in the file: {edit}" for edit in repair.edits]
     if not repairs.complete:
-        tried = _tried(repairs)
-        lines.append(f"repair: no changes were found that determine everything; {tried}")
+        lines.append("repair: no changes were found that determine everything")
     for repair in repairs.partial:
         lines.append(
             f"repair of {_directions(repair, judged)} alone: {changes_in_words(repair)}: leaves"
@@ -108,17 +107,6 @@ def _numbers(repair: Repair) -> str:
     return f"undetermined {listed(list(map(str, numbers)))}"
 
 
-def _tried(repairs: Repairs) -> str:
-    if not repairs.tried:
-        return "nothing can be changed"
-    counts = ", ".join(f"{count} {KINDS[kind]}" for kind, count in repairs.tried.items())
-    return (
-        f"tried: {counts}, and {repairs.sets} sets of several"
-        if repairs.sets
-        else f"tried: {counts}"
-    )
-
-
 def certificate_lines(certificate: ScaleCertificate | None) -> list[str]:
     """Return lines of the certificate that provides scale, with its change of the file, if one is
     needed.
@@ -156,8 +144,6 @@ def repair_data(repairs: Repairs | None) -> Data | None:
     return {
         "complete": [_data(repair) for repair in repairs.complete],
         "partial": [_data(repair) for repair in repairs.partial],
-        "tried": {KINDS[kind]: count for kind, count in repairs.tried.items()},
-        "sets_tried": repairs.sets,
     }
 
 

@@ -25,8 +25,6 @@ MOST_POINTS = 10_000
 # Columns of balls up to which every number is tried, and the ratio beyond; values of a size that
 # are tried first, and about the best of them if none does.
 EVERY, RATIO, SIZES, REFINED = 12, 1.25, 16, 12
-# Change of the goal's figure from ten times the extreme to it, up to which it is as good as exact.
-CONVERGED = 1e-3
 
 
 @dataclass(frozen=True)
@@ -229,7 +227,6 @@ def _monotone(trials: _Trials, deficiency: int) -> Answer:
     ):
         best += PER_DECADE
     if not trials.at(best).is_met:
-        remarks += [] if searched.grows else _convergence(trials, best)
         return _told(trials, "none", best, remarks)
     return _found(trials, best, worst, [])
 
@@ -242,16 +239,6 @@ def _border(trials: _Trials, right: int, wrong: int) -> int:
         middle = (right + wrong) // 2
         right, wrong = (middle, wrong) if trials.is_right(middle) else (right, middle)
     return right
-
-
-def _convergence(trials: _Trials, extreme: int) -> list[str]:
-    """True if an extreme value is as good as an exact one."""
-    judgement, before = trials.at(extreme).judgement, trials.at(extreme + PER_DECADE).judgement
-    if judgement is None or before is None:
-        return []
-    if abs(before.distance - judgement.distance) <= CONVERGED * judgement.distance:
-        return ["an exact one would not be better: ten times that gives the same result"]
-    return ["a smaller one would still change the result"]
 
 
 def _scanned(trials: _Trials) -> Answer:

@@ -74,7 +74,7 @@ def next_positions(
     :raises ExperimentError: the text is invalid.
     """
     experiment = evaluable_of(document, planning=True)
-    offered = offers(experiment, False)
+    offered = offers(experiment)
     changes = [
         change
         for kind in (ChangeKind.POOL, ChangeKind.ADD_POSITION)

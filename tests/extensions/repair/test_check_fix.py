@@ -1,12 +1,10 @@
-"""`check --fix` and `check --diff`: files are mended as a whole or left as they were."""
+"""`check --fix`: files are mended as a whole or left as they were."""
 
 from __future__ import annotations
 
 import errno
 import os
-import shutil
 import stat
-import subprocess
 from pathlib import Path
 from typing import Any
 
@@ -87,9 +85,7 @@ def test_deficient_variants_are_mended_and_the_others_left(
     assert capsys.readouterr().err.endswith("6.1.1[B]: nothing to repair\n")
 
 
-def test_a_difference_is_shown_and_can_be_applied(
-    folder: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_line_ends_and_marks_stay(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     for name, text in {
         "plain": SHIFTED,
         "crlf": SHIFTED.replace("\n", "\r\n"),
@@ -98,26 +94,11 @@ def test_a_difference_is_shown_and_can_be_applied(
     }.items():
         path = folder / f"{name}.yaml"
         path.write_bytes(text.encode())
-        for option in (["--diff"], ["--fix", "--diff"]):
-            assert run("check", *option, path.name) == 1
-            shown, err = capsys.readouterr()
-            assert path.read_bytes() == text.encode()
-            assert "would be repaired: " in err
-        patched = folder / "patched.yaml"
-        patched.write_bytes(text.encode())
         new = bp.repair(path)
         assert run("check", "--fix", "-q", path.name) == 0
         assert capsys.readouterr().err == ""
         assert path.read_bytes().decode("utf-8-sig") == new != text.removeprefix("\ufeff")
         assert path.read_bytes().startswith("\ufeff".encode()) == (name == "mark")
-        assert shown.startswith(f"--- {path.name}\n+++ {path.name}\n@@ ")
-        if shutil.which("patch"):
-            command = ["patch", "--binary", "-s", patched.name]
-            subprocess.run(command, input=shown.encode(), check=True, cwd=folder)
-            assert patched.read_bytes() == path.read_bytes()
-        # Nothing is left to change.
-        assert run("check", "--diff", path.name) == 0
-        assert capsys.readouterr().out == ""
 
 
 def test_each_file_is_mended_by_itself(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -152,8 +133,6 @@ def test_what_cannot_be_repaired_is_told_as_it_is_suggested(
     assert path.read_bytes() == text
     with pytest.raises(bp.ExperimentError, match=wording.NO_CHANGES_WERE_FOUND):
         bp.repair(path, "one height")
-    assert run("check", "--diff", path, "--variant", "one height") == 0
-    assert capsys.readouterr().out == ""
 
 
 def test_data_of_a_mended_file(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -162,8 +141,6 @@ def test_data_of_a_mended_file(folder: Path, capsys: pytest.CaptureFixture[str])
     assert run("check", "--fix", "--format", "json", "shifted.yaml") == 0
     data = json.loads(capsys.readouterr().out)
     assert data["rank_deficiency"] == 0 and data["repairs"] is None
-    assert run("check", "--diff", "--json", "shifted.yaml") == 2
-    assert wording.DIFF_CANNOT_BE_COMBINED in capsys.readouterr().err
 
 
 def test_links_and_permissions_stay(folder: Path) -> None:

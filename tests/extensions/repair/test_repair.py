@@ -416,22 +416,10 @@ def test_nothing_to_repair() -> None:
     assert repairs(design("npl/6.1.1", "A")) is None
 
 
-def test_what_cannot_be_repaired_says_what_was_tried() -> None:
+def test_what_cannot_be_repaired_is_said() -> None:
     experiment = design("hurt_foss/bryan-gauge", "one plane")
     (line,) = repair_lines(repairs(experiment), check(experiment).verdict)
     assert line.startswith(wording.NO_CHANGES_WERE_FOUND_THAT_DETERMINE)
-
-
-def test_sets_that_were_tried_are_counted_once() -> None:
-    experiment = design("npl/6.1.1", "B")
-    first, second, third = offers(experiment)[ChangeKind.CERTIFICATE][:3]
-    search = repair_search._Search(examine(experiment), 1)
-    counts = []
-    for some in ((first,), (first, second), (second, first), (second, third), (third,)):
-        search.judge(some)
-        counts.append(search.sets)
-    assert counts == [0, 1, 1, 2, 2]
-    assert search.tried == {ChangeKind.CERTIFICATE: {first, third}}
 
 
 def test_changes_that_lead_out_of_the_volume_do_not_go_together() -> None:

@@ -6,7 +6,6 @@ A_COMMENT_HERE_WOULD = "a comment here would be lost"
 A_NEW_PROBE = "a new probe too"
 CANNOT_BE_WRITTEN_AS_IT_WAS = "cannot be written in this form"
 ADD_CANDIDATES = "add candidates that determine them"
-DIFF_CANNOT_BE_COMBINED = "--diff cannot be combined with --format json"
 EMPTY_ADD_POSITIONS = "positions: empty; add positions, or choose some from the pool"
 EVEN_ALL_CANDIDATES_TOGETHER_LEAVE_DIRECTIONS = (
     "even all 8 candidates together leave 2 directions undetermined (EAZ, ECZ, EYZ)"
@@ -18,7 +17,7 @@ EVERY_BAR_LIES_PARALLEL_TO_THE_PLANE = (
 EVERY_BAR_LIES_PARALLEL_TO_THE_XZ = "every bar lies parallel to the xz plane"
 FULL_RANK_AND_NOTHING_IS_WEAKLY = "full rank, and no weak direction; average U6 0.2"
 NO_CHANGES_WERE_FOUND = "no changes were found"
-NO_CHANGES_WERE_FOUND_THAT_DETERMINE = "repair: no changes were found that determine everything; "
+NO_CHANGES_WERE_FOUND_THAT_DETERMINE = "repair: no changes were found that determine everything"
 NO_SELECTION_DETERMINES_ANY = "no selection determines any of it"
 REPAIR_IN_THE_FILE = "repair 1, in the file: positions[straight]: "
 REPAIR_IN_THE_FILE_POSITIONS = (

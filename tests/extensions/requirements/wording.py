@@ -1,6 +1,5 @@
 """The wording that the tests of requirements expect: a rewording is entered here alone."""
 
-AN_EXACT_ONE_WOULD = "an exact one would not be better: ten times that gives the same result"
 FROM_MM_MM = "from 752 mm x 752 mm on, the file is invalid: positions[1]: reading ball"
 REPEATS_OF_EVERY_READING = "repeats of every reading"
 THE_FILE_HAS_NO_TASKS = "the file has no tasks"
