@@ -1,5 +1,4 @@
-"""Classes for a user's own error model, and for certified functions of balls; see the how-to pages
-on error models and on certificates.
+"""Classes for a user's own error model; see the how-to page on error models.
 
 >>> Parameter("scale x", "1", "EXX", "scale of x", 0.5).unit
 '1'
@@ -7,7 +6,6 @@ on error models and on certificates.
 
 from __future__ import annotations
 
-from .simulator.design.observations.python_values import BallFunctions
 from .simulator.machines.protocol import Array, ErrorModel, Parameter, Reported, Unit
 
-__all__ = ["Array", "BallFunctions", "ErrorModel", "Parameter", "Reported", "Unit"]
+__all__ = ["Array", "ErrorModel", "Parameter", "Reported", "Unit"]
