@@ -70,7 +70,6 @@ LATER_KEYS = {
     "Prior": ("by_offset",),
     "KinematicSettings": ("functions", "squareness"),
     "EmpiricalSettings": ("rotation_functions",),
-    "RadialSettings": ("function",),
     "TrueMachineFileSettings": ("level",),
 }
 
