@@ -110,9 +110,9 @@ def exact_contradictions(
         least = _least_misfit(exact, layout.coordinates)
         if least is None:
             continue
-        misfit = least[1]
+        misfit, rows = least
         most = float(np.abs(misfit).max())
-        order = np.argsort(-comparable(_doubtfulness(exact, *least), DIGITS), kind="stable")
+        order = np.argsort(-comparable(_doubtfulness(misfit, rows), DIGITS), kind="stable")
         contradictory = [k for k in order.tolist() if abs(misfit[k]) > SHARE * most]
         names = listing(f"{exact.name[k]} in calibration[{exact.item[k]}]" for k in contradictory)
         yield (
@@ -142,55 +142,47 @@ def _exact_values(calibrations: Mapping[int, Calibration], layout: BallLayout) -
     return _Exact(tuple(parts), tuple(items), tuple(names))
 
 
-def _doubtfulness(exact: _Exact, balls: Array, misfit: Array) -> Array:
+def _doubtfulness(misfit: Array, rows: Array) -> Array:
     """Return the misfit per value (m,): misfits divided by the roots of their redundancies
     [Baarda].
     """
-    rows = exact.misfit(balls)[1]
-    u, values, _ = np.linalg.svd(rows.reshape(len(rows), -1), full_matrices=False)
+    u, values, _ = np.linalg.svd(rows, full_matrices=False)
     unexplained = 1.0 - (u[:, values > KNOWN * values.max(initial=0.0)] ** 2).sum(axis=1)
     return np.abs(misfit) / np.sqrt(np.maximum(unexplained, SHARE))
 
 
 def _least_misfit(exact: _Exact, drawn: Array) -> tuple[Array, Array] | None:
-    """Return the balls (n, d) that satisfy the values best and their misfits (m,), or None if
-    every arrangement does.
+    """Return the misfits (m,) of the balls that satisfy the values best, with their derivatives
+    (m, k d), or None if all values are satisfied somewhere.
     """
+    if np.abs(exact.misfit(drawn)[0]).max() <= exact.rounding:
+        return None
+    # Imported late: it loads slowly, and few certificates have exact values off the drawing.
+    from scipy.optimize import least_squares
+
+    def at(move: Array) -> tuple[Array, Array]:
+        balls = begin.copy()
+        balls[exact.balls] += move.reshape(len(exact.balls), -1)
+        misfit, rows = exact.misfit(balls)
+        return misfit, rows.reshape(len(misfit), -1)
+
     extent = float(np.ptp(drawn, axis=0).max())
     generator = np.random.default_rng(0)
-    best = None
+    solutions = []
     for start in STARTS:
-        off = start * extent * generator.standard_normal(drawn.shape)
-        balls, misfit = _solved(exact, drawn + off)
-        if np.abs(misfit).max() <= exact.rounding:
+        begin = drawn + start * extent * generator.standard_normal(drawn.shape)
+        nothing = np.zeros(len(exact.balls) * drawn.shape[1])
+        solution = least_squares(
+            lambda move: at(move)[0],
+            nothing,
+            lambda move: at(move)[1],
+            ftol=None,
+            xtol=1e-15,
+            gtol=1e-15,
+            max_nfev=STEPS,
+        )
+        if np.abs(solution.fun).max() <= exact.rounding:
             return None
-        if best is None or (misfit**2).sum() < (best[1] ** 2).sum():
-            best = balls, misfit
-    return best
-
-
-def _solved(exact: _Exact, balls: Array) -> tuple[Array, Array]:
-    """Balls (n, d) and misfits (m,) at a minimum of their sum of squares [Levenberg; Marquardt]."""
-    misfit, rows = exact.misfit(balls)
-    damping = 0.0
-    for _ in range(STEPS):
-        if np.abs(misfit).max() <= exact.rounding:
-            break
-        u, values, vh = np.linalg.svd(rows.reshape(len(rows), -1), full_matrices=False)
-        is_known = values > KNOWN * values.max(initial=0.0)
-        gain = np.where(is_known, values / np.where(is_known, values**2 + damping**2, 1.0), 0.0)
-        step = np.zeros_like(balls)
-        step[exact.balls] = -(vh.T @ (gain * (u.T @ misfit))).reshape(rows.shape[1:])
-        if np.abs(step).max() <= 1e-16:
-            break
-        # Balls may come to be at one place, or far out.
-        with np.errstate(all="ignore"):
-            new, new_rows = exact.misfit(balls + step)
-            is_better = (new**2).sum() < (misfit**2).sum() and np.isfinite(new_rows).all()
-        if is_better:
-            balls, misfit, rows, damping = balls + step, new, new_rows, damping / 10.0
-        else:
-            damping = max(10.0 * damping, 1e-6)
-            if damping > 1e3:
-                break
-    return balls, misfit
+        solutions.append(solution)
+    best = min(solutions, key=lambda solution: float(solution.cost))
+    return best.fun, best.jac
