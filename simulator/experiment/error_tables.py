@@ -188,25 +188,18 @@ def _range(
     """Return the fault of the ends of a table whose points are in lines `numbers`."""
     lower, upper = axis
     length = upper - lower
-    limits = []
+    messages = []
     for k, beside, end, sign, word in ((0, 1, lower, -1.0, "begins"), (-1, -2, upper, 1.0, "ends")):
         beyond = sign * (positions[k] - end)
         spacing = min(abs(positions[beside] - positions[k]), WIDEST * length)
         if beyond > MARGIN * length or -beyond > max(MARGIN * length, spacing):
-            limits.append((numbers[k], f"the table {word} at {format_length(positions[k])}"))
-    if not limits:
-        return []
-    shift = lower - positions[0]
-    right = "give positions of the axis, in the unit of the header, and cover the axis"
-    if abs(shift) > MARGIN * length and abs(positions[-1] + shift - upper) <= MARGIN * length:
-        change = (
-            f"add {format_length(shift)} to"
-            if shift > 0.0
-            else f"subtract {format_length(-shift)} from"
-        )
-        right = f"{change} every position, or state the volume as the scales read"
-    reason = f"but the axis is {format_length(lower)} to {format_length(upper)}"
-    return [Message(file, number, 1, "", f"{text}, {reason}; {right}") for number, text in limits]
+            text = (
+                f"the table {word} at {format_length(positions[k])}, but the axis is"
+                f" {format_length(lower)} to {format_length(upper)}; give positions of the axis, in"
+                " the unit of the header, and cover the axis"
+            )
+            messages.append(Message(file, numbers[k], 1, "", text))
+    return messages
 
 
 def parse_point(text: str) -> Three:

@@ -77,7 +77,6 @@ NO_POSITION_READS_BALLS = "6:3: artefacts.plate: no position reads balls r1c2"
 PER_METRE_OF_LENGTH = "per metre of length; give less than 100 um/m"
 POINTS_ARE_TOO_MANY = "eyx.csv:5:1: 3 points are too many; at most 2 are possible"
 PUTS_THE_SCALES = "moves the scales to"
-TAKE_MM_FROM_EVERY_POSITION = "subtract 100 mm from every position"
 THERE_ARE_READINGS_UP_TO_HERE = (
     "16:7: pool.candidates[0]: there are 6440000 readings up to here, repeats counted; at most"
 )

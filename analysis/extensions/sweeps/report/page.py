@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from dataclasses import replace
 from itertools import groupby
 from pathlib import PurePosixPath
@@ -173,13 +172,9 @@ def _facts(results: ReportedSweep) -> list[tuple[str, str]]:
     ]
     facts += [("Seed", str(stored["seed"]))] if stored["trials"] else []
     names = [name for name in results.frame.columns if name.endswith("_version")]
-    counts = Counter(zip(*(results.frame[name].tolist() for name in names), strict=True))
-    for versions, count in counts.items():
-        words = ", ".join(
-            f"{name.removesuffix('_version')} {version}"
-            for name, version in zip(names, versions, strict=True)
-        )
-        facts.append(("Computed with", words if len(counts) == 1 else f"{words} ({count} cases)"))
+    for name in names:
+        versions = sorted(set(map(str, results.frame[name])))
+        facts.append((f"Computed with {name.removesuffix('_version')}", ", ".join(versions)))
     return facts
 
 
