@@ -31,7 +31,6 @@ from .estimators.estimator_choice import (
     COMPARED,
     ESTIMATORS,
     EstimatorName,
-    misused,
     takers,
 )
 from .results.groupings import GROUPINGS, Grouping
@@ -196,7 +195,6 @@ def fit(
     certificate: PathLike | pandas.DataFrame | None = None,
     *,
     components: Grouping | None = None,
-    reweight: bool = False,
     columns: Mapping[str, object] | None = None,
     unit: str | None = None,
     coordinates: str | None = None,
@@ -225,7 +223,6 @@ def fit(
     offsets: bool = True,
     *,
     components: Grouping | None = None,
-    reweight: bool = False,
     columns: Mapping[str, object] | None = None,
     unit: str | None = None,
     coordinates: str | None = None,
@@ -253,7 +250,6 @@ def fit(
     offsets: bool = True,
     *,
     components: Grouping | None = None,
-    reweight: bool = False,
     columns: Mapping[str, object] | None = None,
     unit: str | None = None,
     coordinates: str | None = None,
@@ -279,10 +275,9 @@ def fit(
     own. Of the `ballplate.ESTIMATORS` those of distances take `pairs` of balls, also
     `across_probes`, and reversal takes the axis that has the `scale` difference, and whether
     `offsets` between its positions are estimated. With `components`, one of the
-    `ballplate.GROUPINGS`, variances of groups of observations are estimated, and `reweight` puts
-    these in the place of the stated ones. With `trials` so many data sets of the fitted parameters
-    are fitted as well, from a `seed` and by several `workers`. What is to be known beside the
-    figures is in the result's `remarks`, `warnings` and `complaint`.
+    `ballplate.GROUPINGS`, variances of groups of observations are estimated. With `trials` so many
+    data sets of the fitted parameters are fitted as well, from a `seed` and by several `workers`.
+    What is to be known beside the figures is in the result's `remarks`, `warnings` and `complaint`.
 
     >>> readings = simulate(quickstart())
     >>> fit(quickstart(), readings).converged
@@ -301,12 +296,12 @@ def fit(
     ensure_type(str, 'a set of pairs of balls, such as "corners"', pairs=pairs)
     ensure_one_of(("x", "y", "split", "none"), scale=scale)
     ensure_type(bool, "True or False", monomials=monomials, across_probes=across_probes)
-    ensure_type(bool, "True or False", offsets=offsets, reweight=reweight)
+    ensure_type(bool, "True or False", offsets=offsets)
     if components is not None:
         ensure_one_of(GROUPINGS, components=components)
     asked: dict[str, object] = {"scale": scale, "offsets": not offsets, "pairs": pairs}
     asked |= {"across_probes": across_probes, "monomials": monomials}
-    asked |= {"components": components, "reweight": reweight, "trials": trials}
+    asked |= {"components": components, "trials": trials}
     ensure_whole(1, MOST_TRIALS, trials=trials)
     ensure_whole(0, seed=seed)
     ensure_whole(1, workers=workers)
@@ -316,9 +311,6 @@ def fit(
     wrong = takers(estimator, [name for name, value in asked.items() if value])
     if wrong is not None:
         raise ValueError(f"{wrong[0]} applies to the estimator {wrong[1]} only; leave it out")
-    reason = misused(components, reweight, sigma)
-    if reason:
-        raise ValueError(reason)
     column_settings: dict[str, object] = {
         "columns": columns,
         "unit": unit,
@@ -339,7 +331,6 @@ def fit(
         scale,
         offsets,
         components,
-        reweight,
     )
     if trials is None or not isinstance(fit_result, Fit) or not fit_result.converged:
         return fit_result

@@ -12,7 +12,6 @@ from ..estimators.estimator_choice import (
     ESTIMATORS,
     TAKE,
     fit_readings,
-    misused,
     takers,
 )
 from ..results.groupings import GROUPINGS
@@ -118,11 +117,6 @@ def _add_components(parser: ArgumentParser) -> None:
             " probe, position, artefact or calibration (variance components, REML)"
         ),
     )
-    parser.add_argument(
-        "--reweight",
-        action="store_true",
-        help="with --components: fit again with the estimated variances instead of the stated ones",
-    )
 
 
 def _add_trials(parser: ArgumentParser) -> None:
@@ -162,7 +156,6 @@ def run(options: Namespace) -> int:
         options.scale,
         not options.no_offsets,
         options.components,
-        options.reweight,
     )
     if options.trials and isinstance(result, Fit) and result.converged:
         result = _with_trials(options, result, experiment)
@@ -212,11 +205,6 @@ def _refuse_misused(options: Namespace) -> None:
         raise UsageError(f"--{option} applies to --estimator {estimators} only; leave it out")
     if options.trials is None and (options.seed is not None or options.workers is not None):
         raise UsageError("--seed and --workers apply to --trials only; leave them out")
-    reason = misused(options.components, options.reweight, options.sigma)
-    if reason:
-        for name in ("components", "sigma"):
-            reason = reason.replace(f" {name}", f" --{name}")
-        raise UsageError(f"--{reason}")
     if options.output and options.estimator != "full":
         raise UsageError("-o writes the map of the full estimator; leave it out")
     if options.date and not options.output:

@@ -37,7 +37,6 @@ TAKE: dict[str, tuple[str, ...]] = {
     "across_probes": OF_DISTANCES,
     "monomials": ("full", *OF_DISTANCES),
     "components": ("full",),
-    "reweight": ("full",),
     "trials": ("full",),
 }
 
@@ -54,19 +53,6 @@ def takers(estimator: str, options: Collection[str]) -> tuple[str, str] | None:
     return None
 
 
-def misused(components: str | None, reweight: bool, sigma: str | None) -> str:
-    """Return the fault of a combination of options, or an empty text.
-
-    >>> misused(None, True, None)
-    'reweight needs components, the groups of observations to be reweighted'
-    """
-    if reweight and components is None:
-        return "reweight needs components, the groups of observations to be reweighted"
-    if reweight and sigma == "estimated":
-        return "reweight takes variances as estimated by group; leave sigma out"
-    return ""
-
-
 def fit_readings(
     experiment: Experiment,
     observed: ObservedReadings,
@@ -78,7 +64,6 @@ def fit_readings(
     scale: Any = None,
     offsets: bool = True,
     components: Grouping | None = None,
-    reweight: bool = False,
 ) -> FitResult:
     """Return the fit of an experiment's readings by an estimator.
 
@@ -99,7 +84,7 @@ def fit_readings(
     if estimator == "full":
         from ..results.fitting import fit
 
-        return fit(experiment, observed, sigma, monomials, components, reweight)
+        return fit(experiment, observed, sigma, monomials, components)
     from .distances import fit_alternative
 
     return fit_alternative(experiment, observed, estimator, pairs, across_probes, monomials)

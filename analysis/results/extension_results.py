@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import Any, Protocol
 
 from ballplate.presentation.formatting import Data
-from ballplate.simulator.design.arrays import Design
 from ballplate.simulator.inputs.extensions import function, optional_function
 
 
@@ -53,8 +52,6 @@ class GroupVariances(AskedResult, Protocol):
 
     @property
     def groups(self) -> Sequence[Any]: ...
-
-    def reweighted(self, design: Design) -> Design: ...
 
 
 class IssuedCertificate(AskedResult, Protocol):

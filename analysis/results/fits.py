@@ -79,11 +79,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-REWEIGHTED = (
-    "(everything below is as if these estimates had been stated, except those of fewer than 10"
-    " degrees of freedom that are not larger than stated)"
-)
-
 # Steps of an iteration below this, in metres and radians, are reported as rounding.
 LEAST_STEP = 1e-10
 
@@ -103,10 +98,9 @@ class Fit(FitResult):
     root of S^2 over the degrees of freedom, or 1 if the file takes uncertainties as given.
     `adjustments` are those of a three-dimensional metric. `diagnosis` flags gross errors, which
     stay in the fit, or `untested` states why there is none. `estimated` has all estimates as
-    functions of the parameters, without `sigma`. `variance_components` are optional; if
-    `is_reweighted`, all other results are as if their estimates had been stated, except a lack of
-    fit `before_reweighting` that is beyond the limit. `experiment` was fitted. `campaigns` are the
-    sigmas of prior maps; if these are separate, `degrees_of_freedom` are the fewest of them.
+    functions of the parameters, without `sigma`. `variance_components` are optional.
+    `experiment` was fitted. `campaigns` are the sigmas of prior maps; if these are separate,
+    `degrees_of_freedom` are the fewest of them.
     """
 
     label: str
@@ -126,11 +120,9 @@ class Fit(FitResult):
     untested: str = ""
     estimated: EstimatedFunctions | None = None
     variance_components: GroupVariances | None = None
-    is_reweighted: bool = False
     experiment: Experiment | None = None
     bootstrap: AskedResult | None = None
     campaigns: CampaignSigmas | None = None
-    before_reweighting: LackOfFit | None = None
 
     @property
     def design(self) -> Design:
@@ -155,8 +147,6 @@ class Fit(FitResult):
         verdict = verdict_lines(self.verdict, True, lengths, self.unread)
         lines = [self.heading, *verdict]
         origin = "estimated from the residuals" if self.sigma_is_estimated else "as given"
-        if self.is_reweighted:
-            origin = "those of groups as estimated below"
         summary = (
             f"{self.solution.status} after {len(record) - 1} iterations; S^2 ="
             f" {self.sum_of_squares:.6g}"
@@ -179,7 +169,6 @@ class Fit(FitResult):
             lines += ["", *self.assumptions.lines()]
         if self.variance_components is not None:
             lines += ["", *self.variance_components.lines()]
-            lines += [REWEIGHTED] if self.is_reweighted else []
         lines += ["", *uncertainty_table(self.quantities, self.lack_of_fit.caveat), ""]
         lines += [*task_table(self.tasks, self.lack_of_fit.caveat), ""] if self.tasks else []
         printed = [
@@ -233,7 +222,6 @@ class Fit(FitResult):
                 if components is None
                 else {
                     "variance_components": components.to_dict(),
-                    "reweighted": self.is_reweighted,
                 }
             ),
             "estimates": {
@@ -361,7 +349,7 @@ class Fit(FitResult):
 
     def components(self, by: Grouping = "axis") -> GroupVariances:
         """Variances of groups of observations relative to stated ones, by restricted maximum
-        likelihood; of a reweighted fit, relative to those estimated.
+        likelihood.
 
         `by` is axis, probe, position, artefact or calibration.
 
@@ -582,12 +570,7 @@ class Fit(FitResult):
 
     @property
     def lack_of_fit(self) -> LackOfFit:
-        """S^2 against its degrees of freedom; one beyond the limit stays so when variances are
-        estimated from the same residuals.
-        """
-        before = self.before_reweighting
-        if before is not None and before.is_beyond_limit:
-            return before
+        """S^2 against its degrees of freedom."""
         return lack_of_fit(self.sum_of_squares, self.sum_freedom, self.diagnosis, self.untested)
 
     @cached_property

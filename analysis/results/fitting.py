@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import Any, Literal
 
 import numpy as np
@@ -23,7 +22,7 @@ from ..rank.verdicts import verdict
 from ..uncertainty.summaries import uncertainties
 from .adjustments import Adjustment, adjustments
 from .checked_designs import check
-from .diagnosis import diagnosed, lack_of_fit
+from .diagnosis import diagnosed
 from .estimates import estimated_functions, parameter_estimates
 from .fits import Fit
 from .groupings import Grouping
@@ -40,18 +39,17 @@ def fit(
     sigma: Literal["estimated", "given"] | None = None,
     monomials: bool = False,
     components: Grouping | None = None,
-    reweight: bool = False,
 ) -> Fit:
     """Estimate machine errors, balls and poses from readings.
 
     `sigma` overrides the file's; with `monomials` the machine's parameters are the coefficients of
     t, t^2, ... on [0, 1] instead of those of the stable basis. `components` adds variances of
-    groups of observations; with `reweight` these replace the stated ones, and sigma is 1.
+    groups of observations.
 
     :raises ExperimentError: variance components take more memory than there is.
     """
     is_estimated = (sigma or experiment.sigma) == "estimated"
-    campaigns = campaign_sigmas(experiment, observed) if is_estimated and not reweight else None
+    campaigns = campaign_sigmas(experiment, observed) if is_estimated else None
     observed = observed if campaigns is None else campaigns.observed
     design = observed.design
     solution = estimate(design, observed.x) if campaigns is None else campaigns.solution
@@ -68,16 +66,6 @@ def fit(
     variances = None
     if components is not None:
         variances = _variance_components(experiment, at, observed.x, components)
-    if variances is not None and reweight:
-        observed = replace(observed, design=variances.reweighted(design))
-        reweighted = fit(experiment, observed, "given", monomials)
-        squares = solution.factor.sum_of_squares
-        return replace(
-            reweighted,
-            variance_components=variances,
-            is_reweighted=True,
-            before_reweighting=lack_of_fit(squares, own_freedom, diagnosis, untested),
-        )
     judged = verdict(at, experiment.expected_rank_deficiency, experiment.target_uncertainty)
     functions = estimated_functions(at, monomials)
     return Fit(

@@ -14,7 +14,7 @@ from ballplate.simulator.design import Design
 from ballplate.simulator.estimation import Linearisation
 from ballplate.simulator.machines import Array, Integers
 
-from .observation_groups import ObservationGroup, groups_of, reweighted
+from .observation_groups import ObservationGroup, groups_of
 from .restricted_likelihood import (
     SMALLEST,
     GroupSums,
@@ -36,9 +36,6 @@ OUTSIDE = 0.05
 # Groups with fewer degrees of freedom have no estimate: its standard deviation would be larger than
 # itself.
 LEAST_FREEDOM = 1.0
-
-# Degrees of freedom of an estimate below which it does not replace a smaller stated variance.
-FEW = 10
 
 # Entries of the matrices of all groups, of eight bytes each, of which there are several copies.
 MOST_ENTRIES = 20_000_000
@@ -67,32 +64,15 @@ class VarianceComponent:
     def is_estimated(self) -> bool:
         return not np.isnan(self.ratio)
 
-    @property
-    def is_to_be_used(self) -> bool:
-        """True if a reweighted fit uses the estimate: it may reduce uncertainties only if it is
-        accurate to a half.
-        """
-        good = self.ratio > 0.0 and 2.0 * (self.ratio / self.standard_uncertainty) ** 2 >= FEW
-        return self.is_estimated and (good or self.verdict == LARGER)
-
 
 @dataclass(frozen=True, repr=False)
 class VarianceComponents(Result):
-    """Variance components of the groups that `by` makes of all observations of a fit.
-
-    `weighting` are the ratios that a reweighted fit applies to stated variances: 1 without an
-    estimate, or with few degrees of freedom, unless it is larger than stated.
-    """
+    """Variance components of the groups that `by` makes of all observations of a fit."""
 
     label: str
     title: str
     by: Grouping
     groups: tuple[VarianceComponent, ...]
-    weighting: tuple[float, ...]
-
-    def reweighted(self, design: Design) -> Design:
-        """A design whose groups have the estimated variances."""
-        return reweighted(design, groups_of(design, self.by), np.array(self.weighting))
 
     def headline(self) -> str:
         count = sum(group.is_estimated for group in self.groups)
@@ -193,10 +173,7 @@ def variance_components(
     if reason:
         raise ValueError(reason)
     estimated = told_apart(group_sums(leftover(linearisation, x, 0), groups), groups)
-    components = tuple(judged(estimated))
-    used = np.flatnonzero([component.is_to_be_used for component in components])
-    weighting = estimated_ratios(estimated.sums, used)
-    return VarianceComponents(label, title, by, components, tuple(weighting.tolist()))
+    return VarianceComponents(label, title, by, tuple(judged(estimated)))
 
 
 def judged(estimated: Estimated) -> list[VarianceComponent]:

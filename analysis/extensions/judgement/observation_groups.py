@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
-from ballplate.extensions.reliability.hat import row_count, row_places
+from ballplate.extensions.reliability.hat import row_places
 from ballplate.results import Grouping
 from ballplate.simulator.design import (
     Design,
@@ -14,10 +14,9 @@ from ballplate.simulator.design import (
     Observations,
     Priors,
     measured,
-    reading_uncertainties,
 )
 from ballplate.simulator.geometry import AXIS_NAMES
-from ballplate.simulator.machines import Array, Integers
+from ballplate.simulator.machines import Integers
 
 
 @dataclass(frozen=True)
@@ -88,28 +87,3 @@ def groups_of(
             rows = np.flatnonzero([row_name == name for row_name in names])
             groups.append(ObservationGroup(name, start + rows))
     return tuple(group for group in groups if len(group.rows))
-
-
-def reweighted(design: Design, groups: Sequence[ObservationGroup], ratios: Array) -> Design:
-    """Return the design with the stated variances of groups multiplied by (g,)."""
-    d, chosen = design.dimension, design.plate_readings
-    times = np.ones(row_count(design))
-    for group, ratio in zip(groups, ratios.tolist(), strict=True):
-        times[group.rows] = np.sqrt(ratio)
-    places = row_places(design)
-    uncertainty = reading_uncertainties(design, design.readings).copy()
-    uncertainty[chosen] *= times[places["reading"]].reshape(-1, d)
-    changed = []
-    for observation in design.observations:
-        times_of_rows = times[places[observation.word]]
-        if isinstance(observation, Lengths):
-            # Lengths share the noise of readings, which are of standards only: all are one group.
-            times_of_rows = np.full(
-                len(observation), times_of_rows[0] if len(times_of_rows) else 1.0
-            )
-            other_readings = np.setdiff1d(np.arange(len(design.readings)), chosen)
-            uncertainty[other_readings] *= times_of_rows[0] if len(times_of_rows) else 1.0
-        changed.append(observation.enlarged(times_of_rows))
-    return replace(design, readings=replace(design.readings, uncertainty=uncertainty)).observed(
-        *changed
-    )

@@ -191,9 +191,7 @@ def components_section(fit: QuotedData) -> Html:
         "",
     ]
     caption = f"Variances by {components.data['by']}, as ratios to the stated ones"
-    made = table("components", caption, heads, rows, (0, 7))
-    words = "All other values use these estimates instead of the stated variances."
-    return joined([made, note(words) if fit.data.get("reweighted") else Html()])
+    return table("components", caption, heads, rows, (0, 7))
 
 
 def reliability_section(reliability: QuotedData) -> Html:

@@ -26,7 +26,6 @@ from ballplate.extensions.judgement.components import (
 from ballplate.extensions.judgement.observation_groups import (
     ObservationGroup,
     groups_of,
-    reweighted,
 )
 from ballplate.extensions.judgement.restricted_likelihood import (
     at_ratios,
@@ -35,10 +34,7 @@ from ballplate.extensions.judgement.restricted_likelihood import (
 )
 from ballplate.extensions.reliability.remainders import Leftover, leftover
 from ballplate.results.groupings import GROUPINGS, Grouping
-from ballplate.simulator.design.arrays import Design, nominal_state
-from ballplate.simulator.design.observations.distances import CalibratedDistances
-from ballplate.simulator.design.observations.joint_values import JointValues
-from ballplate.simulator.design.observations.whitening import covariance_root
+from ballplate.simulator.design.arrays import Design
 from ballplate.simulator.estimation.linearisation import linearise
 from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.inputs.messages import ExperimentError
@@ -267,23 +263,6 @@ def test_co_ordinates_of_holes_that_are_not_read_are_in_no_group(small: bp.Exper
         assert sum(one.observations for one in groups) == fit.design.observation_count
 
 
-def test_values_with_a_covariance_are_reweighted_together(design: Design) -> None:
-    """Distances half of whose variance is of errors in common."""
-    covariance = 0.04e-12 * (0.5 + 0.5 * np.eye(4))
-    groups = groups_of(design, "calibration")
-    enlarged = reweighted(design, groups, np.array([1.0, 9.0]))
-    one, other = (each.of(CalibratedDistances) for each in (design, enlarged))
-    np.testing.assert_allclose(other.uncertainty, 3.0 * one.uncertainty)
-    joint = JointValues.of([(one, covariance_root(covariance))])
-    state = nominal_state(design)
-    moved = replace(state, balls=state.balls * 1.00001)
-    rows = joint.rows(design, moved, None)
-    wide = joint.enlarged(np.full(4, 3.0)).rows(design, moved, None)
-    # Rounding of what is 16 uncertainties large.
-    np.testing.assert_allclose(wide.residual, rows.residual / 3.0, atol=1e-12)
-    np.testing.assert_allclose(wide.by_ball, rows.by_ball / 3.0, rtol=1e-9, atol=1e-3)
-
-
 def test_a_fit_has_the_estimates_of_the_dense_likelihood(
     small: bp.Experiment, design: Design, noisy: pandas.DataFrame
 ) -> None:
@@ -303,36 +282,6 @@ def test_a_fit_has_the_estimates_of_the_dense_likelihood(
     np.testing.assert_allclose(np.log(ratios), best.x, atol=2e-3)
 
 
-def test_a_reweighted_fit_is_that_of_the_estimated_uncertainties(
-    small: bp.Experiment, noisy: pandas.DataFrame
-) -> None:
-    fit = bp.fit(small, noisy, components="axis", reweight=True)
-    assert fit.variance_components is not None
-    weighting = fit.variance_components.weighting
-    # Distances have too few degrees of freedom to replace what is stated.
-    assert weighting[3] == 1.0
-    stated = [f"{0.2 * np.sqrt(ratio):.12f} um" for ratio in weighting[:3]]
-    same = bp.fit(small.with_({"machine.repeatability": stated}), noisy, sigma="given")
-    assert fit.sigma == same.sigma == 1.0
-    for symbol, quantity in same.quantities.items():
-        assert fit.quantities[symbol].average == pytest.approx(quantity.average, rel=1e-6)
-    for one, other in zip(fit.estimates, same.estimates, strict=True):
-        assert one.value == pytest.approx(other.value, abs=1e-12)
-    again = fit.components("axis").groups
-    # What is left to be estimated is less than a thousandth of a ratio's uncertainty.
-    assert [one.ratio for one in again[:3]] == pytest.approx([1.0] * 3, abs=0.02)
-
-
-def test_uncertain_estimates_do_not_make_uncertainties_smaller(small: bp.Experiment) -> None:
-    readings = bp.simulate(small)
-    fit = bp.fit(small, readings, components="calibration", reweight=True)
-    assert fit.variance_components is not None
-    distances = fit.variance_components.groups[1]
-    assert distances.redundancy < 3.0
-    assert distances.verdict == AS_STATED
-    assert fit.variance_components.weighting[1] == 1.0
-
-
 def test_the_command_prints_and_writes_them(
     tmp_path: Path,
     noisy: pandas.DataFrame,
@@ -348,12 +297,10 @@ def test_the_command_prints_and_writes_them(
     expected = bp.fit(small, noisy, components="axis").variance_components
     assert expected is not None
     assert found["variance_components"] == json.loads(json.dumps(expected.to_dict()))
-    assert found["reweighted"] is False
-    assert main([*command, "--reweight"]) == 0
+    assert main(command) == 0
     text = capsys.readouterr().out
     assert "readings along z" in text
     assert "larger than stated" in text
-    assert wording.SIGMA_TIMES_THE_STATED_UNCERTAINTIES in text
     assert expected.to_frame()["group"].tolist()[2] == "readings along z"
     assert wording.LARGER_THAN_STATED in repr(expected)
 
@@ -375,12 +322,7 @@ def write(tmp_path: Path) -> Callable[[bp.Experiment], Path]:
 @pytest.mark.parametrize(
     ("arguments", "text"),
     [
-        ({"reweight": True}, "reweight needs components"),
         ({"components": "balls"}, '"balls" is unknown'),
-        (
-            {"components": "axis", "reweight": True, "sigma": "estimated"},
-            "reweight takes variances as estimated by group; leave sigma out",
-        ),
         (
             {"components": "axis", "estimator": "distances"},
             "components applies to the estimator full",

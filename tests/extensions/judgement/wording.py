@@ -9,9 +9,6 @@ IS_NOT_DETERMINED_BY_THIS_DESIGN = "is not determined by this design"
 LARGER_THAN_STATED = "larger than stated: readings along z"
 NOTHING_SHOWS_THAT_IT_IS_RICH = "its sufficiency is untested"
 SIGMA_GOES_WITH_READINGS = "--sigma applies to readings"
-SIGMA_TIMES_THE_STATED_UNCERTAINTIES = (
-    "sigma = 1 times the stated uncertainties (those of groups as estimated below)"
-)
 SOURCES_BY_THEIR_PART = "sources by their part of U6, the largest first"
 TRIALS_APPLIES_TO_THE_ESTIMATOR_FULL = "trials applies to the estimator full"
 UNDETERMINED_AND_ARE_LEFT_OUT = "undetermined, and are left out"
