@@ -16,8 +16,10 @@ from .model_kinds import Corner, ErrorModelKind
 from .protocol import ErrorModel
 from .terms import (
     VARIABLES,
+    WITH_CONSTANT,
     Products,
     Radial,
+    RadialName,
     Terms,
     no_terms,
     quadratic,
@@ -48,9 +50,19 @@ class RadialSettings(Settings):
         le=10,
         description="Constant c of sqrt(r^2 + c^2), in fractions of the volume.",
     )
+    function: RadialName = Field(
+        default="multiquadric",
+        description=(
+            "Function of the distance r: multiquadric sqrt(r^2 + c^2), inverse multiquadric"
+            " 1/sqrt(r^2 + c^2), gaussian exp(-r^2/c^2), or without a constant thin plate r^2 log"
+            " r, linear r, cubic r^3."
+        ),
+    )
 
     @model_validator(mode="after")
     def _possible(self) -> Self:
+        if self.function not in WITH_CONSTANT:
+            without(self, ("constant",), f"the function {self.function}")
         try:
             empirical_model(self.terms(), (0.0, 0.0, 0.0), (1.0, 1.0, 1.0))
         except (FrameError, np.linalg.LinAlgError):
@@ -62,7 +74,7 @@ class RadialSettings(Settings):
 
     def terms(self) -> Radial:
         """Return the radial functions."""
-        return Radial(self.centres, self.constant)
+        return Radial(self.centres, self.constant, self.function)
 
 
 TermsSettings = Forms[

@@ -1,16 +1,17 @@
 """Functions of three variables on [0, 1]^3, the terms of the empirical error model.
 
 Products of one univariate function along each axis (redundancy-free sums, plain sums, quadratics,
-full tensor products) and multiquadrics as radial basis functions: NPL Report CISE 15/98, sections
-2.1.1, 2.1.2 and 5.3, which does not prescribe the radial function.
+full tensor products) and radial basis functions: NPL Report CISE 15/98, sections 2.1.1, 2.1.2 and
+5.3, which does not prescribe the radial function.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import product
-from typing import Protocol
+from typing import Literal, Protocol
 
 import numpy as np
 
@@ -177,9 +178,35 @@ def tensor(*bases: Basis) -> Products:
     return Products(axes, tuple(product(x, y, z)))
 
 
+RadialName = Literal[
+    "multiquadric", "inverse multiquadric", "gaussian", "thin plate", "linear", "cubic"
+]
+
+
+def _thin_plate(squared: Array, constant: float) -> Array:
+    """Return r^2 log r of r^2; zero at r = 0."""
+    return 0.5 * squared * np.log(np.where(squared == 0.0, 1.0, squared))
+
+
+RADIAL: dict[str, Callable[[Array, float], Array]] = {
+    "multiquadric": lambda squared, constant: np.sqrt(squared + constant**2),
+    "inverse multiquadric": lambda squared, constant: 1.0 / np.sqrt(squared + constant**2),
+    "gaussian": lambda squared, constant: np.exp(-squared / constant**2),
+    "thin plate": _thin_plate,
+    "linear": lambda squared, constant: np.sqrt(squared),
+    "cubic": lambda squared, constant: squared * np.sqrt(squared),
+}
+"""Radial functions of r^2 and a constant.
+
+Up to sign, each is definite on coefficients orthogonal to linear polynomials: interpolation at
+centres that are not coplanar has one solution.
+"""
+WITH_CONSTANT = ("multiquadric", "inverse multiquadric", "gaussian")
+
+
 @dataclass(frozen=True)
 class Radial:
-    """Interpolants of multiquadrics and a linear polynomial, by their values at centres.
+    """Interpolants of radial functions and a linear polynomial, by their values at centres.
 
     The centres are a regular grid over the volume, corners included. A function's coefficients are
     its values at the centres; the radial functions' coefficients are orthogonal to linear
@@ -192,6 +219,7 @@ class Radial:
 
     grid: tuple[int, int, int]
     constant: float
+    function: RadialName = "multiquadric"
 
     @cached_property
     def centres(self) -> Array:
@@ -207,8 +235,8 @@ class Radial:
         )
 
     def _functions(self, t: Array) -> tuple[Array, Array]:
-        squared = ((t[:, None, :] - self.centres) ** 2).sum(axis=2)
-        kernel = np.sqrt(squared + self.constant**2)
+        distance = ((t[:, None, :] - self.centres) ** 2).sum(axis=2)
+        kernel = RADIAL[self.function](distance, self.constant)
         return kernel, np.column_stack([np.ones(len(t)), t])
 
     @cached_property

@@ -20,7 +20,10 @@ from ballplate.simulator.machines.kinematic import KinematicModel, in_plane, kin
 from ballplate.simulator.machines.plane import PlaneModel, in_space
 from ballplate.simulator.machines.settings import build_error_model
 from ballplate.simulator.machines.terms import (
+    RADIAL,
+    WITH_CONSTANT,
     Radial,
+    RadialName,
     sums,
     univariate,
 )
@@ -116,20 +119,21 @@ def test_parameters_are_as_many_as_the_documentation_says() -> None:
     assert len(univariate(Polynomial(5)).names) == 1 + 3 * 4
 
 
-def test_radial_functions_interpolate_as_scipy_does() -> None:
+@pytest.mark.parametrize("function", RADIAL)
+def test_radial_functions_interpolate_as_scipy_does(function: RadialName) -> None:
     from scipy.interpolate import RBFInterpolator
 
     constant = 0.7
-    radial = Radial((3, 2, 4), constant)
+    radial = Radial((3, 2, 4), constant, function)
+    kernel = {"thin plate": "thin_plate_spline"}.get(function, function.replace(" ", "_"))
+    shape = {"epsilon": 1.0 / constant} if function in WITH_CONSTANT else {}
     places = np.random.default_rng(5).uniform(0.0, 1.0, (40, 3))
     centres = radial.centres
-    values = RBFInterpolator(
-        centres, np.eye(len(centres)), kernel="multiquadric", degree=1, epsilon=1.0 / constant
-    )
+    values = RBFInterpolator(centres, np.eye(len(centres)), kernel=kernel, degree=1, **shape)
     np.testing.assert_allclose(radial.values(places), values(places), rtol=0, atol=1e-9)
     np.testing.assert_allclose(radial.values(centres), np.eye(len(centres)), rtol=0, atol=1e-9)
-    other = Radial((3, 2, 4), 2.0 * constant)
-    assert np.abs(radial.values(places) - other.values(places)).max() > 1e-3
+    assert np.abs(radial.values(places) - Radial((3, 2, 4), 2.0 * constant, function).values(
+        places)).max() > 1e-3 or function not in WITH_CONSTANT  # fmt: skip
 
 
 @pytest.mark.parametrize("arrangement", ["MB2", "FB1", "CX1"])
@@ -202,7 +206,7 @@ def with_model(text: str) -> str:
     [
         ("{kind: kinematic, squareness: straightness}", "{kind: kinematic}"),
         (
-            "{kind: empirical, terms: {centres: [2, 2, 2], constant: 0.5}}",
+            "{kind: empirical, terms: {centres: [2, 2, 2], function: multiquadric}}",
             "{kind: empirical, terms: {centres: [2, 2, 2]}}",
         ),
     ],
@@ -229,7 +233,7 @@ DIFFERENT = [
     "{kind: empirical, rotation_functions: {coefficients: 2}}",
     "{kind: empirical, terms: univariate}",
     "{kind: empirical, terms: {centres: [2, 2, 2]}}",
-    "{kind: empirical, terms: {centres: [2, 2, 2], constant: 0.8}}",
+    "{kind: empirical, terms: {centres: [2, 2, 2], function: cubic}}",
 ]
 
 
@@ -262,7 +266,11 @@ def test_other_options_are_other_experiments(tmp_path: Path) -> None:
             '"coefficients" has no meaning with quadratic terms; remove it',
         ),
         (
-            "{kind: empirical, terms: {centres: [8, 8, 8], constant: 10}}",
+            "{kind: empirical, terms: {centres: [3, 3, 3], function: cubic, constant: 0.5}}",
+            '"constant" has no meaning with the function cubic; remove it',
+        ),
+        (
+            "{kind: empirical, terms: {centres: [6, 6, 6], function: gaussian, constant: 8}}",
             "these functions are too similar to be distinguished",
         ),
     ],

@@ -70,6 +70,7 @@ LATER_KEYS = {
     "Prior": ("by_offset",),
     "KinematicSettings": ("functions", "squareness"),
     "EmpiricalSettings": ("rotation_functions",),
+    "RadialSettings": ("function",),
     "TrueMachineFileSettings": ("level",),
 }
 
