@@ -1,4 +1,5 @@
-"""Classes for a user's own error model; see the how-to page on error models.
+"""Classes for a user's own error model, and for certified functions of balls; see the how-to pages
+on error models and on certificates.
 
 >>> Parameter("scale x", "1", "EXX", "scale of x", 0.5).unit
 '1'
@@ -6,6 +7,7 @@
 
 from __future__ import annotations
 
+from .simulator.design.observations.python_values import BallFunctions
 from .simulator.machines.protocol import Array, ErrorModel, Parameter, Reported, Unit
 
-__all__ = ["Array", "ErrorModel", "Parameter", "Reported", "Unit"]
+__all__ = ["Array", "BallFunctions", "ErrorModel", "Parameter", "Reported", "Unit"]

@@ -66,6 +66,7 @@ if TYPE_CHECKING:
         length_whitening,
     )
     from .observations.priors import Priors
+    from .observations.python_values import PythonCalibration
     from .observations.radius import RadiusCalibration
     from .observations.readings import (
         expected_readings,

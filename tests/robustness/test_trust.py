@@ -79,6 +79,10 @@ READ: dict[str, dict[str, Any]] = {
     "MachineFileSettings.file": {"error_model": {"kind": "machine", "file": "{0}/machine.yaml"}},
     "MapPriorSettings.file": {"priors": [{"kind": "map", "file": "{0}/map.yaml"}]},
     "PointsSettings.file": {"evaluation": {"points": {"file": "{0}/points.csv"}, "probe": "down"}},
+    "PythonValuesSettings.object": calibrated(**python("{0}")),
+    "PythonValuesSettings.values": calibrated(**python("{0}"), values="{0}/distances.csv"),
+    "PythonValuesSettings.covariance": calibrated(**python("{0}"), covariance="{0}/covariance.csv"),
+    "PythonValuesSettings.folder": calibrated(**python("{0}")),
     "PythonSettings.object": {"error_model": python("{0}")},
     "PythonSettings.folder": {
         "true_machine": {"kind": "random", "position": "2 um", "error_model": python("{0}")}
@@ -115,6 +119,10 @@ OTHERS = {
     "PricedCoordinatesSettings.covariance": "CoordinatesSettings, in a pool",
     "PricedDistancesSettings.values": "DistancesSettings, in a pool",
     "PricedDistancesSettings.covariance": "DistancesSettings, in a pool",
+    "PricedPythonValuesSettings.object": "PythonValuesSettings, in a pool",
+    "PricedPythonValuesSettings.folder": "PythonValuesSettings, in a pool",
+    "PricedPythonValuesSettings.values": "PythonValuesSettings, in a pool",
+    "PricedPythonValuesSettings.covariance": "PythonValuesSettings, in a pool",
 }
 CANARY = """
 from pathlib import Path

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from ballplate.simulator.design import PythonCalibration
 from ballplate.simulator.experiment import Experiment
 from ballplate.simulator.machines import PythonSettings, module_source
 from pydantic import BaseModel
@@ -50,11 +51,13 @@ LEFT_OUT = (
     "_found",
 )
 # The same, for single classes: the reading of the laboratory's tables; positions that are not read,
-# which no experiment that is computed has.
+# which no experiment that is computed has; and functions in Python, whose module text and options
+# count instead.
 LEFT_OUT_OF = {
     "Experiment": ("readings", "extensions", "switched_off", "faults"),
     "Position": ("enabled",),
     "Prior": ("data",),
+    "PythonCalibration": ("functions",),
 }
 
 # Names of fields in the fingerprints that stores hold, where the field has another name today.
@@ -145,6 +148,8 @@ def _add(pieces: list[bytes], value: Any) -> None:
             if name not in left_out and not _is_later_default(value, name, item_value):
                 pieces.append(_text(EARLIER_NAMES.get(name, name)))
                 _add(pieces, item_value)
+        if isinstance(value, PythonCalibration):
+            pieces.append(_text(module_text(value.object, value.source)))
     else:
         raise TypeError(f"no fingerprint of a {type(value).__name__}")
 
@@ -208,7 +213,8 @@ def _settings(pieces: list[bytes], value: BaseModel) -> None:
 
 
 def module_text(made_by: str, folder: Path | None) -> str:
-    """Return the text of the module of a user's own error model; empty if there is none.
+    """Return the text of the module of a user's own error model or calibration; empty if there is
+    none.
 
     `made_by` names an object in the module.
     """

@@ -1,4 +1,4 @@
-"""Values of certificates that are correlated.
+"""Values of certificates that are correlated, or functions of a user's own.
 
 Every item of calibration is a block: a function of the balls of one artefact with the covariance of
 its values. Whitened, a row is a combination of all values of its block and ties their balls
