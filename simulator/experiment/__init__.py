@@ -46,6 +46,7 @@ if TYPE_CHECKING:
         override,
         place_of,
         variant_trees,
+        with_present_keys,
     )
 
 __getattr__, __dir__ = lazily(__name__, __file__)

@@ -44,7 +44,7 @@ from .readings_checks import check_readings
 from .readings_section import no_settings
 from .references import resolve_references
 from .structure import validate_sections
-from .variants import MOST_OF_ALL, in_variants, variant_trees
+from .variants import MOST_OF_ALL, in_variants, variant_trees, with_present_keys
 
 
 def load(
@@ -120,7 +120,7 @@ def trees_of(
 
     :raises ExperimentError: the YAML has no tree.
     """
-    root = parse_tree(text, str(source), refused)
+    root = with_present_keys(parse_tree(text, str(source), refused))
     problems = Problems(root)
     return root, variant_trees(root, problems), problems
 
@@ -145,7 +145,7 @@ def written_in_python(sections: AnyMapping[str, Any], folder: Path) -> Experimen
         text = "are for files; change an experiment with its method with_()"
         raise mark.refused(text, "variants")
     try:
-        tree = node_of(sections, mark)
+        tree = with_present_keys(node_of(sections, mark))
     except ValueError as error:
         raise mark.refused(str(error)) from None
     return _built(tree, folder / "experiment", None, OPENED, False)

@@ -18,6 +18,7 @@ from ballplate.simulator.experiment import (
     override,
     python_models,
     variant_trees,
+    with_present_keys,
 )
 from ballplate.simulator.inputs import (
     OPENED,
@@ -188,7 +189,7 @@ def _trees(base: Path) -> Trees:
 
     :raises ExperimentError: the file cannot be read, or a variant is invalid.
     """
-    root = read_tree(base)
+    root = with_present_keys(read_tree(base))
     problems = Problems(root)
     variants = variant_trees(root, problems)
     if problems.messages:
