@@ -1,5 +1,5 @@
-"""Tables of stars beside stated offsets, against rotations that are searched for by another library
-and exchanges that are made by hand.
+"""Tables of stars beside stated offsets, against rotations that are searched for by another
+library.
 """
 
 from __future__ import annotations
@@ -39,23 +39,10 @@ def test_a_table_in_any_axes_with_nominal_offsets_is_not_doubted(seed: int, plac
 @pytest.mark.parametrize("place", [True, False])
 @pytest.mark.parametrize("pair", [(1, 2), (3, 4), (0, 1), (0, 4)])
 @pytest.mark.parametrize("noise", [0.0, 5e-4])
-def test_an_exchange_is_named(pair: tuple[int, int], noise: float, place: bool) -> None:
+def test_an_exchange_is_doubted(pair: tuple[int, int], noise: float, place: bool) -> None:
     table = TIPS + noise * np.random.default_rng(1).uniform(-1.0, 1.0, TIPS.shape)
     table[list(pair)] = table[list(pair[::-1])]
-    found = doubted(table, place=place)
-    assert f'if "{NAMES[pair[0]]}" and "{NAMES[pair[1]]}" are exchanged' in found
-
-
-@pytest.mark.parametrize("seed", range(6))
-def test_an_exchange_is_named_in_any_axes_where_no_turn_is_like_it(seed: int) -> None:
-    """Arms of lengths of their own tell which two are exchanged whatever the axes are."""
-    offsets = TIPS * np.array([1.0, 1.2, 1.5, 1.9, 2.4])[:, None]
-    turn = Rotation.random(random_state=seed).as_matrix()
-    for pair in [(1, 2), (3, 4), (0, 3)]:
-        table = offsets @ turn.T
-        table[list(pair)] = table[list(pair[::-1])]
-        found = doubted(table, offsets)
-        assert f'if "{NAMES[pair[0]]}" and "{NAMES[pair[1]]}" are exchanged' in found
+    assert "check which tip is which" in doubted(table, place=place)
 
 
 def test_a_mirror_image_has_the_same_distances_and_is_doubted() -> None:
@@ -97,4 +84,3 @@ def test_the_file_says_so_once_and_loads(tmp_path: Path) -> None:
         assert len(found.doubts) == exchange
         if exchange:
             assert "stars[0].values" in found.doubts[0]
-            assert f'"{names[1]}" and "{names[2]}" are exchanged' in found.doubts[0]
