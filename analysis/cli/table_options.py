@@ -45,8 +45,8 @@ def add_tables(parser: ArgumentParser) -> None:
         metavar="RULE",
         type=rule,
         help=(
-            'how reports name features, such as "{position}_{ball}_{probe}"; points on a ball are'
-            " numbered by {point} at the end; default: found out, and told"
+            'how reports name features, such as "{position}_{ball}_{probe}"; default: detected and'
+            " reported"
         ),
     )
     parser.add_argument(

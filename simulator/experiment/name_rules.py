@@ -8,7 +8,7 @@ import re
 
 from ..inputs.settings import shorten
 
-PLACES = ("position", "ball", "probe", "point")
+PLACES = ("position", "ball", "probe")
 PLACE = re.compile(r"\{([^{}]*)\}")
 
 
@@ -24,6 +24,4 @@ def check_rule(rule: str) -> str:
         raise ValueError(f"{subject} in a rule of names; known: {', '.join(PLACES)}, in braces")
     if "ball" not in place_holders or len(set(place_holders)) < len(place_holders):
         raise ValueError(f'"{shorten(rule)}" needs {{ball}}, and each place at most once')
-    if "point" in place_holders and not rule.endswith("{point}"):
-        raise ValueError(f'"{shorten(rule)}": {{point}} comes last')
     return rule

@@ -104,8 +104,7 @@ def read_readings(
             without = [rows[i].mark for i in np.flatnonzero(blank)[:MOST_MESSAGES].tolist()]
             messages += [mark.message("", text) for mark in without]
     if messages or unknown:
-        hints = table.hints if unknown else ()
-        raise ExperimentError([*sorted([*messages, *unknown]), *hints])
+        raise ExperimentError(sorted([*messages, *unknown]))
     coordinates, stated_uncertainty = lengths[:, :d], lengths[:, d]
     beside = None
     if design.influences:
@@ -138,7 +137,7 @@ def read_readings(
         raise refused(
             sources[0], f"no reading of the balls {names}; read each at least once", line=1
         )
-    table_notes, doubt = (*table.notes, *swapped), table.doubts
+    table_notes, doubt = (*table.notes, *swapped), tuple[str, ...]()
     checks = optional_service("ReadingChecks")
     if checks is not None:
         uncertainties = stated_uncertainty if has_uncertainty else None

@@ -41,18 +41,13 @@ class SourceText:
 
 @dataclass(frozen=True)
 class SourceRows:
-    """Rows of all tables: `notes` describes how they were read and matched, `hints` help with
-    unknown names.
-
-    `settings` are those stated, with the co-ordinates that reports state; `doubts` concern matched
-    names.
+    """Rows of all tables: `notes` describes how they were read and matched, `settings` are those
+    stated, with the co-ordinates that reports state.
     """
 
     rows: tuple[FileRow, ...]
     notes: tuple[str, ...]
     settings: ReadingsSettings
-    hints: tuple[Message, ...] = ()
-    doubts: tuple[str, ...] = ()
 
 
 def source_text(source: Source, encoding: str | None = None) -> SourceText:

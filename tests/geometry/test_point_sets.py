@@ -7,7 +7,6 @@ from itertools import product
 import numpy as np
 import pytest
 from ballplate.extensions.certificates.datum import Datum, chosen_datum, in_datum, relative_to
-from ballplate.extensions.laboratory.symmetry import turns_onto_itself
 from ballplate.simulator.design.objects import Volume
 from ballplate.simulator.geometry.axes import PlateAxes, plate_axes
 from ballplate.simulator.geometry.ball_layouts import BallLayout
@@ -34,29 +33,6 @@ def grid(*counts: int) -> np.ndarray:
 
 def in_space(points: np.ndarray) -> np.ndarray:
     return np.column_stack([points, np.zeros(len(points))])
-
-
-@pytest.mark.parametrize(
-    ("points", "turns"),
-    [
-        (grid(3, 3), 3),
-        (grid(3, 2), 1),
-        # In space a square has the turns of the dihedral group, a rectangle those of Klein's.
-        (in_space(grid(3, 3)), 7),
-        (in_space(grid(4, 2)), 3),
-        (grid(2, 2, 2), 23),
-        (grid(2, 2, 3), 7),
-        (in_space(grid(4, 1)), 0),
-        (np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 2.0]]), 0),
-    ],
-)
-def test_turns_onto_itself_are_those_of_the_group(points: np.ndarray, turns: int) -> None:
-    found = turns_onto_itself(points, 1e-6)
-    assert len(found) == turns
-    local = points - points.mean(axis=0)
-    for one in found:
-        moved = np.round(local @ one.T, 6) + 0.0
-        assert {tuple(p) for p in moved} == {tuple(p) for p in np.round(local, 6) + 0.0}
 
 
 @pytest.mark.parametrize("shift", [0.0, 5.0])

@@ -38,7 +38,7 @@ from .above_headings import said_above
 from .clock_times import ClockError, ReadTime, clock_time
 from .column_units import units_of_columns
 from .doubtful_commas import commas_of_both_kinds, doubtful_decimals
-from .heading_words import NOTHING, folded, quoted
+from .heading_words import NOTHING, quoted
 from .headings import TEXTS, Group, HeadedColumn, HeadingError, Vocabulary
 from .merged_cells import question
 from .missing_columns import missing_columns
@@ -64,15 +64,13 @@ class TableRows:
     z and u), and further columns; NaN if not stated.
 
     `told` describes how each table was read. `diameters` (rows,) in metres are NaN if not stated.
-    `hints` are advice for unknown names: a position may be named by the file although columns are
-    unused. `coordinates` is the type of a report's co-ordinates, None for a table. `times` are
-    those of rows with clock times.
+    `coordinates` is the type of a report's co-ordinates, None for a table. `times` are those of
+    rows with clock times.
     """
 
     rows: tuple[FileRow, ...]
     told: tuple[str, ...] = ()
     diameters: tuple[float, ...] = ()
-    hints: tuple[Message, ...] = ()
     coordinates: Coordinate | None = None
     times: tuple[ReadTime, ...] = ()
 
@@ -147,7 +145,6 @@ class _Reader:
         rows_found.sort(key=lambda row: row[0].mark.line)
         rows, diameters = [row for row, _ in rows_found], tuple(d for _, d in rows_found)
         self._refuse_doubtful(rows, is_possible)
-        hints = self._of_positions(texts.get("position", ""))
         notes = (self._told(units, texts_above),)
         times = tuple(
             (Mark(str(self.source), line, 1), cells[column.place], clock_time(cells[column.place]))
@@ -156,7 +153,7 @@ class _Reader:
             for line, cells in form.rows
             if cells[column.place].casefold() not in NOTHING
         )
-        return TableRows(tuple(rows), notes, diameters, hints, times=times)
+        return TableRows(tuple(rows), notes, diameters, times=times)
 
     def _asked(self) -> tuple[dict[str, str], dict[int, str]]:
         """Return texts above the headings, and units by index of the columns of lengths.
@@ -220,34 +217,6 @@ class _Reader:
                 texts[role] = name
                 notes.append(f'position "{shorten(name)}" by the name of the file')
         return texts, notes
-
-    def _of_positions(self, position: str) -> tuple[Message, ...]:
-        """Return advice for unknown positions, if only the file's name states one.
-
-        :raises ExperimentError: an unused column holds names of positions alone.
-        """
-        headings = self.form.headings
-        if position != Path(self.source.name).stem or "position" in headings.roles:
-            return ()
-        names_known = {folded(name) for name in self.words.positions}
-        for i, cell in enumerate(headings.cells):
-            if i in headings.used or not cell or folded(position) in names_known:
-                continue
-            if {folded(cells[i]) for _, cells in self.form.rows} <= names_known:
-                name = shorten(cell)
-                raise self.error(
-                    f'the column "{name}" has names of positions; if it is that of positions, give'
-                    f" --columns position={name}, or readings: {{columns: {{position: {name}}}}}"
-                )
-        if not headings.unused:
-            return ()
-        names = quoted(headings.unused)
-        text = (
-            f'position "{shorten(position)}" is the name of the file; not used: {names}; if'
-            " one of these holds the position, give --columns"
-            f" position={shorten(headings.unused[0])}"
-        )
-        return (Message(str(self.source), max(self.form.header, 1), 1, "", text),)
 
     def _rows(
         self, group: Group, texts: Mapping[str, str], units: Mapping[int, str]

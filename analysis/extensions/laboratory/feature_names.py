@@ -70,17 +70,6 @@ def named(names: Sequence[str], rule: str | None, design: Design | None, file: s
     return Named(rule, tuple(_split(name, rule, file) for name in names))
 
 
-def without_point(rule: str) -> tuple[str, re.Pattern[str] | None]:
-    """Return a rule without its point, and the separator of name and point number, if it has a
-    point.
-    """
-    if not rule.endswith("{point}"):
-        return rule, None
-    beginning = rule.removesuffix("{point}")
-    end = beginning.rfind("}") + 1
-    return beginning[:end], re.compile(rf"(.+){re.escape(beginning[end:])}([0-9]+)", re.DOTALL)
-
-
 def _split(name: str, rule: str, file: str) -> Parts | None:
     """Return the parts of a name of an unknown experiment, if it matches the rule."""
     pieces = PLACE.split(rule)
@@ -122,7 +111,7 @@ def _lookup(rule: str, design: Design, numbered: Sequence[str]) -> dict[str, Par
     """Return names by a rule of all balls in all positions with all probes, folded; None for
     ambiguous ones. Names contain the number, from 1, of `numbered` parts.
     """
-    places = [name for name in PLACE.findall(rule) if name != "point"]
+    places = PLACE.findall(rule)
     positions = enumerate(design.positions.names) if "position" in places else ((-1, ""),)
     probes = design.probes.names if "probe" in places else ("",)
     parts_by_name: dict[str, Parts | None] = {}

@@ -48,8 +48,8 @@ def add_options(parser: ArgumentParser) -> None:
         metavar="RULE",
         type=rule,
         help=(
-            'how features are named, such as "{position}_{ball}_{probe}"; points on a ball are'
-            " numbered by {point} at the end; default: found out, and told"
+            'how features are named, such as "{position}_{ball}_{probe}"; default: detected and'
+            " reported"
         ),
     )
     parser.add_argument(

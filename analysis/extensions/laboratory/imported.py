@@ -27,7 +27,7 @@ from ballplate.simulator.inputs import (
     shorten,
 )
 
-from .feature_names import LONGEST_NAME, Named, fold, named, position_of_file, without_point
+from .feature_names import LONGEST_NAME, Named, fold, named, position_of_file
 from .formats.registered import read_report
 from .formats.report import CIRCLE, POINT, SPHERE, UNSTATED, Feature, Report
 
@@ -126,9 +126,7 @@ class ImportSettings:
     @property
     def kinds(self) -> set[str]:
         """Types of features that may be readings."""
-        of_points = self.rule is not None and "{point}" in self.rule
-        more = [CIRCLE] * self.circles + [POINT] * of_points
-        return {POINT} if of_points else {SPHERE, UNSTATED, *more}
+        return {SPHERE, UNSTATED, *([CIRCLE] * self.circles)}
 
 
 @dataclass
@@ -219,12 +217,8 @@ def _taken(report: Report, path: Path | GivenText, settings: ImportSettings) -> 
         feature.kind for feature in report.features if feature.kind not in kinds
     )
     taken_report.left.update(report.others)
-    rule, apart = without_point(settings.rule or "")
     candidates = [feature for feature in report.features if feature.kind in kinds]
-    if apart is not None:
-        candidates = _grouped(candidates, apart, taken_report)
-    else:
-        candidates = _with_points(candidates, report, taken_report)
+    candidates = _with_points(candidates, report, taken_report)
     for why in dict.fromkeys(candidate.lacks for candidate in candidates if candidate.lacks):
         taken_report.leave([candidate for candidate in candidates if candidate.lacks == why], why)
     complete = [
@@ -239,7 +233,7 @@ def _taken(report: Report, path: Path | GivenText, settings: ImportSettings) -> 
         )
         raise refused(report.file, text)
     features = [feature for feature, _ in complete]
-    names, whose = _named(features, rule or None, settings.design, report.file)
+    names, whose = _named(features, settings.rule, settings.design, report.file)
     is_of_file = "{position}" not in names.rule
     position = (
         position_of_file(Path(str(path)).stem, settings.design, str(path)) if is_of_file else ""
@@ -324,22 +318,6 @@ def _with_points(candidates: list[Feature], report: Report, taken_report: _Taken
 def _of_points(name: str, points: Sequence[Feature]) -> Feature:
     places = np.array([point.centre for point in points])
     return replace(points[0], name=name, kind=SPHERE, centre=None, points=places)
-
-
-def _grouped(
-    candidates: list[Feature], apart: re.Pattern[str], taken_report: _Taken
-) -> list[Feature]:
-    """Spheres of points that have the same name except the number of the point."""
-    groups: dict[str, list[Feature]] = {}
-    others_grouped = []
-    for candidate in candidates:
-        match = apart.fullmatch(candidate.name[:LONGEST_NAME])
-        if match is None or candidate.centre is None:
-            others_grouped.append(candidate)
-        else:
-            groups.setdefault(match[1], []).append(candidate)
-    taken_report.leave(others_grouped, "the name has no number of a point")
-    return [_of_points(name, points) for name, points in groups.items()]
 
 
 def _readings(

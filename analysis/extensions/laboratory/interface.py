@@ -42,9 +42,8 @@ def read_report(
     from ballplate.simulator.inputs import LENGTH_UNITS
 
     from .formats.registered import FORMATS
-    from .imported import ImportSettings
+    from .imported import ImportSettings, report_readings
     from .imported_result import ReadReport
-    from .planned_and_imported import import_readings
 
     paths = [reports] if isinstance(reports, str | os.PathLike) else list(reports)
     for path in paths:
@@ -59,5 +58,5 @@ def read_report(
     rule = None if name is None else check_rule(name)
     factor = None if unit is None else LENGTH_UNITS[unit]
     settings = ImportSettings(design, rule, form, factor, circles)
-    imported = import_readings([Path(path) for path in paths], settings)
+    imported = report_readings([Path(path) for path in paths], settings)
     return ReadReport(Path(paths[0]).stem, imported)

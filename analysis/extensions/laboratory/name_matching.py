@@ -19,7 +19,6 @@ from ballplate.simulator.machines import Array, Integers
 
 from .heading_words import folded, quoted
 from .probe_matching import Places, matched_probes
-from .symmetry import turns_onto_itself
 
 # A reading is of the ball whose place is nearer than this part of the distance to its nearest
 # neighbour; a position is the one whose readings are on average as near, and others twice as far.
@@ -33,10 +32,9 @@ _KINDS = re.compile(r"(?:ball|sphere|kugel|position|pos|lage|p|b|k|s|no|nr)\s*")
 
 @dataclass
 class Names:
-    """Matched names of a table, with notes, doubts and questions."""
+    """Matched names of a table, with notes and questions."""
 
     told: list[str] = field(default_factory=list)
-    doubted: list[str] = field(default_factory=list)
     asked: list[str] = field(default_factory=list)
 
 
@@ -296,8 +294,7 @@ def _matched_balls(
         used = list(dict.fromkeys(row.texts[1] for row in of_own))
         if 2 * sum(name not in names_known for name in used) <= len(used):
             continue
-        turned_freely = places is None
-        names = _by_number(of_own, used, balls, design, turned_freely, findings) or _by_place(
+        names = _by_number(of_own, used, balls, design, places is None, findings) or _by_place(
             of_own, used, balls, design, places, findings
         )
         for i, row in zip(members, _renamed(of_own, 1, names), strict=True):
@@ -328,16 +325,16 @@ def _by_number(
     used: Sequence[str],
     balls: Integers,
     design: Design,
-    turned_freely: bool,
+    in_part: bool,
     findings: Names,
 ) -> dict[str, str]:
-    """Match balls by number in reading order, if the readings then fit the artefact as planned or
-    in another orientation.
+    """Match balls by number in reading order, if the readings then fit the artefact as planned, or
+    with the axes of the artefact where they are `in_part` co-ordinates.
     """
     numbers, order = _numbers(used, len(balls)), _order_read(design, balls)
     if numbers is None or not len(order):
         return {}
-    limit, rotations = BY_PLACE * _pitch(design.balls.places[balls]), []
+    limit = BY_PLACE * _pitch(design.balls.places[balls])
     for name in dict.fromkeys(row.texts[0] for row in rows):
         for probe in dict.fromkeys(row.texts[2] for row in rows if row.texts[0] == name):
             rows_of_name = [row for row in rows if row.texts[0] == name and row.texts[2] == probe]
@@ -350,49 +347,14 @@ def _by_number(
             # Most of them: a single wrong reading is no other numbering.
             if float(np.median(apart)) > limit:
                 return {}
+            # Of a symmetrical artefact turned otherwise, locations do not confirm its numbering.
             planned = design.positions.rotations[design.positions.names.index(name)]
-            if not turned_freely and float(np.abs(rotation - planned).max()) > AS_PLANNED:
+            expected = np.eye(design.dimension) if in_part else planned
+            if float(np.abs(rotation - expected).max()) > AS_PLANNED:
                 return {}
-            rotations.append(rotation)
     names = {name: design.balls.names[order[k]] for name, k in numbers.items()}
-    if turned_freely:
-        _doubt_numbers(design.balls.places[balls], rotations, limit, names, findings)
     findings.told.append(f"balls matched by number in reading order: {_pairs(names)}")
     return names
-
-
-def _doubt_numbers(
-    places: Array,
-    rotations: Sequence[Array],
-    limit: float,
-    names: Mapping[str, str],
-    findings: Names,
-) -> None:
-    """Ask about numbers of balls at `places` that part co-ordinates, with `rotations` against the
-    artefact's axes, contradict, and doubt them if these do not decide.
-    """
-    if all(
-        float(np.abs(rotation - np.eye(len(rotation))).max()) <= AS_PLANNED
-        for rotation in rotations
-    ):
-        return
-    turns = turns_onto_itself(places, limit)
-    if not turns:
-        return
-    pairs = _pairs(names)
-    for rotation in rotations:
-        if any(float(np.abs(rotation - turn).max()) <= AS_PLANNED for turn in turns):
-            findings.asked.append(
-                f"the numbers of balls ({pairs}, in reading order) and their locations along the"
-                " part's axes disagree, and the artefact turned onto itself looks the same; write"
-                " the names that balls have in the experiment"
-            )
-            return
-    findings.doubted.append(
-        f"balls are matched by number in reading order alone ({pairs}): the artefact turned onto"
-        " itself looks the same, so that part co-ordinates cannot confirm the numbering; write the"
-        " names that balls have in the experiment"
-    )
 
 
 def _by_place(

@@ -97,18 +97,18 @@ def any_source_rows(
     def places(rows_of_source: Sequence[FileRow]) -> Array:
         return _places(rows_of_source, design, settings)
 
-    hints = tuple(hint for table in tables for hint in table.hints)
     named, names_found = with_known_names(
         rows, design, None if settings.coordinates == "part" else places
     )
     if names_found.asked:
-        asked = [rows[0].mark.message("", text) for text in names_found.asked]
-        raise ExperimentError([*asked, *hints])
+        # How tables were read names the columns that are not used.
+        told = (text for table in tables if table.coordinates is None for text in table.told)
+        texts = (*names_found.asked, *told)
+        raise ExperimentError([rows[0].mark.message("", text) for text in texts])
     notes_of_all = [*(text for table in tables for text in table.told), *notes]
     if len(diameters) == len(rows):
         notes_of_all += _about_diameters(named, np.array(diameters))
-    doubts = tuple(names_found.doubted)
-    return SourceRows(named, (*notes_of_all, *names_found.told), settings, hints, doubts)
+    return SourceRows(named, (*notes_of_all, *names_found.told), settings)
 
 
 def _refuse_wrong_times(sources: Sequence[Source], tables: Sequence[TableRows]) -> None:

@@ -4,14 +4,11 @@ that are too few.
 
 from __future__ import annotations
 
-from itertools import permutations
-
 import ballplate as bp
 import numpy as np
 import pandas as pd
 import pytest
 from ballplate.extensions.laboratory.digits import doubts_about_digits
-from ballplate.extensions.laboratory.symmetry import turns_onto_itself
 from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.inputs.messages import ExperimentError
 from numpy.typing import NDArray
@@ -84,54 +81,18 @@ def test_numbers_that_contradict_places_in_the_part_are_refused(
 ) -> None:
     numbered = in_part(readings, np.eye(3))
     numbered["ball"] = numbered["ball"].map(by_columns)
-    with pytest.raises(ExperimentError, match=wording.ALONG_THE_PARTS_AXES_DISAGREE):
+    with pytest.raises(ExperimentError, match=wording.NOR_NUMBERS_THAT_FIT):
         bp.fit(experiment, numbered, coordinates="part")
 
 
 @pytest.mark.parametrize("number", [by_rows, by_columns])
-def test_numbers_that_nothing_tells_are_warned_of(
+def test_numbers_that_nothing_tells_are_refused(
     number: object, experiment: bp.Experiment, readings: pd.DataFrame
 ) -> None:
     numbered = in_part(readings, ASKEW)
     numbered["ball"] = numbered["ball"].map(number)
-    found = bp.fit(experiment, numbered, coordinates="part")
-    assert any(wording.PART_CO_ORDINATES_DO_NOT_TELL in one for one in found.warnings)
-
-
-def test_numbers_of_a_plate_without_symmetry_are_told_by_it(
-    experiment: bp.Experiment, readings: pd.DataFrame
-) -> None:
-    """Without one corner ball, a grid has but the turn over about a diagonal."""
-    balls = [f"r{r}c{c}" for r in range(1, 6) for c in range(1, 6)]
-    places = np.array([[0.1 * int(b[3]), 0.13 * int(b[1]), 0.0] for b in balls])
-    assert len(turns_onto_itself(places, 0.03)) == 3
-    assert not turns_onto_itself(places[1:], 0.03)
-
-
-def test_turns_are_those_of_all_permutations() -> None:
-    """By enumeration, of a square, a rectangle, a pyramid and points at random."""
-    generator = np.random.default_rng(2)
-    square = np.array([[1, 1, 0], [-1, 1, 0], [-1, -1, 0], [1, -1, 0]], float)
-    for places in (
-        square,
-        square * [2.0, 1.0, 1.0],
-        np.vstack([square, [[0, 0, 2]]]),
-        generator.standard_normal((5, 3)),
-    ):
-        local = places - places.mean(axis=0)
-        expected = set()
-        for order in permutations(range(len(places))):
-            u, _, v = np.linalg.svd(local[list(order)].T @ local)
-            turn = u @ np.diag([1.0, 1.0, np.linalg.det(u @ v)]) @ v
-            off = np.abs(local @ turn.T - local[list(order)]).max()
-            if off < 1e-6 and order != tuple(range(len(places))):
-                expected.add(order)
-        found = turns_onto_itself(places, 1e-3)
-        orders = {
-            tuple(int(np.argmin(np.linalg.norm(local - turn @ one, axis=1))) for one in local)
-            for turn in found
-        }
-        assert orders == expected and len(found) == len(expected)
+    with pytest.raises(ExperimentError, match=wording.NOR_NUMBERS_THAT_FIT):
+        bp.fit(experiment, numbered, coordinates="part")
 
 
 def exchanged(readings: pd.DataFrame, first: str, second: str) -> pd.DataFrame:

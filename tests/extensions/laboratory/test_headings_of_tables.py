@@ -48,23 +48,15 @@ def test_other_words_for_positions(readings: pandas.DataFrame, tmp_path: Path, h
     assert np.allclose(found.x, 1e-3 * readings[AXES].to_numpy(), rtol=0, atol=1e-12)
 
 
-def test_an_unknown_heading_with_names_of_positions_is_named(
-    readings: pandas.DataFrame, tmp_path: Path
-) -> None:
-    heads = ["Ort", "Kugel", "Taster", "X [mm]", "Y [mm]", "Z [mm]"]
-    text = refusal(readings, heads, tmp_path / "t.csv")
-    assert wording.THE_COLUMN_HAS_NAMES_OF_POSITIONS in text and "--columns position=Ort" in text
-
-
 def test_columns_that_are_not_used_are_told_where_the_name_of_the_file_is_no_position(
     readings: pandas.DataFrame, tmp_path: Path
 ) -> None:
     letters = dict(zip(readings["position"].unique(), "ABCDEFGH", strict=False))
     table = readings.assign(position=["ort " + letters[name] for name in readings["position"]])
     heads = ["Ort", "Kugel", "Taster", "X [mm]", "Y [mm]", "Z [mm]"]
-    text = refusal(table, heads, tmp_path / "t.csv")
-    assert wording.THE_NAME_OF_THE_FILE in text
-    assert 'not used: "Ort"' in text and "--columns position=Ort" in text
+    for rows in (table, readings):
+        text = refusal(rows, heads, tmp_path / "t.csv")
+        assert wording.THE_NAME_OF_THE_FILE in text and 'not used: "Ort"' in text
 
 
 def test_a_file_named_as_a_position_has_that_position(

@@ -77,52 +77,6 @@ def test_a_report_imports_to_the_readings_of_the_plain_table(
     assert np.abs(found[AXES] - expected[AXES]).to_numpy().max() < tolerance
 
 
-def test_readings_that_the_plan_has_and_the_report_not_are_told(tmp_path: Path) -> None:
-    """And the other way round: every name of what was removed, and how many of each."""
-    lines = (FOLDER / "dmis_mm.dmo").read_text(encoding="utf-8").splitlines(keepends=True)
-    readings = bp.read_report(FOLDER / "dmis_mm.dmo", CAMPAIGN).to_frame()
-    planned, whole = bp.read_report(FOLDER / "dmis_mm.dmo", CAMPAIGN).imported, len(readings)
-    assert not any("planned" in one for one in planned.remarks)
-    # Of one position all, and of another the first.
-    first, second = list(dict.fromkeys(readings["position"]))[:2]
-    gone = readings.index[readings["position"] == first].tolist()
-    single = int(readings.index[readings["position"] == second][0])
-    marks = [reading.mark.line for reading in planned.readings]
-    left = [*gone, single]
-    begins = [marks[i] - 1 for i in left]
-    ends = [
-        begin + 1 + [not _goes_on(line) for line in lines[begin:]].index(True) for begin in begins
-    ]
-    dropped = {k for begin, end in zip(begins, ends, strict=True) for k in range(begin, end)}
-    path = tmp_path / "short.dmo"
-    path.write_text("".join(line for k, line in enumerate(lines) if k not in dropped), "utf-8")
-    imported = bp.read_report(path, CAMPAIGN).imported
-    assert len(imported.readings) == whole - len(left)
-    (told,) = (one for one in imported.remarks if "planned" in one)
-    assert told.startswith(f"{len(left)} of {whole} planned readings are missing: ")
-    assert f"all of {first}" in told and f"{readings['ball'][single]} " in told
-    assert f"in {second}" in told and told.count(", ") == 1
-    # Planned without the ball, its readings are more than the plan has.
-    content = yaml.safe_load(CAMPAIGN.read_text(encoding="utf-8"))
-    place = next(one for one in content["positions"] if one.get("name") == second)
-    ball = readings["ball"][single]
-    unplanned = int(((readings["position"] == second) & (readings["ball"] == ball)).sum())
-    place["balls"] = sorted(set(readings["ball"]) - {ball})
-    other = tmp_path / "campaign.yaml"
-    other.write_text(yaml.safe_dump(content, sort_keys=False), encoding="utf-8")
-    (told,) = (
-        one
-        for one in bp.read_report(FOLDER / "dmis_mm.dmo", other).imported.remarks
-        if "planned" in one
-    )
-    assert f"{unplanned} reading" in told and "not planned: " in told
-    assert ball in told and told.endswith(f"in {second}")
-
-
-def _goes_on(line: str) -> bool:
-    return line.rstrip().endswith("$")
-
-
 def test_points_on_the_surface_fit_to_the_estimates_within_the_rounding_of_points() -> None:
     (row,) = (row for row in REPORTS if "points" in row["file"])
     imported = bp.read_report(FOLDER / row["file"], CAMPAIGN).to_frame()

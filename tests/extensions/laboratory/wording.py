@@ -1,6 +1,5 @@
 """The wording that the tests of laboratory expect: a rewording is entered here alone."""
 
-ALONG_THE_PARTS_AXES_DISAGREE = "along the part's axes disagree, .* write the names"
 ARE_NOT_AMONG_THE_POINTS = '"2 7" are not among the 6 points of the set'
 ARE_NOT_IN_THE_EXPERIMENT = "are not in the experiment"
 ARE_SAID_TO_BE_IN = 'lengths of "X'
@@ -87,9 +86,9 @@ NO_UNIT_IS_STATED_2 = 'no unit is stated for the columns "X", "Y", "Z"'
 NO_UNIT_IS_STATED_FOR_THE_ISTWERT = (
     'no unit is stated for the columns "X-Istwert", "Y-Istwert", "Z-Istwert"'
 )
+NOR_NUMBERS_THAT_FIT = "nor numbers in reading order that fit; write the names"
 NO_WRITE_A = "lab.csv:6:1: no x; write a number, or remove the line"
 OTHERWISE_THE_NAMES_OF_BALLS = "otherwise correct the names of balls"
-PART_CO_ORDINATES_DO_NOT_TELL = "part co-ordinates cannot confirm the numbering"
 NO_Y_WRITE = "2:1: no y; write a number"
 PLACED_BY_THE_NOMINAL_POSES = "placed by the nominal poses"
 PLANNED_BUT_NOT_READ = "planned but not read (3)"
@@ -112,7 +111,6 @@ STATE_THE_RULE_WITH_NAME = "state the rule with --name"
 SWAP_THE_NAMES_OF_THE_BALLS = "swap the names of the balls in lines 54 and 55"
 TABLE_OF_THE_NOMINAL_CENTRES = "table of the nominal centres of balls"
 THERE_IS_NO_COLUMN = 'there is no column "F"'
-THE_COLUMN_HAS_NAMES_OF_POSITIONS = 'the column "Ort" has names of positions'
 THE_CONTROL_CHARACTER_IS_NO_PART = (
     "report:2:1: the control character U+0007 is not allowed in a text"
 )
@@ -133,7 +131,7 @@ THE_NAMES_OF_BALLS = (
     "the names of balls r2c2 and r2c1 in position P3 were swapped (lines 54 and 55)"
 )
 THE_NAME_CAN_BE_PARTED = 'the name "z_low_r1c1" can be parted as {position}_{ball} in several ways'
-THE_NAME_OF_THE_FILE = 't.csv:1:1: position "t" is the name of the file'
+THE_NAME_OF_THE_FILE = 'position "t" by the name of the file'
 THE_PROBES_ARE_NOT_IN_THE_EXPERIMENT = (
     'the probes "T1", "T2", "T3", "T4", "T5" are not in the experiment, and neither the plan nor'
 )
