@@ -57,7 +57,6 @@ def printed(capsys: pytest.CaptureFixture[str], *arguments: str) -> Any:
             lambda: bp.map(MACHINE, line={"y": 0.3, "z": 0.2}, points=4),
             ("map", MACHINE, "--line=y = 300 mm, z = 200 mm", "--points=4"),
         ),
-        (lambda: bp.map(MACHINE, error="EXX"), ("map", MACHINE, "--error=EXX")),
         (
             lambda: bp.compensation(MACHINE, "isg", "200 mm", sense="errors of indication"),
             (
@@ -214,10 +213,8 @@ WRONG: list[tuple[Callable[[], object], type[Exception], str]] = [
     (lambda: bp.lengths(QUICKSTART, "1 um", grid=(3, 3, "4")), TypeError, r"grid\[2\]='4'; give"),
     (lambda: bp.lengths(QUICKSTART, "1 um", probe="dwn"), ValueError, 'did you mean "down"'),
     (lambda: bp.map(3), TypeError, r"machine=3; give a fit, what its to_map\(\) gives, or a path"),
-    (lambda: bp.map(MACHINE, error="EXQ"), ValueError, 'states no error "EXQ"'),
     (lambda: bp.map(MACHINE, grid=(2, 2)), ValueError, "give three numbers of points"),
     (lambda: bp.map(MACHINE, points=3), ValueError, "points need a line"),
-    (lambda: bp.map(MACHINE, (2, 2, 2), error="EXX"), ValueError, "grid and error do not go"),
     (lambda: bp.map(MACHINE, line="y = 3"), ValueError, "y"),
     (lambda: bp.spline(TABLE, knot="none"), TypeError, '"knot" is unknown; did you mean "knots"'),
     (lambda: bp.spline(TABLE, order="4"), TypeError, "order='4'; give a whole number"),

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from .fits import Fit
     from .fitting import fit
     from .groupings import GROUPINGS, Grouping
-    from .map_of_fit import FRAMES, MappedFit, data_of, left_out_words, maps_known
+    from .map_of_fit import FRAMES, MappedFit, data_of, left_out_words
     from .prediction import Prediction
     from .residuals import reading_residuals
     from .sigmas_by_campaign import campaign_sigmas, with_sigmas

@@ -67,10 +67,10 @@ RECIPES = (
     ),
     "certificate tables.yaml tables-readings.csv -o out.csv --datum all --coverage-factor 3",
     (
-        "adjust bar-bell.yaml bar-bell-readings.csv --variant 'length known' --scale 'x=22 um/m'"
-        " --turn 'y+x=0.02 turns of 1 mm at 400 mm' --after bar-bell-again.csv -o out.yaml"
+        "adjust map.yaml --scale 'x=22 um/m' --turn 'y+x=0.02 turns of 1 mm at 400 mm'"
+        " --after map.npz -o out.yaml"
     ),
-    "adjust small.yaml small-readings.csv --scale 'x=2 um/m' --uncertainty 2% --json",
+    "adjust map.yaml --scale 'x=2 um/m' --uncertainty 2% --json",
     "adjust map.yaml --turn 'y-x=2 arcsec' --after map.npz --force -o out.npz",
     "fit small.yaml small-readings.csv -o new.npz --date 2026-11-22",
     "correct map.yaml to-correct.csv --length A B --tasks small.yaml",
@@ -117,7 +117,7 @@ RECIPES = (
     "import z-low.dmo --from dmis --unit mm -o out.csv",
     "map machine.yaml --grid 3,3,2",
     "map machine.yaml --line 'y = 300 mm, z = 200 mm' --points 3 --json",
-    "map gec-like.yaml --error EXX --format csv",
+    "map gec-like.yaml --grid 2,3,4 --format csv",
     "map gec-like.yaml --grid 2,2,2 --plot out.svg",
     "map map.yaml --grid 3,2,2 --budget --draw 3 --seed 4 --tasks small.yaml",
     "map map.npz --plane 'z = 200 mm' --grid 3,3 --probe right --plot out.svg --json",

@@ -7,17 +7,16 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from ballplate.results import Fit, data_of, maps_known
+from ballplate.results import Fit, data_of
 from ballplate.simulator.computing import single_threaded
 from ballplate.simulator.design import Volume
 from ballplate.simulator.geometry import cross_matrices, pose_size
 from ballplate.simulator.inputs import LengthFunction, number_of
 from ballplate.simulator.machines import Array, ErrorModel, HasLines, MachineDescription, PlaneModel
-from ballplate.simulator.maps import InCommon, LackOfFit, MapData, readings_in_common
+from ballplate.simulator.maps import LackOfFit, MapData
 from ballplate.simulator.readings import position_fingerprints
 
 from .campaign_tests import EstimatedSigma
-from .readings_in_common import same_positions, same_readings
 from .volumetric_errors import Volumetric
 
 # Points at random in a volume, besides one for each parameter, at which a model is asked whether it
@@ -195,25 +194,8 @@ def without_shared(root: Array, absorbed: Array | None) -> tuple[Array, Array]:
     return root - (root @ axes.T * (1.0 - remaining)) @ axes, root @ absorbed.T
 
 
-def in_common(first: ComparedMap, second: ComparedMap) -> InCommon:
-    """Return the overlap of the readings of two maps, compared singly for fits."""
-    overlap = readings_in_common(first.data, second.data)
-    first_fit, second_fit = first.fit, second.fit
-    if overlap == "same" or first_fit is None or second_fit is None:
-        return overlap
-    of_readings = same_readings(first_fit.observed, second_fit.observed)
-    knows_alike = maps_known(first_fit.experiment) == maps_known(second_fit.experiment)
-    if of_readings == "same":
-        return "same" if knows_alike else "some"
-    return "some" if "some" in (overlap, of_readings) else "none"
-
-
 def positions_in_common(first: ComparedMap, second: ComparedMap) -> tuple[str, ...]:
     """Return names of positions with common readings or, without a fit, their number."""
-    if first.fit is not None and second.fit is not None:
-        positions = same_positions(first.fit.observed, second.fit.observed)
-        if positions:
-            return positions
     if first.data is None or second.data is None:
         return ()
     common = first.data.common(second.data)

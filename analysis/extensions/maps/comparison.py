@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from itertools import combinations
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -23,8 +22,6 @@ from .plates import PlateDifference, plate_differences
 PLACES = np.linspace(0.1, 1.0, 10)
 # Points of the volume at random, at the least, for the test of the map as a whole.
 LEAST_POINTS = 150
-# Points that lengths are compared between: with more, all pairs take long.
-MOST_POINTS = 200
 # Where a corner differs from another in so many axes, their length is one of these.
 OF_CORNERS = {1: "edges", 2: "face diagonals", 3: "body diagonals"}
 # What makes error functions of two models the same ones.
@@ -33,13 +30,10 @@ SAME = ("arrangement", "lower", "upper", "origin", "full_rotations", "spatial", 
 
 @dataclass(frozen=True)
 class ComparisonSettings:
-    """Settings of a comparison: `coverage_factor`, `grid` points along each axis or `points` (n, d)
-    in metres or of a file, and the probe.
-    """
+    """Settings of a comparison: `coverage_factor`, `grid` points along each axis, and the probe."""
 
     coverage_factor: float = 2.0
     grid: int = 4
-    points: Array | Path | None = None
     probe: str | None = None
 
 
@@ -103,8 +97,7 @@ def compared(
 ) -> MapComparison:
     """Compare two maps.
 
-    :raises NotComparableError: machines of other dimensions or volumes, no common probe, or points
-        outside.
+    :raises NotComparableError: machines of other dimensions or volumes, or no common probe.
     """
     if first.dimension != second.dimension:
         axes = f"{first.dimension} and {second.dimension}"
@@ -121,21 +114,12 @@ def compared(
         )
         return ValueDifference(mapped_first, mapped_second, scatters)
 
-    reference = even_grid(volume.lower, volume.upper, [settings.grid] * len(volume.lower))
-    points = settings.points if isinstance(settings.points, np.ndarray) else reference
-    _refuse_outside(points, volume)
+    points = even_grid(volume.lower, volume.upper, [settings.grid] * len(volume.lower))
     difference, offset = difference_at(points, offsets[probe]), offsets[probe]
-    # The motion is that of the volume, wherever points were asked for.
-    middle = reference.mean(axis=0)
-    moving = motions(reference - middle).reshape(reference.size, -1)
-    to_motion = np.asarray(np.linalg.pinv(moving))
-    motion = difference_at(reference, offset).by(to_motion)
-    if points is reference:
-        remainder = difference.without(orthonormal(moving))
-    else:
-        there = motions(points - middle).reshape(points.size, -1)
-        less = np.concatenate([np.eye(points.size), -there @ to_motion], axis=1)
-        remainder = difference_at(np.concatenate([points, reference]), offset).by(less)
+    middle = points.mean(axis=0)
+    moving = motions(points - middle).reshape(points.size, -1)
+    motion = difference.by(np.asarray(np.linalg.pinv(moving)))
+    remainder = difference.without(orthonormal(moving))
     names = tuple(
         f"{axis} at {place}" for place in map(_place, points) for axis in AXIS_NAMES[: len(middle)]
     )
@@ -145,12 +129,9 @@ def compared(
         _lengths(of_corners, corners, kind, pairs, (first, second), k)
         for kind, pairs in _of_corners(corners)
     ]
-    pairs = np.array(list(combinations(range(len(points)), 2)), np.int64).reshape(-1, 2)
-    pairs = pairs[(points[pairs[:, 0]] != points[pairs[:, 1]]).any(axis=1)]
-    kind_of_lengths = (
-        "lengths through the volume" if settings.points is None else "lengths between the points"
-    )
-    lengths.append(_lengths(difference, points, kind_of_lengths, pairs, (first, second), k))
+    pairs = np.array(list(combinations(range(len(points)), 2)))
+    through = "lengths through the volume"
+    lengths.append(_lengths(difference, points, through, pairs, (first, second), k))
     functions, why = _functions(first, second, k)
     count = max(LEAST_POINTS, *(len(side.values) for side in (first, second)))
     return MapComparison(
@@ -209,18 +190,6 @@ def _offsets(
         names = ", ".join(offsets) or "none"
         raise NotComparableError(f'no probe "{probe}" in both maps; in both: {names}')
     return probe, offsets
-
-
-def _refuse_outside(points: Array, volume: Volume) -> None:
-    slightly = 1e-9 * volume.size
-    outside = (points < volume.lower - slightly) | (points > volume.upper + slightly)
-    if outside.any():
-        where = _place(points[int(outside.any(axis=1).argmax())])
-        raise NotComparableError(
-            f"the point {where} is outside the volume of both maps; leave it out"
-        )
-    if not 2 <= len(points) <= MOST_POINTS:
-        raise NotComparableError(f"{len(points)} points; give 2 to {MOST_POINTS}")
 
 
 def _place(point: Array) -> str:

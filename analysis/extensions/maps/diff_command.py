@@ -50,14 +50,7 @@ def add_options(parser: ArgumentParser) -> None:
         type=Path,
         help="tables of readings of two experiment files, instead of the named ones",
     )
-    where = parser.add_mutually_exclusive_group()
-    where.add_argument(
-        "--points",
-        metavar="CSV",
-        type=Path,
-        help="compare at these points, and lengths between them: columns x_mm, y_mm, z_mm",
-    )
-    where.add_argument(
+    parser.add_argument(
         "--grid",
         metavar="N",
         type=_grid,
@@ -136,7 +129,7 @@ def run(options: Namespace) -> int:
         )
         difference = map_difference(
             (first, second),
-            ComparisonSettings(k, options.grid, options.points, options.probe),
+            ComparisonSettings(k, options.grid, options.probe),
             options.shared is not None,
             standard,
             (options.dates[0], options.dates[1]),

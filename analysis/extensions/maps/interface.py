@@ -68,7 +68,6 @@ def diff(
     first: Fit | FittedMap | PathLike,
     second: Fit | FittedMap | PathLike,
     *,
-    points: PathLike | Sequence[Sequence[float]] | None = None,
     grid: int = 4,
     probe: str | None = None,
     coverage_factor: float = 2.0,
@@ -81,9 +80,9 @@ def diff(
 
     Each is a fit, its `to_map()`, or the path of a map file, of a machine file (an expected map,
     with the expanded uncertainty `stated` of lengths, such as "0.5 um + L/1000000"), or of an
-    experiment file that names its readings. `points` (n, d) are in metres, or a CSV file with x_mm,
-    y_mm and z_mm; default: `grid` points along each axis. With `shared` both fits rest on the same
-    certificate, whose errors cancel. `dates` are days of the campaigns, such as "2026-11-22".
+    experiment file that names its readings. There are `grid` points along each axis. With `shared`
+    both fits rest on the same certificate, whose errors cancel. `dates` are days of the campaigns,
+    such as "2026-11-22".
 
     :raises ValueError: the maps do not go together, or share no certificate.
 
@@ -92,7 +91,6 @@ def diff(
     >>> bp.diff(*campaigns)
     <MapDifference of second less first: no change is shown (p = 0.53)>
     """
-    import numpy as np
     from ballplate.simulator.inputs import Target, parse_length_function, stated_day
 
     from .comparison import ComparisonSettings
@@ -107,14 +105,10 @@ def diff(
         raise ValueError(f"dates={dates!r}; give two, that of the first and that of the second")
     days = tuple(None if day is None else stated_day(day) for day in dates)
     target = None if stated is None else Target(parse_length_function(stated), coverage_factor)
-    is_file = isinstance(points, str | os.PathLike)
-    places = Path(str(points)) if is_file else None if points is None else np.asarray(points, float)
-    if isinstance(places, np.ndarray) and places.ndim != 2:
-        raise ValueError("points: give a list of points, each with its co-ordinates in metres")
     sides = [fit_map_or_path(name, side) for name, side in (("first", first), ("second", second))]
     return map_difference(
         (sides[0], sides[1]),
-        ComparisonSettings(coverage_factor, grid, places, probe),
+        ComparisonSettings(coverage_factor, grid, probe),
         shared is not None,
         None if target is None else target.standard,
         (days[0], days[1]),
@@ -159,7 +153,6 @@ def map(
     machine: PathLike | Fit | FittedMap,
     grid: Sequence[int] | None = None,
     line: str | Line | None = None,
-    error: str | None = None,
     points: int | PathLike | pandas.DataFrame | Sequence[Sequence[float]] | None = None,
     *,
     plane: str | Mapping[str, float] | None = None,
@@ -170,8 +163,7 @@ def map(
     tasks: Experiment | PathLike | None = None,
 ) -> MachineErrors | FittedErrorMap:
     """Return volumetric errors of a machine file or of a map, with expanded uncertainties: on a
-    grid over the volume, in a plane, along a line, at points, or one parametric error of a machine
-    file along its axis.
+    grid over the volume, in a plane, along a line, or at points.
 
     `line` is a text as in `ballplate map --line`, co-ordinates in metres of the two fixed axes, or
     two points; `plane` the co-ordinate of the axis across it. `points` is their number along a
@@ -195,7 +187,6 @@ def map(
     from .volumetric_errors import MOST_POINTS
 
     source = map_or_path("machine", machine)
-    ensure_type(str, "the name of a parametric error, such as EXX", error=error)
     ensure_type(str, "the name of a probe", probe=probe)
     ensure_type(bool, "True or False", budget=budget)
     ensure_whole(1, MOST_DRAWS, draw=draw)
@@ -230,7 +221,7 @@ def map(
     )
     draws = None if draw is None else Draws(draw, seed)
     chosen = () if tasks is None else (experiment_of(tasks),)
-    return map_errors(source, asked, error, probe, draws, budget, chosen)
+    return map_errors(source, asked, probe, draws, budget, chosen)
 
 
 def curves(

@@ -145,16 +145,6 @@ def length_map(
     )
 
 
-@single_threaded
-def length_pairs(
-    experiment: Experiment, settings: LengthMapSettings
-) -> tuple[Array, list[PairTile]]:
-    """Points (n, d) of the grid, and all lengths between them in tiles."""
-    at = linearise(lay_out(experiment))
-    points = grid_points(at.design, settings.grid)
-    return points, list(_tiles(at, points, settings))
-
-
 def _tiles(at: Linearisation, points: Array, settings: LengthMapSettings) -> Iterator[PairTile]:
     """Return the tiles of all pairs of points."""
     probes = np.full(len(points), at.design.probes.names.index(settings.probe))

@@ -29,8 +29,8 @@ if TYPE_CHECKING:
 DESCRIPTION = (
     "Combine the parametric errors of a machine file, systematic and random, or the estimates of a"
     " map file (fit -o), with their expanded uncertainties, into volumetric errors: on a grid with"
-    " the length errors of the body diagonals, in a plane, along a line, at the points of a table,"
-    " or one parametric error along its axis. An error is the position of the tip minus the"
+    " the length errors of the body diagonals, in a plane, along a line, or at the points of a"
+    " table. An error is the position of the tip minus the"
     " position that the scales indicate; the error of indication has the opposite sign."
 )
 
@@ -87,11 +87,6 @@ def _add_places(parser: ArgumentParser) -> None:
     )
     where.add_argument(
         "--plane", metavar="PLANE", type=_plane, help='errors in a plane, as in "z = 200 mm"'
-    )
-    where.add_argument(
-        "--error",
-        metavar="NAME",
-        help="of a machine file: a parametric error along its axis",
     )
     parser.add_argument(
         "--points",
@@ -164,9 +159,7 @@ def run(options: Namespace) -> int:
     draws = None if options.draw is None else Draws(options.draw, seed)
     tasks = () if options.tasks is None else load(options.tasks)
     try:
-        errors = map_errors(
-            options.file, asked, options.error, options.probe, draws, options.budget, tasks
-        )
+        errors = map_errors(options.file, asked, options.probe, draws, options.budget, tasks)
     except ValueError as error:
         raise UsageError(error) from None
     # Before anything is printed that nobody may read to its end.

@@ -14,14 +14,14 @@ import numpy as np
 from ballplate.presentation import Data, Result, aligned, number, picked, records, table_lines
 from ballplate.results import FEW
 from ballplate.simulator.computing import comparable
+from ballplate.simulator.inputs import listing
 from ballplate.simulator.machines import Array
-from ballplate.simulator.maps import InCommon, verdict_data, verdict_line
+from ballplate.simulator.maps import InCommon, readings_in_common, verdict_data, verdict_line
 
 from .campaign_tests import TOO_ALIKE, TOO_RARE
-from .compared_maps import MOTIONS, ComparedMap, in_common, positions_in_common
+from .compared_maps import MOTIONS, ComparedMap, positions_in_common
 from .comparison import MapComparison
 from .normalised_errors import FigureGroup, JointTest
-from .readings_in_common import read_once_words
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -82,7 +82,7 @@ class MapDifference(Result):
     @cached_property
     def in_common(self) -> InCommon:
         """Overlap of the readings of both maps."""
-        return in_common(self.first, self.second)
+        return readings_in_common(self.first.data, self.second.data)
 
     @property
     def is_too_alike(self) -> bool:
@@ -172,7 +172,11 @@ class MapDifference(Result):
         if self.in_common == "same":
             cautions.append(f"warning: {SAME_READINGS}")
         elif once := positions_in_common(self.first, self.second):
-            cautions.append(f"warning: {read_once_words(once)}")
+            cautions.append(
+                f"warning: readings are the same in both campaigns in {listing(once)}: the"
+                " campaigns are less different than two that are independent, and a change may be"
+                " missed"
+            )
         elif self.is_too_alike:
             cautions.append(f"warning: {TOO_ALIKE}")
         return tuple(cautions)

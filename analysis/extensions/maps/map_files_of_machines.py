@@ -28,24 +28,17 @@ def map_of_source(source: Path | FittedMap) -> tuple[FittedMap, str]:
 def map_errors(
     source: Path | FittedMap,
     asked: PlacesAsked,
-    error: str | None = None,
     probe: str | None = None,
     draws: Draws | None = None,
     with_budget: bool = False,
     tasks: Sequence[Experiment] = (),
 ) -> MachineErrors | FittedErrorMap:
     """Return errors of a machine file or of a map at places, and of lengths of an experiment with
-    `tasks`, or one parametric error of a machine file.
+    `tasks`.
 
     :raises ExperimentError: the file is wrong.
     :raises ValueError: what does not go together, or is not in the machine.
     """
-    if error is not None:
-        choices = {**vars(asked), "probe": probe, "draw": draws, "budget": with_budget or None}
-        choices["tasks"] = tasks or None
-        stated_choices = [name for name, value in choices.items() if value is not None]
-        if stated_choices:
-            raise ValueError(f"{stated_choices[0]} and error do not go together; give only one")
     if isinstance(source, Path) and not is_map_file(source):
         if probe is not None:
             raise ValueError("a machine file states its own probe; leave the probe out")
@@ -53,9 +46,7 @@ def map_errors(
             raise ValueError("tasks are measured by a map of a fit; leave them out")
         if with_budget:
             raise ValueError("a budget is that of a map of a fit; leave it out")
-        return machine_errors(source, asked, error, draws)
-    if error is not None:
-        raise ValueError("error functions of a map are those of map --curves, in Python bp.curves")
+        return machine_errors(source, asked, draws)
     fitted, label = map_of_source(source)
     lengths = [tasks_of_experiment(fitted, task) for task in tasks]
     wanted = reduce(Tasks.beside, lengths) if lengths else None

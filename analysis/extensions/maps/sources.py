@@ -2,22 +2,19 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 from ballplate.results import Fit
 from ballplate.simulator.experiment import load_machine, read_map
-from ballplate.simulator.inputs import LengthFunction, header_names, read_table
-from ballplate.simulator.machines import Array, MachineDescription
+from ballplate.simulator.inputs import LengthFunction
+from ballplate.simulator.machines import MachineDescription
 from ballplate.simulator.maps import FittedMap
-from ballplate.simulator.readings import AXES
 
 from .compared_maps import ComparedMap, expected_map, map_of_fit
 from .comparison import ComparisonSettings, NotComparableError, compared
 from .fit_files import fit_of_file, kind_of_file
 from .map_difference import MapDifference
-from .point_files import NAMING
 from .shared_certificates import with_shared_certificates
 
 Side = Path | Fit | FittedMap
@@ -60,8 +57,6 @@ def map_difference(
     dimension = next(
         compared_map.dimension for compared_map in measured if compared_map is not None
     )
-    if isinstance(settings.points, Path):
-        settings = replace(settings, points=read_points(settings.points, dimension))
     first, second = (
         compared_map or _expected(machine, label, dimension, stated, day)
         for compared_map, machine, label, day in zip(
@@ -74,16 +69,6 @@ def map_difference(
     return MapDifference(
         first, second, compared(first, second, settings), settings.coverage_factor, count
     )
-
-
-def read_points(path: Path, dimension: int) -> Array:
-    """Return points (n, d) in metres of a CSV file with the columns x_mm, y_mm and, in space, z_mm.
-
-    :raises ExperimentError: the file is wrong.
-    """
-    names = tuple(name for name in header_names(path) if name in NAMING)
-    rows = read_table(path, names, AXES[:dimension])
-    return np.array([row.lengths for row in rows])
 
 
 def _expected(

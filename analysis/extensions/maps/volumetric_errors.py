@@ -27,7 +27,6 @@ from ballplate.simulator.machines import (
     error_function,
     reference_functions,
     squareness_field,
-    stated_function,
     thermal_field,
     true_volumetric,
 )
@@ -225,16 +224,12 @@ def _deviations(deviation: float | Points, positions: Array) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class AlongAxis:
-    """A parametric error along its axis: at `positions` (m,), as stated, at the reference point,
-    and deviation.
+    """A parametric error along its axis, at the reference point, and its deviation.
 
-    `stated` and `values` are None for a purely random error; `measured` has the positions and
-    values of a table.
+    `values` are None for a purely random error; `measured` has the positions and values of a table.
     """
 
     error: ParametricError
-    positions: Array
-    stated: Array | None
     values: Array | None
     deviation: Array | None
     measured: Points | None
@@ -261,13 +256,10 @@ def along_axes(machine: MachineDescription) -> list[AlongAxis]:
                 positions, [x for x in table.positions if positions[0] <= x <= positions[-1]]
             )
         t = machine.scaled(error.axis, positions)
-        shape = stated_function(machine, error)
         deviation = error.deviation
         curves.append(
             AlongAxis(
                 error,
-                positions,
-                None if shape is None else shape.values(t)[:, 0],
                 functions[error.name].values(t)[:, 0] if error.name in functions else None,
                 None if deviation is None else _deviations(deviation, positions),
                 table,

@@ -1,6 +1,4 @@
-"""Volumetric errors of a machine as they show themselves: on a grid, along a line, and one error
-along its axis.
-"""
+"""Volumetric errors of a machine as they show themselves: on a grid, at points or along a line."""
 
 from __future__ import annotations
 
@@ -17,24 +15,18 @@ from ballplate.presentation import (
 )
 from ballplate.simulator.experiment import load_machine
 from ballplate.simulator.inputs import Message
-from ballplate.simulator.machines import meaning
 
 from .fitted_tables import realisation_lines
 from .map_places import MapPlaces, PlacesAsked, map_places
 from .realisations import Draws, Realisations
 from .volumetric_errors import (
-    AlongAxis,
     LengthErrors,
     Volumetric,
     VolumetricErrors,
-    along_axes,
     drawn_machine_errors,
 )
 from .volumetric_plots import draw_grid, draw_line, draw_points
 from .volumetric_tables import (
-    along_csv,
-    along_data,
-    along_lines,
     diagonal_lines,
     error_columns,
     error_data,
@@ -44,20 +36,27 @@ from .volumetric_tables import (
     length_line,
     machine_data,
     machine_lines,
-    why_not_along,
 )
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-@dataclass(frozen=True, repr=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class MachineErrors(Result):
-    """Errors of the machine of a file; `doubts` are what of the file is unlikely to be meant."""
+    """Volumetric errors of the machine of a file at `places`: `errors` at points, and those of
+    `lengths`; `realisations` are optional draws of the random part.
+
+    `doubts` are improbable statements of the file.
+    """
 
     label: str
     machine: Volumetric
     doubts: tuple[str, ...]
+    places: MapPlaces
+    errors: VolumetricErrors
+    lengths: LengthErrors
+    realisations: Realisations | None = None
 
     @property
     def title(self) -> str:
@@ -66,32 +65,6 @@ class MachineErrors(Result):
     @property
     def warnings(self) -> tuple[str, ...]:
         return self.doubts
-
-    def point_lines(self) -> Iterable[str]:
-        """The points alone as lines of a CSV file, in units that its columns name."""
-        raise NotImplementedError
-
-    def plot(self, path: str | Path | None = None) -> Figure:
-        """The errors as a picture.
-
-        With a path, which ends in .svg, .png or .pdf, the picture is written as well.
-
-        :raises ImportError: matplotlib is missing.
-        :raises ValueError: the path ends in something else, or errors along one axis.
-        """
-        raise ValueError("a parametric error along its axis has no picture; leave it out")
-
-
-@dataclass(frozen=True, eq=False, repr=False)
-class ErrorsAtPoints(MachineErrors):
-    """Volumetric errors at `places`: `errors` at points, and those of `lengths`; `realisations` are
-    optional draws of the random part.
-    """
-
-    places: MapPlaces
-    errors: VolumetricErrors
-    lengths: LengthErrors
-    realisations: Realisations | None = None
 
     def headline(self) -> str:
         largest = 1e6 * float(self.errors.resultant.max())
@@ -123,16 +96,23 @@ class ErrorsAtPoints(MachineErrors):
         return {**error_columns(self.errors), "unit": ["m"] * len(self.errors.points)}, ()
 
     def point_lines(self) -> Iterable[str]:
+        """The points alone as lines of a CSV file, in units that its columns name."""
         names = self.places.names_of_points
         return errors_csv(self.errors, self.realisations, error_columns, names)
 
     def plot(self, path: str | Path | None = None) -> Figure:
-        """The errors as vectors, magnified, seen from the front and above."""
+        """The errors as vectors, magnified, seen from the front and above.
+
+        With a path, which ends in .svg, .png or .pdf, the picture is written as well.
+
+        :raises ImportError: matplotlib is missing.
+        :raises ValueError: the path ends in something else.
+        """
         return draw_points(self.errors, self.machine.volume, self.title, path)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class VolumetricMap(ErrorsAtPoints):
+class VolumetricMap(MachineErrors):
     """Errors on a grid over the volume, and of the four body diagonals."""
 
     def plot(self, path: str | Path | None = None) -> Figure:
@@ -141,7 +121,7 @@ class VolumetricMap(ErrorsAtPoints):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class ErrorsOnLine(ErrorsAtPoints):
+class ErrorsOnLine(MachineErrors):
     """Errors along a line, and that of its length."""
 
     def lines(self) -> list[str]:
@@ -159,41 +139,8 @@ class ErrorsOnLine(ErrorsAtPoints):
         return draw_line(self.errors, path)
 
 
-@dataclass(frozen=True, eq=False, repr=False)
-class ErrorAlongAxis(MachineErrors):
-    """One parametric error along its axis."""
-
-    along: AlongAxis
-
-    def headline(self) -> str:
-        error, unit = self.along.error, "µrad" if self.along.error.is_rotation else "µm"
-        return f"{error.name}, {meaning(error.name)}, range {1e6 * self.along.range:.4g} {unit}"
-
-    def lines(self) -> list[str]:
-        return along_lines(self.along)
-
-    def data(self) -> Data:
-        return along_data(self.along)
-
-    def rows(self) -> list[Data]:
-        """Return one row per position along the axis, in metres and radians."""
-        data = self.to_dict()
-        names = [name for name in ("position", "stated", "value", "random") if data[name]]
-        columns = zip(*(data[name] for name in names), strict=True)
-        return [dict(zip(names, row, strict=True)) | {"unit": data["unit"]} for row in columns]
-
-    def point_lines(self) -> Iterable[str]:
-        return along_csv(self.along)
-
-
-def machine_errors(
-    file: Path,
-    asked: PlacesAsked,
-    error: str | None = None,
-    draws: Draws | None = None,
-) -> MachineErrors:
-    """Return errors of a machine file at requested locations, or of one parametric error along its
-    axis.
+def machine_errors(file: Path, asked: PlacesAsked, draws: Draws | None = None) -> MachineErrors:
+    """Return errors of a machine file at requested locations.
 
     :raises ExperimentError: the file is wrong.
     :raises ValueError: what does not go together, or is not in the machine.
@@ -201,18 +148,14 @@ def machine_errors(
     doubts: list[Message] = []
     machine = load_machine(file, doubts)
     built = Volumetric(machine)
-    common = file.stem, built, tuple(map(str, doubts))
-    if error is not None:
-        every = {function.error.name: function for function in along_axes(machine)}
-        if error not in every:
-            raise ValueError(why_not_along(error, built, str(file)))
-        return ErrorAlongAxis(*common, every[error])
     if draws is not None and not built.is_random:
         raise ValueError("this machine has no random part; leave the realisations out")
     places = map_places(built.volume, asked)
-    kind = {"grid": VolumetricMap, "line": ErrorsOnLine}.get(places.kind, ErrorsAtPoints)
+    kind = {"grid": VolumetricMap, "line": ErrorsOnLine}.get(places.kind, MachineErrors)
     return kind(
-        *common,
+        file.stem,
+        built,
+        tuple(map(str, doubts)),
         places,
         built.errors(places.points),
         built.lengths(places.starts, places.ends),

@@ -19,10 +19,9 @@ from ballplate.presentation import (
     table_lines,
 )
 from ballplate.simulator.computing import comparable
-from ballplate.simulator.inputs import format_length, hint, listing
+from ballplate.simulator.inputs import format_length
 from ballplate.simulator.machines import (
     AXES,
-    NAMES,
     SQUARENESS,
     Arrangement,
     Array,
@@ -119,28 +118,6 @@ def _stated_as(along: AlongAxis) -> str:
     return form + (f", {error.criterion}" if error.is_straightness else "")
 
 
-def why_not_along(name: str, built: Volumetric, file: str) -> str:
-    """Why there is no parametric error of that name along an axis."""
-    stated_names = [error.name for error in built.machine.errors]
-    value = {
-        parameter.name: f"{number(1e6 * size)} {SHOWN[parameter.unit]}"
-        for parameter, size in _numbers(built)
-    }
-    if name in SQUARENESS:
-        value_text = (
-            f"{value[name]} at the reference point, in the table without --error"
-            if name in value
-            else "not stated"
-        )
-        return f"{name} is the {meaning(name)}, a single number: {value_text}"
-    if name in NAMES:
-        return (
-            f"{file} does not state {name}, {meaning(name)}; it is zero (stated:"
-            f" {listing(sorted(stated_names))})"
-        )
-    return f'{file} states no error "{name}"; {hint(name, stated_names)}'
-
-
 def _meaning_text(parameter: Parameter) -> str:
     is_droop = parameter.name in ("phi1", "phi2")
     return parameter.meaning + (", over the whole axis" if is_droop else "")
@@ -208,45 +185,8 @@ def extreme_lines(errors: VolumetricErrors) -> list[str]:
     ]
 
 
-def along_lines(along: AlongAxis) -> list[str]:
-    """A parametric error along its axis."""
-    columns_shown, unit = _curve_columns(along, "at the reference point"), _unit(along)
-    positions = along.positions
-    keep = (
-        np.arange(0, len(positions), 5)
-        if along.measured is None
-        else np.flatnonzero(np.isin(positions, along.measured.positions))
-    )
-    axis = AXES[along.error.axis]
-    columns = {
-        f"{axis}, mm": (positions[keep], millimetres),
-        **{
-            f"{name}, {unit}": (values[keep], _three_decimals)
-            for name, values in columns_shown.items()
-        },
-    }
-    head = f"{along.error.name} {symbol(along.error.name)}: {meaning(along.error.name)}"
-    band = "" if along.values is None else f", range {number(1e6 * along.range)} {unit}"
-    subtitle = (
-        []
-        if along.values is None
-        else [f"stated as {_stated_as(along)}; {_line_stated(along)}".rstrip("; ")]
-    )
-    return [head + band, *subtitle, *table_lines(columns)]
-
-
 def _two_decimals(value: float) -> str:
     return fixed(1e6 * value, 2)
-
-
-def _three_decimals(value: float) -> str:
-    return fixed(1e6 * value, 3)
-
-
-def _line_stated(along: AlongAxis) -> str:
-    if along.error.is_rotation:
-        return "a rotation is the same on all lines"
-    return "at the reference point (no line stated)" if along.error.line is None else ""
 
 
 def errors_csv(
@@ -266,19 +206,6 @@ def errors_csv(
         numbers = {"realisation": [i] * len(table.points)} if len(tables) > 1 else {}
         # The headings stand above the first table alone.
         yield from table_csv({**numbers, **points, **columns(table)})[int(i > 0) :]
-
-
-def along_csv(along: AlongAxis) -> list[str]:
-    """A parametric error along its axis as lines of a CSV file."""
-    curves = _curve_columns(along, along.error.name)
-    columns = {f"{name}, {_unit(along)}": values for name, values in curves.items()}
-    return table_csv({"position, mm": along.positions, **columns})
-
-
-def _curve_columns(along: AlongAxis, name: str) -> dict[str, Array]:
-    """Return the columns of an error along its axis, `name` for the reference point."""
-    columns = {"stated": along.stated, name: along.values, "random": along.deviation}
-    return {key: values for key, values in columns.items() if values is not None}
 
 
 def _unit(along: AlongAxis) -> str:
@@ -338,19 +265,6 @@ def error_data(errors: VolumetricErrors) -> list[Data]:
         resultant=errors.resultant,
         random=errors.uncertainties,
     )
-
-
-def along_data(along: AlongAxis) -> Data:
-    """A parametric error along its axis, in metres and radians."""
-    return {
-        "error": along.error.name,
-        "symbol": symbol(along.error.name),
-        "unit": along.unit,
-        "position": along.positions,
-        "stated": along.stated,
-        "value": along.values,
-        "random": along.deviation,
-    }
 
 
 def millimetres(value: float) -> str:

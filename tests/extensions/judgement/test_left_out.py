@@ -15,7 +15,6 @@ from ballplate.extensions.judgement.left_out import (
     rest_of,
     validate,
 )
-from ballplate.extensions.maps.readings_in_common import same_readings
 from ballplate.simulator.design.arrays import Design, nominal_state
 from ballplate.simulator.estimation.gauss_newton import estimate, linearised_fit
 from ballplate.simulator.experiment.layout import lay_out
@@ -217,24 +216,3 @@ def positions_of(experiment: Experiment) -> list[dict[str, object]]:
     from ballplate.simulator.inputs.yamltree import to_python, written
 
     return to_python(written(experiment.tree, "positions"))  # type: ignore[arg-type,return-value]
-
-
-@pytest.mark.parametrize("digits", [9, 8, 7])
-def test_an_edit_makes_no_second_campaign(digits: int) -> None:
-    """One reading of each position is left out, and the rest is rounded."""
-    design = lay_out(small())
-    observed, other = campaign(design, 6), campaign(design, 7)
-    own, x = observed.design.readings, observed.x
-    _, first = np.unique(own.position, return_index=True)
-    rest = np.delete(np.arange(len(x)), first)
-    for rows in (np.arange(len(x)), rest):
-        again = observe(design, own.select(rows), np.round(x[rows], digits))
-        assert same_readings(observed, again) == same_readings(again, observed) == "same"
-    # Part of a campaign is no other one either, and one of its own stays one, however coarse.
-    half = np.flatnonzero(own.position < 3)
-    part = observe(design, own.select(half), np.round(x[half], digits))
-    assert same_readings(observed, part) == same_readings(part, observed) == "some"
-    for coarse in (digits, 6):
-        rounded = [replace(one, x=np.round(one.x, coarse)) for one in (observed, other)]
-        for one, two in (rounded, (observed, rounded[1]), (rounded[0], other)):
-            assert same_readings(one, two) == "none"

@@ -472,8 +472,6 @@ def test_commands_print_what_results_say(
         (["--plane", "z = 200 mm", "--grid", "2,2,2"], "a plane has points along two axes"),
         (["--plane", "z = 3 m"], "the plane is outside the volume in z"),
         (["--grid", "2,2"], "give three numbers of points"),
-        (["--error", "EXX"], "error functions of a map are those of map --curves"),
-        (["--error", "EXX", "--budget"], "budget and error do not go together"),
         (["--seed", "3"], "--seed needs --draw"),
     ],
 )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from itertools import combinations
 
 import ballplate as bp
 import numpy as np
@@ -161,10 +162,9 @@ def dense_lengths(fit: Fit, points: Array, pairs: Array) -> tuple[Array, Array]:
 
 
 def test_lengths_are_those_of_the_corrected_points(fits: tuple[Fit, Fit]) -> None:
-    points = np.array([[0.0, 0.0, 0.0], [1.0, 1.0, 1.0], [0.2, 0.7, 0.4], [0.9, 0.1, 0.6]])
-    settings = ComparisonSettings(points=points)
-    found = compared(map_of_fit(fits[0]), map_of_fit(fits[1]), settings).lengths[-1]
-    pairs = np.array([[i, j] for i in range(4) for j in range(i + 1, 4)])
+    comparison = compared(map_of_fit(fits[0]), map_of_fit(fits[1]), ComparisonSettings(grid=3))
+    points, found = comparison.points, comparison.lengths[-1]
+    pairs = np.array(list(combinations(range(27), 2)))
     (first, one), (second, other) = (dense_lengths(fit, points, pairs) for fit in fits)
     assert found.differences == pytest.approx(second - first, abs=1e-10)
     assert found.standard_uncertainties == pytest.approx(np.sqrt(np.diag(one + other)), rel=1e-4)

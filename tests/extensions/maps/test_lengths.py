@@ -14,14 +14,15 @@ from ballplate.cli import main
 from ballplate.extensions.maps.length_map import (
     LengthGroups,
     LengthMapSettings,
+    _tiles,
     class_edges,
     direction_classes,
     direction_names,
     grid_points,
     length_map,
-    length_pairs,
 )
 from ballplate.results.checked_designs import predict
+from ballplate.simulator.estimation.linearisation import linearise
 from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.experiment.model import Experiment
@@ -77,7 +78,8 @@ def test_the_whole_is_what_run_tells_of_the_same_points(experiment: Experiment) 
 
 def all_pairs(experiment: Experiment, **changes: object) -> np.ndarray:
     """First and second point, length, uncertainty of every pair, sorted."""
-    _, tiles = length_pairs(experiment, settings(**changes))
+    chosen, at = settings(**changes), linearise(lay_out(experiment))
+    tiles = _tiles(at, grid_points(at.design, chosen.grid), chosen)
     rows = [
         np.column_stack([t.first, t.second, t.lengths, t.uncertainties, t.is_open]) for t in tiles
     ]
