@@ -10,7 +10,7 @@ from ballplate.simulator.inputs.faces import lazily
 if TYPE_CHECKING:
     from .arrangement import ARRANGEMENTS, AXES, Arrangement
     from .bases import Basis
-    from .curves import NAMES, Points, SmoothedPoints, curves_model
+    from .curves import Points, SmoothedPoints, curves_model
     from .custom import CustomModelError, module_source
     from .description import (
         Combination,
@@ -18,7 +18,6 @@ if TYPE_CHECKING:
         ParametricError,
         PowerSeries,
         reference_functions,
-        stated_function,
         true_volumetric,
     )
     from .empirical import USUAL_OFFSET, EmpiricalModel

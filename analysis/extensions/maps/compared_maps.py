@@ -4,11 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 from ballplate.results import Fit, data_of
-from ballplate.simulator.computing import single_threaded
 from ballplate.simulator.design import Volume
 from ballplate.simulator.geometry import cross_matrices, pose_size
 from ballplate.simulator.inputs import LengthFunction, number_of
@@ -18,12 +16,6 @@ from ballplate.simulator.readings import position_fingerprints
 
 from .campaign_tests import EstimatedSigma
 from .volumetric_errors import Volumetric
-
-# Points at random in a volume, besides one for each parameter, at which a model is asked whether it
-# can do a motion of its frame.
-POINTS = 20
-# Largest part of a motion that may be left over where a model contains it.
-CONTAINED = 1e-6
 
 MOTIONS = {
     2: ("shift along x", "shift along y", "turn about z"),
@@ -160,26 +152,6 @@ class ComparedMap:
             np.linalg.norm(basis / effects, axis=1),
             basis @ self.shared[columns_of_function],
         )
-
-    @cached_property
-    @single_threaded
-    def held(self) -> tuple[str, ...]:
-        """Motions of the frame and turns of the probe that no parameter can make."""
-        d, volume = self.dimension, self.volume
-        generator = np.random.default_rng(np.random.SeedSequence(0))
-        count = POINTS + len(self.values)
-        x = generator.uniform(volume.lower, volume.upper, (count, d))
-        offsets = 0.1 * volume.size.max() * generator.uniform(-1.0, 1.0, x.shape)
-        wanted = np.concatenate([motions(x), motions(offsets)[:, :, d:]], axis=2)
-        wanted = wanted.reshape(x.size, -1)
-        wanted /= np.linalg.norm(wanted, axis=0)
-        columns = self.model.jacobian(x, np.zeros(len(self.values)), offsets).reshape(x.size, -1)
-        size = np.linalg.norm(columns, axis=0)
-        columns = columns / np.where(size > 0.0, size, 1.0)
-        residual = wanted - columns @ np.linalg.lstsq(columns, wanted, rcond=1e-12)[0]
-        names = (*MOTIONS[d], *(f"{name} of the probe" for name in MOTIONS[d][d:]))
-        missing = np.linalg.norm(residual, axis=0) > CONTAINED
-        return tuple(name for name, is_held in zip(names, missing, strict=True) if is_held)
 
 
 def without_shared(root: Array, absorbed: Array | None) -> tuple[Array, Array]:

@@ -19,7 +19,7 @@ from ballplate.simulator.machines import Array
 from ballplate.simulator.maps import InCommon, readings_in_common, verdict_data, verdict_line
 
 from .campaign_tests import TOO_ALIKE, TOO_RARE
-from .compared_maps import MOTIONS, ComparedMap, positions_in_common
+from .compared_maps import ComparedMap, positions_in_common
 from .comparison import MapComparison
 from .normalised_errors import FigureGroup, JointTest
 
@@ -90,7 +90,7 @@ class MapDifference(Result):
         probability.
         """
         test = self.comparison.test
-        if test is None or len(self._measured()) < 2:
+        if test is None or self.first.is_expected or self.second.is_expected:
             return False
         return 1.0 - test.p < TOO_RARE
 
@@ -209,27 +209,7 @@ class MapDifference(Result):
             ("U", 1e6 * self.coverage_factor * u),
             ("", ["µm" if name.startswith("shift") else "µrad" for name in motion.names]),
         ]
-        return [*table_lines(columns), *map(self._held_line, self._measured())]
-
-    def _measured(self) -> tuple[ComparedMap, ...]:
-        return tuple(side for side in (self.first, self.second) if not side.is_expected)
-
-    def _held_line(self, side: ComparedMap) -> str:
-        every = MOTIONS[side.dimension]
-        turns = {f"{name} of the probe" for name in every[side.dimension :]}
-        held_motions = set(side.held)
-        parts = []
-        if held_motions >= set(every):
-            parts.append("every motion of the frame")
-        else:
-            parts += [name for name in every if name in held_motions]
-        parts += (
-            ["the orientation of the probe"]
-            if held_motions >= turns
-            else sorted(held_motions & turns)
-        )
-        motions = ", ".join(parts) or "nothing"
-        return f"({side.label}: the conditions of its error model take out {motions})"
+        return table_lines(columns)
 
     def _shown_groups(self) -> tuple[FigureGroup, ...]:
         """Return the groups of values, with all error functions as one."""
@@ -436,7 +416,6 @@ def _map_data(side: ComparedMap) -> Data:
         "expected": side.is_expected,
         "degrees_of_freedom": side.degrees_of_freedom,
         **({} if side.is_expected else {"lack_of_fit": verdict_data(side.lack_of_fit)}),
-        "frame_takes_out": side.held,
     }
 
 

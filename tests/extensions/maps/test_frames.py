@@ -130,25 +130,6 @@ def test_motions_are_derivatives_of_rigid_motions() -> None:
     assert plane[:, :, 2] == pytest.approx(np.stack([-points[:, 1], points[:, 0]], axis=1))
 
 
-def test_what_the_frame_takes_out_is_told(fits: tuple[Fit, Fit]) -> None:
-    held = map_of_fit(fits[0]).held
-    assert len(held) == 9
-    squares = bp.experiment(
-        {
-            "title": "straight axes",
-            "machine": {"volume": ["600 mm", "600 mm"], "repeatability": "0.5 um"},
-            "error_model": {"kind": "metric"},
-            "artefacts": {"plate": {"kind": "square", "balls": 5, "size": "300 mm"}},
-            "positions": [
-                {"name": "straight", "corner": {"x": "100 mm", "y": "100 mm"}},
-                {"name": "turned", "corner": {"x": "100 mm", "y": "100 mm"}, "quarter_turns": 1},
-            ],
-        }
-    )
-    plane = map_of_fit(bp.fit(squares, bp.simulate(squares)))  # type: ignore[arg-type]
-    assert {"shift along x", "shift along y", "turn about z"} <= set(plane.held)
-
-
 def dense_lengths(fit: Fit, points: Array, pairs: Array) -> tuple[Array, Array]:
     """Lengths (m,) between corrected points and their covariance (m, m), by the fit's own way."""
     found = fit.correct(points, "down")

@@ -16,7 +16,7 @@ from ballplate.cli import main
 from ballplate.extensions.maps.map_places import PlacesAsked, map_places
 from ballplate.extensions.maps.volumetric_errors import Volumetric
 from ballplate.simulator.experiment.machine_file import load_machine
-from ballplate.simulator.machines import reference_functions, stated_function
+from ballplate.simulator.machines.description import reference_functions, stated_function
 
 from tests.extensions.maps import wording
 
