@@ -63,7 +63,7 @@ class Edit:
 def edits(before: Experiment, after: Experiment) -> tuple[Edit, ...]:
     """Return the changes that turn the file of `before` into that of `after`.
 
-    Positions, calibration and probes are compared.
+    Positions, added probes and added calibration are compared.
     """
     changes = []
     for name, probe in after.probes.items():
@@ -87,25 +87,14 @@ def edits(before: Experiment, after: Experiment) -> tuple[Edit, ...]:
         elif place.name in unnamed or settings != position_settings(before, place_before):
             changes.append(Edit(("positions", place.name), settings))
     candidates = () if after.pool is None else after.pool.candidates
-    for k, item in enumerate(after.calibration):
-        if not can_be_written(item):
-            # Only a candidate of the pool is added as the file states it; nothing else changes.
-            if k >= len(before.calibration):
-                item_settings = next(
-                    candidate.settings for candidate in candidates if candidate.item is item
-                )
-                changes.append(Edit(("calibration",), to_list(item_settings), True))
-            continue
-        new_settings = calibration_settings(after, item)
-        if k >= len(before.calibration):
-            changes.append(Edit(("calibration",), new_settings, True))
-            continue
-        old = calibration_settings(before, before.calibration[k])
-        changes += [
-            Edit(("calibration", k, key), value)
-            for key, value in new_settings.items()
-            if value != old.get(key)
-        ]
+    for item in after.calibration[len(before.calibration) :]:
+        # Only a candidate of the pool is added as the file states it.
+        settings = (
+            calibration_settings(after, item)
+            if can_be_written(item)
+            else to_list(next(each.settings for each in candidates if each.item is item))
+        )
+        changes.append(Edit(("calibration",), settings, True))
     return tuple(changes)
 
 
