@@ -344,32 +344,16 @@ def _filled(action: Action) -> Outcome:
     return filled(action.draft, _known("artefact", artefact, layouts), probes, turns, count)
 
 
-def _limited(action: Action) -> Outcome:
-    """Add an entry to a list of the pool's limits: a forbidden box, or a candidate left out."""
-    return [TextChange(_limit(action), to_list(action["entry"]), "append")]
-
-
-def _lifted(action: Action) -> Outcome:
-    """Remove an entry of a list of the pool's limits, with what holds nothing else."""
-    data, steps, index = to_python(action.draft.tree), _limit(action), int(action["index"])
-    entries = ((data.get("pool") or {}).get("limits") or {}).get(steps[-1]) or ()
-    if not 0 <= index < len(entries):
-        raise ActionError(f"no pool.limits.{steps[-1]}[{index}]")
-    return _without(data, steps, [index])
-
-
-def _limit(action: Action) -> Steps:
-    return ("pool", "limits", _known("limit", action["limit"], ("forbidden", "at_most")))
-
-
 def _set(action: Action) -> Outcome:
-    """Set a value at a path, in the form of a file; an absent value removes it, and one at a last
-    step of + is a further entry of a list.
+    """Set a value at a path, in the form of a file; an absent value removes it, an entry of a list
+    with what holds nothing else, and one at a last step of + is a further entry of a list.
     """
     steps, text = _steps(action["path"]), str(action["value"])
     if steps[-1] == "+":
         return [TextChange(steps[:-1], value_of(text), "append")]
     if not text.strip():
+        if isinstance(steps[-1], int):
+            return _without(to_python(action.draft.tree), steps[:-1], steps[-1:])
         return [TextChange(steps, kind="remove")]
     return [TextChange(steps, value_of(text))]
 
@@ -444,8 +428,6 @@ ACTIONS: Mapping[str, Callable[[Action], Outcome]] = {
     "repair": _repaired,
     "plan": _planned,
     "fill": _filled,
-    "limit": _limited,
-    "lift": _lifted,
     "remove": _removed,
     "off": _switched_off,
     "on": _switched_on,

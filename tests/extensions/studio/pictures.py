@@ -48,7 +48,7 @@ def tour(page, folder: Path, design: Path) -> None:
         page.click(f"[aria-label='read {name}']")
         place = f"window.studio.state().design.scene.positions.find((one) => one.name === {name!r})"
         until(page, f"!{place}.enabled")
-    until(page, "!!window.studio.state().design.motions")
+    until(page, "!!window.studio.view.motions")
     picture("undetermined")
     page.click("[data-job=suggest]")
     page.wait_for_selector("#suggestions li")
@@ -91,7 +91,6 @@ def tour(page, folder: Path, design: Path) -> None:
     page.click("#keep")
     page.click("#sweep")
     page.fill("[data-axis=values]", "0.1 um; 0.2 um; 0.4 um")
-    page.click("#more-axes")
     page.fill("[data-axis=paths] >> nth=1", "artefacts.plate.balls")
     page.fill("[data-axis=values] >> nth=1", "[5, 5]; [6, 6]; [7, 7]")
     picture("sweep")

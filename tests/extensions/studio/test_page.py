@@ -171,7 +171,7 @@ def test_the_answer_comes_first_and_is_said_once_nothing_moves(design: Path) -> 
 def test_the_map_is_of_lengths_and_of_points_on_request(design: Path) -> None:
     with Studio(design) as studio, tab(1440) as page:
         page.goto(studio.address)
-        until(page, "!!window.studio?.state()?.design?.map")
+        until(page, "!!window.studio?.view.map")
         legend = page.inner_text("#legend")
         assert "ratio to the target 0.5 µm" in legend and "here 0.2 to 0.48" in legend
         bands = page.locator("#legend li")
@@ -190,5 +190,5 @@ def test_the_map_is_of_lengths_and_of_points_on_request(design: Path) -> None:
         page.wait_for_selector("#legend >> text=depends on the origin")
         page.select_option("#map", "")
         until(page, "document.querySelector('#legend').innerText === ''")
-        assert page.evaluate("window.studio.state().design.map") is None
+        assert page.evaluate("window.studio.view.map") is None
         assert page.errors == []

@@ -41,15 +41,18 @@ def test_a_pool_is_filled_limited_and_planned_from(page):
     page.click("#fill")
     page.wait_for_selector("#pool-said >> text=64 candidates")
     until(page, f"{DRAWN}.join() === '64,0'")
-    page.select_option("#corner", "x high, y high, z high")
+    for axis in "xyz":
+        page.select_option(f"#forbidding [name={axis}]", "high")
     page.click("#forbid")
     page.wait_for_selector("#pool-said >> text=in a forbidden box")
     until(page, f"{DRAWN}[1] === 1")
-    fields(page, "[aria-label='forbidden box 1, from and to along z']", "0 mm, 400 mm")
+    # All of it is in a form, where the box is changed and removed.
+    page.click("#forms [data-section=pool] > summary")
+    fields(page, """[data-path='["pool","limits","forbidden",0,"z"]']""", "[0 mm, 400 mm]")
     text = settled(page, 3)["text"]
     assert text.count("z: [0 mm, 400 mm]") == 1, text
     page.wait_for_selector("#pool-said >> text=9 in a forbidden box")
-    page.click("[aria-label='Allow box 1 again']")
+    page.click("#forms [data-section=pool] [aria-label^='remove forbidden 1']")
     page.wait_for_selector("#pool-said >> text=64 candidates")
     # Stopped, the plan is the best so far; applied, it is one step.
     fields(page, "#hours", "8")

@@ -22,9 +22,8 @@ from ballplate.simulator.inputs import ExperimentError
 
 PROBES = {"x": ["right", "left"], "y": ["back", "front"], "z": ["down"]}
 FILL = {"do": "fill", "probes": PROBES, "quarter_turns": [0, 1], "count": 3}
-CORNER = {"x": ["0 mm", "200 mm"], "y": ["0 mm", "200 mm"], "z": ["0 mm", "200 mm"]}
 SMALL = {"probes": {"z": ["down"]}, "quarter_turns": [0], "count": 2}
-FORBID = {"do": "limit", "limit": "forbidden", "entry": CORNER}
+FORBIDDEN = ["pool", "limits", "forbidden"]
 
 
 @pytest.fixture
@@ -67,16 +66,17 @@ def test_a_corner_is_forbidden_and_allowed_again(document):
     assert before["boxes"] == [] and before["count"] == len(before["names"])
     # The file's own positions are in the low corner; there is none in the upper one.
     corner = {axis: ["900 mm", "2 m"] for axis in "xyz"}
-    forbidden = done(filled, FORBID | {"entry": corner})
+    forbidden = done(filled, {"do": "set", "path": [*FORBIDDEN, "+"], "value": str(corner)})
     after = pooled(forbidden)
     assert after["boxes"] == [[[0.9] * 3, [1.0] * 3]]
     dropped = after["dropped"]["in a forbidden box"]
     assert dropped > 0 and after["count"] + dropped >= before["count"] > after["count"]
-    left = done(forbidden, {"do": "lift", "limit": "forbidden", "index": 0})
+    left = done(forbidden, {"do": "set", "path": [*FORBIDDEN, 0], "value": ""})
     assert left.text == filled.text
     # One is left out by its name.
     entry = {"of": {"name": before["names"][0]}, "count": 0}
-    out = done(filled, {"do": "limit", "limit": "at_most", "entry": entry})
+    path = ["pool", "limits", "at_most", "+"]
+    out = done(filled, {"do": "set", "path": path, "value": str(entry)})
     assert pooled(out)["left_out"] == before["names"][:1]
     assert pooled(out)["names"] == before["names"][1:]
 

@@ -1,14 +1,15 @@
 // The verdict, its figures, what is assumed and what is undetermined.
 import { flow, lead } from "./forms.js";
 import { legend } from "./legend.js";
-import { $, act, ask_now, button, fill, make, micro, page, share, table } from "./page.js";
+import { $, act, button, fill, follow, make, micro, page, share, table } from "./page.js";
 
 const counted = (number) => number.toLocaleString("en");
+const rounded = (number) => `${Number(number.toPrecision(3))}`;
 const figure = (look, text, ...words) => make("div", { class: `figure ${look}` },
   make("span", { class: "big" }, text), make("span", {}, words));
 const lines = (texts) => texts.map((text) => make("p", {}, text));
 const was = (text) => (page.state.kept ? ` (was ${text})` : "");
-const lengths_of = (design) => design?.quantities.find(({ symbol }) => symbol === "U6");
+export const lengths_of = (design) => design?.quantities.find(({ symbol }) => symbol === "U6");
 
 // Whether targets are met, in words that a person may act on.
 const LOOKS = { met: "good", missed: "warn", undecided: "warn" };
@@ -39,18 +40,6 @@ function answered(design, of_rest, is_old) {
   ];
 }
 
-// What comes with the map: the time of measuring, and lengths elsewhere that miss the target.
-function late({ met }) {
-  const { hours, usual, map } = page.drawn ?? {};
-  const { largest, unit } = map?.scale ?? {};
-  const time = (value) => (value ? `${Number(value.toFixed(2))} h` : "–");
-  return make("div", { id: "late" }, hours ? figure("", time(hours), "of measuring",
-    usual ? ", with usual times" : "", was(time(page.state.kept?.hours))) : null,
-  met === "met" && unit === "target" && largest > 1 ? make("p", { class: "notes" },
-    `Elsewhere in the volume, lengths reach ${Number(largest.toPrecision(3))} times the target.`)
-    : null);
-}
-
 const rank_words = ({ deficiency, expected, directions }) => {
   const weak = directions.filter((one) => one.weak).length;
   return [deficiency ? `Rank deficiency ${deficiency}` : "Full rank",
@@ -58,61 +47,65 @@ const rank_words = ({ deficiency, expected, directions }) => {
     weak ? `; ${weak} weakly determined` : ""].join("");
 };
 
-export function figures(design, messages, pending = false) {
-  const rank = design?.rank;
-  const moving = design !== page.state.design;
-  const wrong = !moving && (page.state.stale || pending);
-  const left_out = (design?.scene.positions ?? []).filter(({ problem }) => problem);
-  const is_missed = Boolean(rank) && !["met", ""].includes(design.met);
-  const reason = pending ? "Computing"
+// What the figures are of, with their rank.
+function notes_on({ rank }, messages, left_out, is_old) {
+  if (!is_old) {
+    const names = left_out.map(({ name }) => name).join(", ");
+    return [rank_words(rank),
+      ...(names ? [`of the positions without ${names}, which cannot be read there`] : [])];
+  }
+  const reason = page.state.pending ? "Computing"
     : messages[0]?.line ? "The text is invalid" : "The text cannot be evaluated";
-  const notes = [
-    wrong ? `${reason}; ${rank ? "these are the figures before it." : "there are no figures yet."}`
-      : rank ? rank_words(rank) : "",
-    left_out.length && !wrong ? `of the positions without ${left_out.map((one) => one.name)
-      .join(", ")}, which cannot be read there` : ""].filter(Boolean);
-  const box = $("verdict");
-  box.className = wrong ? "bad old" : rank?.deficiency ? "bad" : is_missed ? "warn"
-    : design?.met ? "" : "open";
-  fill(box, rank ? [answered(design, left_out.length > 0, wrong), late(design)] : [],
-    make("div", { class: "notes" }, lines(notes), left_out.length
-      ? button("Fit all positions to the volume", () => act({ do: "fit" }), { id: "fit" }) : null));
+  return [`${reason}; ${rank ? "these are the figures before it." : "there are no figures yet."}`];
+}
+
+// Show the answer for the design; while that moves, its figures and what is wrong with it.
+export function figures() {
+  const { design, state, view } = page;
+  const { rank, met, worst } = design ?? {};
+  const moving = design !== state.design;
+  const is_old = !moving && (state.stale || state.pending);
+  const left_out = (design?.scene.positions ?? []).filter(({ problem }) => problem);
+  const is_missed = Boolean(rank) && !["met", ""].includes(met);
+  const messages = moving ? left_out.map(({ name, problem }) =>
+    ({ what: `position "${name}"`, text: problem })) : state.messages;
+  const notes = notes_on(design ?? {}, messages, left_out, is_old);
+  $("verdict").className = is_old ? "bad old" : rank?.deficiency ? "bad" : is_missed ? "warn"
+    : met ? "" : "open";
+  $("design").classList.toggle("unanswered", is_old);
+  fill($("figures"), rank ? answered(design, left_out.length > 0, is_old) : []);
+  fill($("notes"), lines(notes), left_out.length && !is_old
+    ? button("Fit them to the volume", () => act({ do: "fit" }), { id: "fit" }) : null);
+  fill($("messages"), messages.map(message),
+    (design?.doubts ?? []).map((text) => make("li", {}, text)));
   const [suggest, next] = $("next").children;
   suggest.classList.toggle("primary", rank?.deficiency > 0);
   next.classList.toggle("primary", is_missed && !rank.deficiency);
-  page.view.lengths?.(rank && design.worst ? [{ ...design.worst,
-    label: `${micro(design.worst.uncertainty)} µm` }] : []);
+  view.lengths(worst ? [{ ...worst, label: `${micro(worst.uncertainty)} µm` }] : []);
   if (moving) return;
   // Only where there is something to determine.
   suggest.hidden = !rank?.directions.length;
   suggest.textContent = `What would determine it${rank?.deficiency ? "" : " better"}?`;
-  fill($("messages"), messages.map(message),
-    (design?.doubts ?? []).map((text) => make("li", {}, text)));
-  const figured = [...box.querySelectorAll(":scope > .figure")].map((one) =>
+  const figured = [...$("figures").children].map((one) =>
     [...one.children].map((part) => part.textContent).join(" "));
-  const said = [...(wrong ? [] : figured), ...notes].join("; ");
-  if (!pending && $("said").textContent !== said) $("said").textContent = said;
+  const said = [...(is_old ? [] : figured), ...notes].join("; ");
+  if (!state.pending && $("said").textContent !== said) $("said").textContent = said;
   fill($("counts"), lines(rank
     ? [`${rank.parameters} parameters from ${rank.observations} observations`, ...rank.reasons]
     : []));
-  quantities(rank && !wrong ? page.drawn?.quantities ?? [] : []);
   directions(rank?.directions ?? []);
-  if (rank && !wrong) ask_later();
-  else {
-    clearTimeout(waiting);
-    fill($("scale"));
-    assumed(null);
-  }
+  ask_later();
 }
 
 function message({ line, what, text }) {
   const where = line ? button(`line ${line}`, () => show_line(line),
     { class: "link", title: "show the line" }) : null;
-  return make("li", {}, where, what ? `, ${what}` : "", line ? ": " : "", text);
+  return make("li", {}, where, what ? `${line ? ", " : ""}${what}` : "", line || what ? ": " : "",
+    text);
 }
 
 function show_line(line) {
-  unfold_text(true);
+  $("text-area").open = true;
   const text = $("text");
   const all = text.value.split("\n");
   const before = all.slice(0, line - 1).join("\n").length + (line > 1 ? 1 : 0);
@@ -121,77 +114,45 @@ function show_line(line) {
   text.scrollTop = (line - 4) * (text.scrollHeight / all.length);
 }
 
-export function unfold_text(open) {
-  $("text-box").hidden = !open;
-  $("toggle-text").setAttribute("aria-expanded", String(open));
-}
-
-const MOST_DIRECTIONS = 3; // that are shown before a person asks for the others
 function directions(found) {
   const swing = (index) => {
     page.stopped = index === page.motion;
     page.motion = page.stopped ? null : index;
     page.show();
   };
-  const items = found.map((direction, index) => make("li", {},
-    button(index === page.motion ? "stop" : "move", () => swing(index),
-      { "aria-pressed": String(index === page.motion), "data-motion": String(index) }),
-    make("strong", {}, ` ${direction.weak ? "weak" : "undetermined"} `), direction.words));
-  const rest = items.splice(MOST_DIRECTIONS);
-  fill($("motions"),
-    items.length ? make("h2", {}, "What the readings leave undetermined") : null,
-    make("ol", {}, items), rest.length ? make("details", {},
-      make("summary", {}, `${rest.length} more`), make("ol", {}, rest)) : null);
+  fill($("motions"), found.length ? make("h2", {}, "What the readings leave undetermined") : null,
+    make("ol", { class: "scrolled" }, found.map(({ weak, words }, index) => make("li", {},
+      button(index === page.motion ? "stop" : "move", () => swing(index),
+        { "aria-pressed": String(index === page.motion), "data-motion": String(index) }),
+      make("strong", {}, ` ${weak ? "weak" : "undetermined"} `), words))));
 }
 
-// The map and the motion that were drawn last stay until those of the design have come.
-export function dress(design) {
-  const { drawn } = page;
-  if (!drawn || drawn.dimension !== design.scene.dimension) return;
-  design.map = $("map").value ? drawn.map : null;
-  design.motions = drawn.motions && drawn.motion === page.motion
-    ? { ...drawn.motions, directions: { [drawn.motion]: drawn.motions.direction } } : null;
-}
-
-const stale = (is, ...names) =>
-  names.forEach((name) => $(name)?.classList.toggle("stale", is));
-
-let waiting = null;
 // The map and what swings come once nothing moves; scale and assumptions, which take longer than
 // all the rest, after them.
-export function ask_later(after = 100) {
-  clearTimeout(waiting);
-  stale(true, "scale", "assumptions", "rests", "quantities", "legend", "late");
-  waiting = setTimeout(async () => {
-    const { motion, state: { fingerprint } } = page;
-    try {
-      const drawn = await ask_now("/api/drawn", { map: $("map").value, motion });
-      if (drawn && motion === page.motion) draw({ ...drawn, motion });
-      const is_known = page.later?.fingerprint === fingerprint;
-      const later = is_known ? page.later : await ask_now("/api/later");
-      if (later?.fingerprint !== page.state.fingerprint) return;
-      page.later = later;
-      fill($("scale"), lines(later.lines));
-      assumed(later.assumptions);
-      stale(false, "scale", "assumptions", "rests");
-    } catch {
-      // A later request has replaced this one, or the design has no such figures.
-      if (fingerprint === page.state.fingerprint) fill($("scale"));
-    }
-  }, after);
+export function ask_later() {
+  follow("drawn", { map: $("map").value, motion: page.motion }, (drawn) => {
+    if (drawn.error) return;
+    page.view.draw(drawn);
+    legend();
+    quantities(drawn.quantities);
+    late(drawn);
+    follow("later", {}, ({ lines: texts = [], assumptions }) => {
+      fill($("scale"), lines(texts));
+      assumed(assumptions);
+    }, 0);
+  }, 100);
 }
 
-function draw(found) {
-  const { view, state: { design } } = page;
-  page.drawn = { ...found, dimension: design.scene.dimension };
-  dress(design);
-  view.map();
-  view.move(found.motion);
-  legend();
-  quantities(found.quantities);
-  $("late")?.replaceWith(late(design));
-  $("hours").placeholder = `as now: ${Number(found.hours.toFixed(2))}`;
-  stale(false, "legend", "quantities", "late");
+// What comes with the map: the time of measuring, and lengths elsewhere that miss the target.
+function late({ hours, usual, map }) {
+  const { kept, design } = page.state;
+  const { largest, unit } = map?.scale ?? {};
+  const time = (value) => (value ? `${Number(value.toFixed(2))} h` : "–");
+  fill($("late"), figure("", time(hours), "of measuring", usual ? ", with usual times" : "",
+    was(time(kept?.hours))), design.met === "met" && unit === "target" && largest > 1
+    ? make("p", {}, `Elsewhere in the volume, lengths reach ${rounded(largest)} times the target.`)
+    : null);
+  $("hours").placeholder = `as now: ${Number(hours.toFixed(2))}`;
 }
 
 // A button that leads to where an assumption is stated; an effect of its own is written first.
@@ -207,28 +168,17 @@ function stating({ assumed: what, changes }) {
     { class: "link", "aria-label": `${added ? "state it" : "show where it is stated"}: ${what}` });
 }
 
-const FEW_ASSUMED = 3; // rows that are shown before a person asks for all
-let all_assumed = false;
 function assumed(found) {
   const all = found?.assumptions ?? [];
   $("assumptions").hidden = !all.length;
   fill($("rests"), found?.warning ? [found.warning, " ", stating(all[0])] : []);
-  const times = (ratio) => (Number.isFinite(ratio) ? `${Number(ratio.toPrecision(3))}` : "");
   const row = (words, { average, maximum, ratio }) =>
-    [words, micro(average), micro(maximum), times(ratio)];
-  const toggle = () => {
-    all_assumed = !all_assumed;
-    assumed(found);
-  };
-  const more = make("td", { colspan: "4" }, button(all_assumed ? "fewer" : `all ${all.length}`,
-    toggle, { id: "all-assumed", class: "link", "aria-expanded": String(all_assumed) }));
-  const shown = all.slice(0, all_assumed ? all.length : FEW_ASSUMED).map((one) =>
-    row(make("td", { title: one.source }, make("strong", {}, one.assumed),
-      `, instead ${one.instead} `, stating(one)), one));
+    [words, micro(average), micro(maximum), Number.isFinite(ratio) ? rounded(ratio) : ""];
+  const rows = all.map((one) => row(make("td", { title: one.source },
+    make("strong", {}, one.assumed), `, instead ${one.instead} `, stating(one)), one));
   fill($("assumptions").lastElementChild, table(
     ["U6 in µm without what is assumed", "average", "max.", "times"],
-    [row("all of these", { ...found, ratio: 1 }), ...shown,
-      ...(all.length > FEW_ASSUMED ? [[more]] : [])]));
+    [row("all of these", { ...found, ratio: 1 }), ...rows]));
 }
 
 const SHOWN_UNITS = { m: "µm", rad: "µrad", 1: "ppm" };

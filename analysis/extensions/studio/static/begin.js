@@ -1,5 +1,4 @@
 // The page on which a design begins: the questions of init, a file of the folder, or an example.
-import { dialog } from "./computations.js";
 import { $, act, ask, button, fill, make, page, tell } from "./page.js";
 import { picture } from "./paper.js";
 
@@ -9,7 +8,6 @@ let questions = null; // as the studio asks them, and the name of the file
 let draft = null; // of the last answers
 let asked = 0; // drafts that were asked for
 let timer = null;
-const left = new Set(); // the questions whose fields were left once
 
 export const begins = () => !$("begin").hidden;
 
@@ -61,8 +59,9 @@ function close(said = "") {
 async function leave(action) {
   const { state: { file, saved, untouched }, typed } = page;
   const question = `${file} has changes that are not saved. Leave them?`;
-  if ((typed || !(saved || untouched)) && !(await dialog(question))) return false;
+  if ((typed || !(saved || untouched)) && !window.confirm(question)) return false;
   page.typed = false;
+  $("planning").reset();
   return act({ ...action, discard: true });
 }
 
@@ -82,14 +81,15 @@ function group({ name, label, hint, usual, fields }) {
     make("p", { class: "hint", id: `hint-${name}` }, hint, usual ? ` Empty: ${usual}.` : ""),
     make("div", { class: "fields" }, made),
     make("p", { class: "field-error", id: `error-${name}` }));
-  box.querySelectorAll("input, select").forEach((one) =>
+  box.querySelectorAll("input").forEach((one) =>
     one.setAttribute("aria-describedby", `hint-${name} error-${name}`));
   return box;
 }
 
 const number = ({ label, units }, id) => make("div", { class: "field" },
   make("label", { for: id }, label), make("div", { class: "bar" },
-    make("input", { id, name: id, inputmode: "decimal", autocomplete: "off" }),
+    make("input", { id, name: id, inputmode: "decimal", autocomplete: "off",
+      pattern: "\\s*\\d*[.,]?\\d*\\s*" }),
     units.length < 2 ? make("span", {}, units[0].name)
       : make("select", { name: `${id}-unit`, "aria-label": `unit of ${label}` },
         units.map((unit, k) => make("option", { value: k }, unit.name)))));
@@ -108,24 +108,20 @@ function choices(field, name) {
     make("p", { class: "hint" }, "Or the order of the axes:"), others) : others;
 }
 
-// The text of an answer as init takes it, and what is `wrong` in fields by their names.
+// The text of an answer as init takes it.
 function answer({ name, fields }) {
-  const wrong = {};
-  const typedIn = (k) => form.elements[`answer-${name}-${k}`].value.trim();
-  const isStated = fields.some(({ units }, k) => units && typedIn(k));
-  const texts = fields.map(({ label, units, usual }, k) => {
-    const id = `answer-${name}-${k}`;
-    const typed = typedIn(k);
+  const inputs = fields.map((_, k) => form.elements[`answer-${name}-${k}`]);
+  const isStated = inputs.some(({ value }, k) => fields[k].units && value.trim());
+  return fields.map(({ units, usual }, k) => {
+    const typed = inputs[k].value.trim();
     if (!units) return typed;
-    const unit = units[form.elements[`${id}-unit`]?.value ?? 0];
+    const unit = units[form.elements[`answer-${name}-${k}-unit`]?.value ?? 0];
     // A constant that is stated alone does not grow.
     const empty = isStated && unit.text.includes("+") ? "" : unit.default;
-    form.elements[id].placeholder = empty ?? usual ?? "";
+    inputs[k].placeholder = empty ?? usual ?? "";
     const value = typed.replace(",", ".") || empty || "";
-    if (!(Number(value) >= 0)) wrong[id] = `${label}: "${typed}" is no number`;
     return value && unit.text.replace("{}", () => value);
-  });
-  return { text: texts.join(""), wrong };
+  }).join("");
 }
 
 async function update() {
@@ -133,7 +129,7 @@ async function update() {
   asked += 1;
   const mine = asked;
   sessionStorage.setItem("answers", JSON.stringify(Object.fromEntries(new FormData(form))));
-  const answers = Object.fromEntries(questions.map((one) => [one.name, answer(one).text]));
+  const answers = Object.fromEntries(questions.map((one) => [one.name, answer(one)]));
   try {
     const found = await ask("/api/draft", answers);
     if (mine !== asked) return;
@@ -146,21 +142,15 @@ async function update() {
   }
 }
 
-// What is wrong at its field, but not while it is typed for the first time.
+// What is wrong, which the browser shows once a field was left.
 function messages() {
-  const said = questions.flatMap((question) => {
-    const { name, label } = question;
-    const box = $(`question-${name}`);
-    const isTyped = box.contains(document.activeElement) && !left.has(name);
-    const { wrong } = answer(question);
-    const faults = Object.values(wrong).join("; ");
-    const message = isTyped ? "" : faults || draft.messages[name] || "";
+  questions.forEach(({ name }) => {
+    const inputs = [...$(`question-${name}`).querySelectorAll("input")];
+    const wrong = inputs.find(({ validity }) => validity.patternMismatch);
+    const message = wrong ? `"${wrong.value}" is no number` : draft.messages[name] ?? "";
+    inputs.forEach((one) => one.setCustomValidity(wrong && one !== wrong ? "" : message));
     $(`error-${name}`).textContent = message;
-    box.querySelectorAll("input, select").forEach((one) => one.setAttribute("aria-invalid",
-      String(Boolean(message) && (!faults || one.name in wrong))));
-    return message ? `${label}: ${message}` : [];
-  }).join(". ");
-  if ($("begin-status").textContent !== said) $("begin-status").textContent = said;
+  });
 }
 
 function summary(answers) {
@@ -176,20 +166,13 @@ form.oninput = () => {
   clearTimeout(timer);
   timer = setTimeout(update, PAUSE);
 };
-// Faults of a question are reported once it is left.
-form.addEventListener("focusout", ({ target, relatedTarget }) => {
-  const box = target.closest("fieldset");
-  if (!box || box.contains(relatedTarget)) return;
-  left.add(box.id.replace("question-", ""));
-  if (draft) messages();
-});
 form.onsubmit = async (event) => {
   event.preventDefault();
-  questions.forEach((one) => left.add(one.name));
+  form.classList.add("sent");
   await update();
-  if (draft?.text && !Object.keys(draft.messages).length) {
+  if (form.reportValidity() && draft?.text) {
     await begin_with(draft.text, "a draft of your answers");
-  } else $("begin").querySelector("[aria-invalid=true]")?.focus();
+  }
 };
 $("begin-example").onclick = () => close(page.state.note);
 $("begin-flat").onclick = async () => {

@@ -1,12 +1,13 @@
 // Computations beside the page: suggestions, sweeps, plans, fits.
+import { lengths_of } from "./answers.js";
 import { $, act, ask, button, fill, make, micro, page, share, table, tell } from "./page.js";
 
 const OFFERING = ["suggest", "next", "plan"]; // what is drawn and applied
 let running = []; // computations as they were when they were asked after last
 const shown = new Map(); // by the number of a computation and of a suggestion
 
-const is_current = ({ fingerprint, state }) =>
-  fingerprint === page.state.fingerprint && state === "done";
+const is_of_now = ({ fingerprint }) => fingerprint === page.state.fingerprint;
+const is_current = (job) => is_of_now(job) && job.state === "done";
 
 // What is suggested for the present design: what was computed last.
 function current() {
@@ -26,12 +27,11 @@ export function drawn() {
 
 // Of this file, what was suggested as suggestions; what failed of an earlier text nowhere.
 function lists() {
-  const { file, fingerprint } = page.state;
+  const is_listed = (job) => job.file === page.state.file && (job.state === "failed"
+    ? is_of_now(job)
+    : job.state === "running" || !["suggest", "next"].includes(job.job) || !job.result.length);
   fill($("suggestions"), current().map(suggestion));
-  fill($("jobs"), running.filter((job) => job.file === file && (job.state === "failed"
-    ? job.fingerprint === fingerprint
-    : job.state === "running" || job.job === "plan" || !OFFERING.includes(job.job)
-      || !job.result.length)).map(computation));
+  fill($("jobs"), running.filter(is_listed).map(computation));
 }
 
 // How many times their size residuals are drawn.
@@ -42,7 +42,7 @@ function magnified({ result }) {
 
 // The settings of the next position that lowers U6 most for each reading, if it was asked for.
 export function candidate() {
-  const before = page.state.design?.quantities?.find(({ symbol }) => symbol === "U6")?.average;
+  const before = lengths_of(page.state.design)?.average;
   const gain = ({ average, place }) => (before - (average ?? before)) / place.readings;
   const added = current().filter((one) => one.settings);
   return added.sort((one, other) => gain(other) - gain(one) || 0)[0]?.settings;
@@ -65,11 +65,9 @@ function suggestion(one) {
     button("apply", () => apply(one), { "data-apply": "" })));
 }
 
-function apply({ settings, plan: positions, calibration, edits }) {
-  if (settings) act({ do: "add", settings }, "position added");
-  else if (positions) act({ do: "plan", positions, calibration }, "planned; undo leads back");
-  else act({ do: "repair", edits }, "applied");
-}
+const apply = ({ settings, plan: positions, calibration, edits }) =>
+  act({ do: settings ? "add" : positions ? "plan" : "repair", settings, positions, calibration,
+    edits }, "applied; undo leads back");
 
 const BESIDE = "computing beside the studio …";
 // What refuses the start, or nothing.
@@ -84,18 +82,6 @@ export async function start(job, settings = {}) {
   }
   poll();
   return refused;
-}
-
-// A plan within the hours that are stated, or else those of the present positions.
-export function plan() {
-  const typed = $("hours").value.trim().replace(",", ".");
-  const is_read = page.state.design?.scene.positions.some((place) => place.enabled);
-  if (typed ? Number(typed) > 0 : is_read) {
-    return start("plan", typed ? { hours: Number(typed) } : {});
-  }
-  $("hours").focus();
-  return tell(typed ? `"${typed}" is no number of hours`
-    : "There are no positions that hours could be taken from: state the hours.", true);
 }
 
 let polling = null;
@@ -121,69 +107,52 @@ export async function poll() {
 const NOTHING = { suggest: "nothing was found that determines more",
   next: "no further position fits" };
 
+// What there is to read of a computation.
+function text_of(job) {
+  const { state, result } = job;
+  if (state !== "done") return state === "failed" ? result : "";
+  const size = result.residuals && magnified(job).toLocaleString("en");
+  return [NOTHING[job.job], size && `residuals are drawn ${size} times their size`, result.notes,
+    result.lines].flat().filter(Boolean).join("\n");
+}
+
 function computation(job) {
-  const { id, state, result, step } = job;
-  const isDone = state === "done";
-  const is_old = job.fingerprint !== page.state.fingerprint;
+  const { id, state, result, step, ending } = job;
+  const text = text_of(job);
   const stop = async () => {
     await ask("/api/stop", { id });
     poll();
   };
-  const fitted = isDone && result?.residuals
-    ? [`residuals are drawn ${magnified(job).toLocaleString("en")} times their size`] : [];
-  const text = state === "failed" ? String(result) : isDone && NOTHING[job.job]
-    ? NOTHING[job.job] : isDone && result?.lines
-      ? [...fitted, ...(result.notes ?? []), ...result.lines].join("\n") : null;
   return make("li", { "data-state": state, id: `job-${id}` },
     make("strong", {}, job.job), ` ${state}`,
     make("span", { class: "step" }, state === "running" && step ? `: ${step}` : ""), " ",
-    button(state !== "running" ? "close" : job.ending ? "stop without a plan" : "stop", stop), " ",
-    job.ending ? make("small", {}, "ends with the best so far ") : null,
+    button(state !== "running" ? "close" : ending ? "stop without a plan" : "stop", stop), " ",
+    ending ? make("small", {}, "ends with the best so far ") : null,
     job.page ? make("a", { href: `/pages/${id}`, target: "_blank", rel: "noopener",
       "data-page": "" }, "open its page") : null,
-    text ? button("read it whole", () => opened(job.job, make("pre", {}, text))) : null,
-    is_old ? make("small", {}, " of an earlier design") : null,
+    is_of_now(job) ? null : make("small", {}, " of an earlier design"),
     // What is of an earlier design is read on request alone.
-    text && !is_old ? make("pre", { tabindex: "0" }, text) : null,
-    isDone && job.job === "sweep" ? cells(result, job.page) : null,
+    text ? [make("button", { type: "button", popovertarget: `text-${id}` }, "read it whole"),
+      make("pre", { popover: "auto", id: `text-${id}` }, text),
+      is_of_now(job) && make("pre", { tabindex: "0" }, text)] : null,
+    state === "done" && job.job === "sweep" ? cells(result, job.page) : null,
   );
 }
 
 const MOST_ROWS = 60; // of a sweep's cells in its table here
-function cells(found, has_page) {
+function cells({ axes, cells: found }, has_page) {
   // The last keys of paths, which tell enough where there is little room.
-  const short = (paths) => paths.map((path) => path.split(".").at(-1)).join(", ");
-  const heads = found.axes.map((paths) =>
-    make("th", { scope: "col", title: paths.join(", ") }, short(paths)));
-  const rows = found.cells.slice(0, MOST_ROWS).map((cell) => [...cell.values,
-    ...(cell.reason ? [make("td", { colspan: "4" }, cell.reason)] : [cell.deficiency,
-      micro(cell.average), micro(cell.maximum), share(cell.within) || "no target"])]);
-  const rest = found.cells.length - MOST_ROWS;
-  return make("div", { class: "scrolled", tabindex: "0" }, make("table", {}, table(
-    [...heads, "rank deficiency", "U6 average µm", "U6 max. µm", "lengths within target"], rows)),
-  rest > 0 ? make("p", {}, `${rest} more cases are on the page`) : null,
-  has_page ? null
-    : make("p", {}, "its page needs the extra report: python -m pip install 'ballplate[report]'"));
-}
-
-// True if a dialogue was confirmed.
-function confirmed(dialogue) {
-  Object.assign(dialogue, { returnValue: "" }).showModal();
-  return new Promise((resolve) => {
-    dialogue.onclose = () => resolve(dialogue.returnValue === "ok");
-  });
-}
-
-function opened(question, ...fields) {
-  $("question").textContent = question;
-  $("fields").replaceChildren(...fields);
-  return confirmed($("dialog"));
-}
-
-export async function dialog(question, ...fields) {
-  const inputs = fields.map(([name, value]) => make("input", { name, value }));
-  const labels = inputs.map((input) => make("label", {}, input.name, input));
-  return (await opened(question, ...labels)) ? inputs.map((input) => input.value) : null;
+  const heads = axes.map((paths) => make("th", { scope: "col", title: paths.join(", ") },
+    paths.map((path) => path.split(".").at(-1)).join(", ")));
+  const figures = (cell) => [cell.deficiency, micro(cell.average), micro(cell.maximum),
+    share(cell.within) || "no target"];
+  const rows = found.slice(0, MOST_ROWS).map((cell) => [...cell.values,
+    ...(cell.reason ? [make("td", { colspan: "4" }, cell.reason)] : figures(cell))]);
+  const rest = found.length - MOST_ROWS;
+  return [make("div", { class: "scrolled", tabindex: "0" }, make("table", {}, table(
+    [...heads, "rank deficiency", "U6 average µm", "U6 max. µm", "lengths within target"], rows))),
+  rest > 0 && make("p", {}, `${rest} more cases are on the page`), has_page ? null
+    : make("p", {}, "its page needs the extra report: python -m pip install 'ballplate[report]'")];
 }
 
 // Paths of all values of a design, entries of lists by their names where they have any.
@@ -195,29 +164,28 @@ function keys(data, path = "") {
   return path ? [path, ...below] : below;
 }
 
-export async function sweep() {
-  const axes = $("axes");
-  const part = (one, key, mark) => one.querySelector(`[data-axis=${key}]`).value.split(mark)
-    .map((text) => text.trim()).filter(Boolean);
+$("sweep").onclick = () => {
   fill($("paths"), keys(page.state.data ?? {}).map((path) => make("option", { value: path })));
-  while (await confirmed($("sweeping"))) {
-    const meant = [...axes.children].map((one) =>
-      ({ paths: part(one, "paths", ","), values: part(one, "values", ";") }));
-    const refused = await start("sweep", { axes: meant.filter(({ paths }) => paths.length) });
-    // Beside the axis whose key the words begin with, or below all.
-    const k = meant.findIndex(({ paths }) => paths.some((path) => refused.startsWith(`${path}: `)));
-    [...axes.children].forEach((one, other) => {
-      one.lastElementChild.textContent = k === other ? refused : "";
-    });
-    $("sweep-error").textContent = k < 0 ? refused : "";
-    if (!refused) return;
-  }
-}
-$("more-axes").onclick = () => {
-  const axis = $("axes").lastElementChild.cloneNode(true);
-  axis.querySelectorAll("input").forEach((input) => { input.value = ""; });
-  $("axes").append(axis);
-  axis.querySelector("input").focus();
+  $("sweep-error").textContent = "";
+  $("sweeping").showModal();
+};
+// The dialogue stays until its sweep has begun.
+$("sweeping").onsubmit = async (event) => {
+  if (event.submitter.id === "cancel") return;
+  event.preventDefault();
+  const listed = (input, mark) =>
+    input.value.split(mark).map((text) => text.trim()).filter(Boolean);
+  const axes = [...$("axes").children].map((one) => one.querySelectorAll("input"))
+    .map(([paths, values]) => ({ paths: listed(paths, ","), values: listed(values, ";") }));
+  const refused = await start("sweep", { axes: axes.filter(({ paths }) => paths.length) });
+  $("sweep-error").textContent = refused;
+  if (!refused) $("sweeping").close();
+};
+
+// A plan within the hours that are stated, or else those of the present positions.
+$("planning").onsubmit = (event) => {
+  event.preventDefault();
+  start("plan", $("hours").value ? { hours: $("hours").valueAsNumber } : {});
 };
 
 export function fit(file) {

@@ -2,7 +2,7 @@
 import { $, act, button, fill, make, options, page } from "./page.js";
 
 const SECTIONS = [
-  "title", "machine", "error_model", "probes", "artefacts", "positions", "calibration",
+  "title", "machine", "error_model", "probes", "artefacts", "positions", "calibration", "pool",
   "influences", "evaluation", "target_uncertainty", "coverage_factor", "expected_rank_deficiency",
 ];
 const isMapping = (one) => one !== null && typeof one === "object" && !Array.isArray(one);
@@ -146,7 +146,7 @@ function entries(path, data, items) {
   const listed = choices(kinds(items)) ?? [];
   const add = ({ currentTarget: { previousElementSibling: select } }) =>
     set([...path, "+"], select ? usual(select.value, items) : flow(data.at(-1)));
-  const title = (one, k) => one?.kind ?? one?.name ?? `${k + 1}`;
+  const title = (one, k) => one?.kind ?? one?.name ?? `${spaced(path.at(-1))} ${k + 1}`;
   const shown = data.map((one, k) => make("fieldset", {},
     make("legend", {}, title(one, k), " ", button("×", () => set([...path, k], ""),
       { title: "remove", "aria-label": `remove ${title(one, k)} ${k + 1}` })),

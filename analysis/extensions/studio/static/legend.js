@@ -45,11 +45,10 @@ function along(nodes, at) {
 }
 
 export function legend() {
-  const { map, target } = page.state.design ?? {};
-  const kind = $("map").value;
-  const known = kind && map ? knownOf(map) : [];
+  const { view: { map }, state: { design: { target } } } = page;
+  const known = map ? knownOf(map) : [];
   if (!known.length) {
-    fill($("legend"), kind && map && "Map: everything is undetermined: nothing to colour.");
+    fill($("legend"), map && "Map: everything is undetermined: nothing to colour.");
     return;
   }
   const isRatio = map.scale?.unit === "target";
@@ -58,7 +57,7 @@ export function legend() {
   const band = (low, k, { length }) => make("li",
     { class: isRatio && low === 1 && "target", style: `--shade: var(--band-${k})` },
     number(low), isRatio && low === 1 && " = target", k === length - 1 && `${unit} or more`);
-  fill($("legend"), isRatio ? MEANINGS.target + target : MEANINGS[kind],
+  fill($("legend"), isRatio ? MEANINGS.target + target : MEANINGS[$("map").value],
     `; here ${number(Math.min(...known))} to ${number(Math.max(...known))}${unit}`,
     known.length < valuesOf(map).length && "; grey: undetermined",
     make("ul", { class: "bands" }, bandsOf(map).map(band)));

@@ -1,41 +1,47 @@
 // Errors by positions: how much of each error's information goes with each position.
-import { $, ask, button, make, micro, page } from "./page.js";
+import { candidate } from "./computations.js";
+import { $, button, fill, follow, make, micro, page } from "./page.js";
+import { choose } from "./positions.js";
 
 const UNITS = { m: "µm", rad: "µrad", 1: "ppm" };
 const percent = (part) => `${Number((100 * part).toPrecision(part < 0.01 ? 1 : 2))}`;
 const known = (value, words) => (value === null ? "–" : words(value));
+// As everywhere on the page, half a minute shows.
+const in_minutes = (minutes) => `${Number(minutes.toFixed(1))}`;
 const hint = (...words) => make("p", { class: "hint" }, ...words);
 const row = (attributes, label, unit, cells) => make("tr", attributes,
   make("th", { scope: "row" }, label), make("td", {}, unit), cells);
 
-function head({ positions, average }, onChoose) {
-  const name = (one) => make("th", { scope: "col" },
-    button(`${one.is_added ? "+ " : ""}${one.name}`, () => onChoose(one),
-      { class: "link", "aria-label": `choose ${one.name}` }));
+function head({ positions, average }) {
+  const name = ({ name: words, is_added }) => make("th", { scope: "col" },
+    button(`${is_added ? "+ " : ""}${words}`, () => choose(words),
+      { class: "link", "aria-label": `choose ${words}` }));
   const figures = (label, all, words) =>
     row({}, label, all, positions.map((one) => make("td", {}, words(one))));
   return make("thead", {}, make("tr", {}, ["error", "u"].map((words) =>
     make("th", { scope: "col" }, words)), positions.map(name)),
   figures("readings", "", ({ readings }) => readings),
   positions.some(({ minutes }) => minutes !== null)
-    && figures("minutes", "", ({ minutes }) => known(minutes, Math.round)),
+    && figures("minutes", "", ({ minutes }) => known(minutes, in_minutes)),
   figures("U6 without, µm", known(average, micro), (one) => known(one.average, micro)));
 }
 
-// A row that is pointed at or focused is given to `onHover`, with the index of the direction that
-// hides it, or null; where several do, its name leads to the next.
-function errorRow(error, parts, isLost, directions, onHover) {
+function swing(motion) {
+  if (motion === undefined || motion === page.motion) return;
+  page.motion = motion;
+  page.show();
+}
+
+// Where a row is pointed at or focused, the direction that hides its error swings; where several
+// do, its name leads to the next.
+function error_row(error, parts, isLost, directions) {
   const { name, hidden_by: hidden, standard_uncertainty: u, unit } = error;
   const reasons = hidden.map((k) => directions[k]).join("; ");
-  let k = 0;
-  const point = () => onHover(error, hidden[k] ?? null);
-  const turn = () => {
-    k = (k + 1) % hidden.length;
-    point();
-  };
+  const point = () => swing(hidden[0]);
+  const turn = () => swing(hidden[(hidden.indexOf(page.motion) + 1) % hidden.length]);
   const label = !hidden.length ? make("span", { title: error.meaning }, name)
-    : button(name, turn, { class: "link", title: reasons, "data-focus": `error ${name}`,
-      "aria-label": `${name}: ${reasons}`, onfocus: point });
+    : button(name, turn, { class: "link", title: reasons, "aria-label": `${name}: ${reasons}`,
+      onfocus: point });
   const cells = parts.map((part, position) => {
     const look = part === null ? "open" : isLost[position] ? "part lost" : "part";
     const words = isLost[position] ? () => "all" : percent;
@@ -54,45 +60,23 @@ function gain({ name, readings, minutes, average }, before) {
     isKnown && minutes && ` and ${by(minutes)} for each minute`);
 }
 
-// The table in a box, and what there is to know about it.
-function matrix(data, { onHover, onChoose }) {
+// The table in a box, whose right edge fades as long as there is more behind it.
+function matrix({ error, ...data }) {
+  if (error || !data.errors) return error ?? "";
   const { positions, undetermined_without: lost } = data;
-  const rows = data.errors.map((error, k) =>
-    errorRow(error, data.information[k], lost[k], data.directions, onHover));
-  const box = make("div", { class: "scrolled whole", tabindex: "0", role: "region",
-    "aria-label": "Errors by positions", onscroll: () => look() },
-  make("table", { class: "matrix" }, head(data, onChoose), make("tbody", {}, rows)));
-  const more = hint(`Scroll to the right for all ${positions.length} positions →`);
-  // Its right edge fades as long as there is more behind it.
-  const look = () => {
-    more.hidden = box.scrollWidth <= box.clientWidth;
-    box.classList.toggle("more", box.scrollLeft + box.clientWidth < box.scrollWidth - 2);
-  };
-  new ResizeObserver(look).observe(box);
-  return [hint("Information of each error that goes with each position, %"), more, box,
+  const rows = data.errors.map((one, k) =>
+    error_row(one, data.information[k], lost[k], data.directions));
+  return [hint(`Information of each error that goes with each of ${positions.length} positions, %`),
+    make("div", { class: "scrolled whole", tabindex: "0", role: "region",
+      "aria-label": "Errors by positions" },
+    make("table", { class: "matrix" }, head(data), make("tbody", {}, rows))),
     ...positions.filter((one) => one.is_added).map((one) => gain(one, data.average)),
     lost.flat().some(Boolean) ? hint("all: without it, the error is undetermined.") : ""];
 }
 
-let shown = null; // what the table is of
-let waiting = null;
-// Show the table of the present design with a candidate, once it is unfolded and nothing moves. A
-// position whose head is pressed is given to `onChoose`.
-export function errors(candidate, handlers) {
-  clearTimeout(waiting);
-  const { fingerprint, design, stale, pending } = page.state;
-  const key = JSON.stringify([fingerprint, candidate ?? null]);
-  $("matrix").classList.toggle("stale", key !== shown);
-  if (!$("errors").open || key === shown || !design || stale || pending) return;
-  waiting = setTimeout(async () => {
-    try {
-      const data = await ask("/api/matrix", candidate ? { settings: candidate } : {});
-      if (data.fingerprint !== page.state.fingerprint) return;
-      shown = key;
-      if (data.errors) $("matrix").replaceChildren(...matrix(data, handlers));
-      $("matrix").classList.remove("stale");
-    } catch (error) {
-      $("matrix").textContent = error.message;
-    }
-  }, 400);
+// Show the table of the present design with the next position, if that was asked for.
+export function errors() {
+  const settings = candidate();
+  if (!$("errors").open) return;
+  follow("matrix", settings ? { settings } : {}, (data) => fill($("matrix"), matrix(data)), 400);
 }

@@ -4,6 +4,7 @@ export const $ = (id) => document.getElementById(id);
 
 export const page = {
   state: null, // the studio's last answer
+  design: null, // that of the state, or as it would be while something moves
   schema: null,
   selected: null, // the name of the chosen position
   motion: null, // the number of the direction that swings
@@ -112,10 +113,29 @@ export async function ask(path, body) {
   return data;
 }
 
-// The answer to a question of the present design, or nothing if that has changed meanwhile.
-export async function ask_now(path, body) {
-  const found = await ask(path, body);
-  return found.fingerprint === page.state.fingerprint ? found : null;
+const views = {}; // by name: the last answer and what it is of, what is wanted, and the wait for it
+// Show a view of the present design, once nothing moves; what is of an earlier one is marked, and
+// what came after a later question is not shown.
+export function follow(name, body, show, after = 300) {
+  const { fingerprint, pending, stale } = page.state;
+  const view = (views[name] ??= {});
+  const key = JSON.stringify([fingerprint, body]);
+  const isWanted = () => view.wanted === key && page.state.fingerprint === fingerprint;
+  const finish = () => {
+    if (view.of === key) show(view.answer);
+    document.querySelectorAll(`[data-of=${name}]`)
+      .forEach((one) => one.classList.toggle("stale", view.of !== key));
+  };
+  view.wanted = key;
+  clearTimeout(view.wait);
+  finish();
+  if (view.of === key || pending || stale) return;
+  view.wait = setTimeout(async () => {
+    const answer = await ask(`/api/${name}`, body).catch(({ message }) => ({ error: message }));
+    if (!isWanted()) return;
+    Object.assign(view, { answer, of: key });
+    finish();
+  }, after);
 }
 
 let lost = null; // waits for a studio that does not answer

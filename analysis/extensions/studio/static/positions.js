@@ -8,7 +8,7 @@ export function choose(name) {
 }
 
 export function positions() {
-  const { positions: list = [], unclear = {} } = page.state.design?.scene ?? {};
+  const { positions: list = [], unclear = {} } = page.design?.scene ?? {};
   // Those that cannot be understood have no place.
   const others = Object.entries(unclear).map(([name, problem]) =>
     ({ name, problem, enabled: true, readings: "unclear" }));
@@ -33,7 +33,7 @@ function item({ name, enabled, problem, readings }) {
 }
 
 function details({ name, artefact, groups, plane, problem, probes, read, readings }) {
-  const { scene } = page.state.design;
+  const { scene } = page.design;
   const many = groups > 1;
   const axes = scene.dimension === 3 ? ["x", "y", "z"] : [];
   const does = (words, action, attributes = {}) =>

@@ -1,10 +1,9 @@
 // The page of the studio: it asks, the engine answers, and everything that is shown comes from
 // there.
-import { ask_later, dress, figures, unfold_text } from "./answers.js";
+import { ask_later, figures } from "./answers.js";
 import { begin, begins, open } from "./begin.js";
-import { candidate, dialog, drawn, fit, plan, poll, start, sweep } from "./computations.js";
-import { build, flow } from "./forms.js";
-import { legend } from "./legend.js";
+import { drawn, fit, poll, start } from "./computations.js";
+import { build } from "./forms.js";
 import { errors } from "./matrix.js";
 import { $, act, ask, options, page, preview, refresh, tell, watch } from "./page.js";
 import { pool } from "./pool.js";
@@ -13,8 +12,7 @@ import { View } from "./view.js";
 
 const view = new View($("view"), {
   onSelect: choose,
-  onDrag: (name, by) =>
-    preview({ do: "move", position: name, by }, (design) => figures(design, [])),
+  onDrag: (name, by) => preview({ do: "move", position: name, by }, moving),
   onDrop: (name, by) => act({ do: "move", position: name, by }),
   onPlace: (at) => act({ do: "put", at, like: page.selected ?? undefined }, "position added"),
 });
@@ -24,6 +22,7 @@ page.show = show;
 function show() {
   const { state } = page;
   const { design, file } = state;
+  page.design = design;
   const title = `${file}${state.saved ? "" : " (not saved)"}`;
   const heading = `${title}${design ? ` — ${design.title}` : ""}`;
   $("title").textContent = begins() ? "ballplate studio" : heading;
@@ -35,40 +34,20 @@ function show() {
   $("redo").disabled = !state.forward;
   $("save").disabled = state.saved;
   $("keep").textContent = state.kept ? "Stop comparing" : "Keep to compare";
-  state_hours();
+  // The hours of a plan are those of the data sheet that the file was drafted from, until changed.
+  $("hours").defaultValue = /^#.* --hours ([\d.]+)/m.exec(state.text)?.[1] ?? "";
   page.typed &&= $("text").value !== state.text;
   if (!page.typed) $("text").value = state.text;
   $("apply").disabled = !page.typed;
   if (design) draw(design);
   else view.empty();
-  figures(design, state.messages, state.pending);
+  figures();
   watch();
   positions();
   build();
   drawn();
   pool();
-  informed();
-}
-
-let stated = "";
-// The hours of a plan are those of the data sheet that the file was drafted from, until changed.
-function state_hours() {
-  const { file, text } = page.state;
-  const hours = /^#.* --hours ([\d.]+)/m.exec(text)?.[1] ?? "";
-  if (stated !== `${file} ${hours}`) $("hours").value = hours;
-  stated = `${file} ${hours}`;
-}
-
-// Errors by positions; what hides one swings.
-function informed() {
-  errors(candidate(), {
-    onHover: (_, motion) => {
-      if (motion === null || motion === page.motion) return;
-      page.motion = motion;
-      show();
-    },
-    onChoose: ({ name }) => choose(name),
-  });
+  errors();
 }
 
 function draw(design) {
@@ -77,38 +56,42 @@ function draw(design) {
   if (!places.some(({ name }) => name === page.selected)) page.selected = null;
   if (page.motion >= count) page.motion = null;
   if (page.motion === null && design.rank?.deficiency && !page.stopped) page.motion = 0;
-  dress(design);
-  view.motion = page.motion;
+  if (page.motion === null) view.move(null);
   view.show(design, page.selected);
-  $("stage").classList.toggle("flat", dimension === 2);
-  legend();
+  $("design").classList.toggle("flat", dimension === 2);
+}
+
+// Figures of the design as it would be, and what is then wrong with its positions.
+function moving(preview_of) {
+  const { scene } = page.state.design;
+  const places = scene.positions.map((place, k) =>
+    ({ ...place, problem: preview_of.scene.positions[k]?.problem }));
+  page.design = { ...preview_of, scene: { ...scene, positions: places } };
+  figures();
+  positions();
 }
 
 const CLICKS = {
-  undo: () => act({ do: "undo" }),
-  redo: () => act({ do: "redo" }),
-  save: () => act({ do: "save" }, "saved"),
+  apply: () => act({ do: "text", text: $("text").value }),
   keep: () => {
     const off = Boolean(page.state.kept);
     $("details").open ||= !off;
     act({ do: "keep", off });
   },
-  "save-as": async () => {
-    const question = "Save under another name, in the same folder";
-    const answer = await dialog(question, ["name", page.state.file]);
-    if (answer) act({ do: "save", name: answer[0] }, "saved");
+  "save-as": () => {
+    const name = window.prompt("Save under another name, in the same folder", page.state.file);
+    if (name) act({ do: "save", name }, "saved");
   },
-  apply: () => act({ do: "text", text: $("text").value }),
   reopen: () => {
     page.typed = false;
     act({ do: "reopen" }, "read again; undo leads back to the text that was here");
   },
-  "toggle-text": () => unfold_text($("text-box").hidden),
   home: () => view.home(),
-  sweep,
-  plan,
 };
 Object.entries(CLICKS).forEach(([id, does]) => { $(id).onclick = does; });
+document.querySelectorAll("[data-do]").forEach((one) => {
+  one.onclick = () => act({ do: one.dataset.do }, one.dataset.said);
+});
 document.querySelectorAll("[data-job]").forEach((one) => {
   one.onclick = () => start(one.dataset.job);
 });
@@ -122,34 +105,30 @@ $("text").oninput = () => {
   $("apply").disabled = !page.typed;
 };
 $("step").onchange = ({ target: { value } }) => { view.step = Number(value); };
-$("errors").ontoggle = informed;
+$("errors").ontoggle = errors;
 $("pool").ontoggle = $("show-pool").onchange = pool;
-$("map").onchange = () => {
-  show();
-  ask_later(0);
-};
+$("map").onchange = ask_later;
 $("readings").onchange = ({ target }) => {
   if (target.files[0]) fit(target.files[0]);
   target.value = "";
 };
+// A file that is dropped elsewhere does not replace the page.
+for (const type of ["dragover", "drop"]) {
+  document.addEventListener(type, (event) => {
+    if (event.target !== $("readings")) event.preventDefault();
+  });
+}
 // A message of what was refused ends with the next attempt.
 document.addEventListener("input", () => {
   if ($("notice").classList.contains("bad")) tell("");
 });
-for (const type of ["dragover", "dragleave", "drop"]) {
-  document.addEventListener(type, (event) => {
-    event.preventDefault();
-    $("drop").classList.toggle("over-it", type === "dragover" && $("drop").contains(event.target));
-    if (event.dataTransfer?.files[0] && type === "drop") fit(event.dataTransfer.files[0]);
-  });
-}
 document.addEventListener("keydown", (event) => {
   if (!(event.ctrlKey || event.metaKey) || event.target === $("text") || begins()) return;
   const key = event.key.toLowerCase();
   const does = { z: event.shiftKey ? "redo" : "undo", y: "redo", s: "save" }[key];
   if (!does) return;
   event.preventDefault();
-  CLICKS[does]();
+  act({ do: does }, $(does).dataset.said);
 });
 // Axes of a plate and directions along them.
 const ARROWS = {
@@ -176,7 +155,7 @@ $("view").addEventListener("keydown", (event) => {
 window.addEventListener("beforeunload", (event) => { if (page.typed) event.preventDefault(); });
 window.addEventListener("focus", () => { if (page.state) refresh(); });
 
-window.studio = { view, state: () => page.state, act, flow };
+window.studio = { view, state: () => page.state, act };
 try {
   [page.state, page.schema] = await Promise.all([ask("/api/state"), ask("/api/schema")]);
   show();

@@ -33,13 +33,14 @@ export class View {
     this.hands = new Hands(this);
     this.empty();
     new ResizeObserver(() => this.resize()).observe(canvas);
-    matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => this.map(true));
+    matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => this.colourMap());
   }
 
   // Nothing to show: the text has been wrong since it was opened.
   empty() {
-    Object.assign(this, { design: null, bounds: null, mapped: null, motion: null, residual: null });
+    Object.assign(this, { design: null, bounds: null, map: null, residual: null });
     this.set({ sheets: [], plates: [], offered: [], segments: [], outlines: [], boxes: [] });
+    this.move(null);
   }
 
   // Show something else beside the design, in the next frame.
@@ -61,15 +62,21 @@ export class View {
     this.plates = positions.map((place) =>
       plateOf(place, place.probes.map((probe) => probes[probe]), this.size));
     this.dress();
-    this.map();
-    this.move(this.motion);
     if (isOther) this.home();
   }
 
+  // The map and the motion that were drawn last stay until those of the design have come.
+  draw({ map, motions }) {
+    if (map !== this.map) {
+      this.map = map;
+      this.colourMap();
+    }
+    if (motions !== this.motions) this.move(motions);
+  }
+
   // Uncertainty on levels of the volume, as transparent sheets of colours.
-  map(isRecoloured = false) {
-    const { map } = this.design ?? {};
-    if (map === this.mapped && !isRecoloured) return;
+  colourMap() {
+    const { map } = this;
     // Where everything is undetermined there is nothing to compare.
     const slices = map?.slices.filter(({ values }) => values.flat().some(Boolean)) ?? [];
     const sheets = slices.map(({ level, values }) => {
@@ -77,7 +84,7 @@ export class View {
       const ends = [corner(0, 0), corner(-1, 0), corner(0, -1)];
       return { ends, image: imageOf(map, values, this.colour) };
     });
-    this.set({ mapped: map, sheets });
+    this.set({ sheets });
   }
 
   colour = (name) => getComputedStyle(this.canvas).getPropertyValue(name);
@@ -105,13 +112,10 @@ export class View {
   lengths = (segments) => this.set({ segments });
 
   // Let a direction swing, or stop; at rest it is at its largest.
-  move(index) {
-    const data = this.design?.motions;
-    const direction = data?.directions[index ?? -1];
-    const moved = new Map(direction?.readings.map((by, k) =>
-      [`${data.ball[k]} ${data.names[data.position[k]]}`, vector(by)]));
-    const motion = direction ? index : null;
-    this.set({ motion, direction, moved, amplitude: direction ? SHARE * this.size : 0 });
+  move(motions) {
+    const moved = new Map(motions?.direction.readings.map((by, k) =>
+      [`${motions.ball[k]} ${motions.names[motions.position[k]]}`, vector(by)]));
+    this.set({ motions, moved, amplitude: motions ? SHARE * this.size : 0 });
   }
 
   home() {
@@ -209,7 +213,7 @@ export class View {
     pen.fillStyle = this.colour("--paper");
     pen.fillRect(0, 0, canvas.width, canvas.height);
     if (!this.design || !this.metre) return;
-    if (this.direction && !this.still) {
+    if (this.motions && !this.still) {
       this.set({ amplitude: SHARE * this.size * Math.sin((2 * Math.PI * now) / PERIOD) });
     }
     this.sheets.forEach((sheet) => this.sheet(sheet));
@@ -221,7 +225,7 @@ export class View {
     const thin = Math.min(1, 8 / this.plates.length);
     [...this.plates, ...this.offered].forEach((plate) =>
       this.plate(plate, plate.look === "quiet" ? thin : 1));
-    if (this.direction) this.stroke(this.lattice(), "--bad");
+    if (this.motions) this.stroke(this.lattice(), "--bad");
     residual?.place.forEach((place, k) => {
       const ends = [place, plus(place, residual.value[k], residual.scale)].map(this.pixel);
       const colour = residual.standardised[k] > 3.5 ? "--bad" : "--quiet";
@@ -307,9 +311,9 @@ export class View {
 
   // The volume's lattice on its faces and through its middle, bent as the direction swings.
   lattice() {
-    const { motions: { nodes }, scene: { lower, upper } } = this.design;
+    const { motions: { nodes, direction }, design: { scene: { lower, upper } } } = this;
     const at = (place) => {
-      const by = this.direction.nodes[place.reduce((sum, k) => sum * nodes + k, 0)];
+      const by = direction.nodes[place.reduce((sum, k) => sum * nodes + k, 0)];
       return place.map((k, axis) => lower[axis] + by[axis] * this.amplitude
         + ((upper[axis] - lower[axis]) * k) / (nodes - 1));
     };
