@@ -353,7 +353,7 @@ def _set(action: Action) -> Outcome:
         return [TextChange(steps[:-1], value_of(text), "append")]
     if not text.strip():
         if isinstance(steps[-1], int):
-            return _without(to_python(action.draft.tree), steps[:-1], steps[-1:])
+            return _without(to_python(action.draft.tree), steps[:-1], [steps[-1]])
         return [TextChange(steps, kind="remove")]
     return [TextChange(steps, value_of(text))]
 

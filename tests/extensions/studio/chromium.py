@@ -123,3 +123,16 @@ def settled(page, revision: int) -> dict:
     """The state when the design has reached a revision, with its figures."""
     until(page, f"window.studio?.state()?.revision >= {revision} && !window.studio.state().pending")
     return page.evaluate("window.studio.state()")
+
+
+# Where a plate, or a point in metres, is on the screen.
+SPOT = """(what) => { const { view } = window.studio;
+const { left, top } = view.svg.getBoundingClientRect();
+const [x, y] = view.pixel(typeof what === 'string' ? view.named(what).middle : what);
+return [left + x, top + y]; }"""
+
+
+def spot(page, what: list[float] | str) -> tuple[float, float]:
+    """The pixels of a plate by its name, or of a point in metres."""
+    x, y = page.evaluate(SPOT, what)
+    return x, y

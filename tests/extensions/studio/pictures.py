@@ -12,7 +12,7 @@ from pathlib import Path
 import ballplate as bp
 from ballplate.designs import shipped
 
-from tests.extensions.studio.chromium import Studio, settled, tab, until
+from tests.extensions.studio.chromium import Studio, settled, spot, tab, until
 
 # At which letters stay sharp, in a fifth of the bytes of PNG.
 QUALITY = 82
@@ -60,14 +60,14 @@ def tour(page, folder: Path, design: Path) -> None:
     page.click("#positions button.name >> nth=0")
     page.click("#keep")
     until(page, "!!window.studio.state().kept")
-    x, y = page.evaluate("window.studio.view.screen('z low')")
+    x, y = spot(page, "z low")
     revision = page.evaluate("window.studio.state().revision")
     page.mouse.move(x, y)
     page.mouse.down()
     page.mouse.move(x, y - 20, steps=6)
     page.mouse.up()
     settled(page, revision + 1)
-    # Keeping a design has unfolded all uncertainties.
+    page.click("#details summary")
     picture("drag")
     page.click("#details summary")
     page.click("#position [aria-label='r3c3']")

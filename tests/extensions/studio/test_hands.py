@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 from ballplate.designs import shipped
 
-from tests.extensions.studio.chromium import IN_BROWSER, Studio, opened, settled, tab, until
+from tests.extensions.studio.chromium import IN_BROWSER, Studio, opened, settled, spot, tab, until
 
 pytestmark = [*IN_BROWSER, pytest.mark.slow]
 
@@ -40,11 +40,6 @@ def page(tmp_path: Path) -> Iterator:
 
 def calls(page, name: str) -> list:
     return [sent for called, *sent in page.evaluate("window.calls") if called == name]
-
-
-def spot(page, point: list[float] | str) -> tuple[float, float]:
-    x, y = page.evaluate(f"window.studio.view.screen({point!r})")
-    return x, y
 
 
 def middle(page) -> list[float]:
@@ -125,16 +120,6 @@ def test_a_plate_stops_at_the_wall_and_is_red_beyond_it(page) -> None:
     page.mouse.up()
     assert settled(page, 2)["design"]["scene"]["positions"][0]["problem"] is None
     assert [name for name, _ in calls(page, "onDrop")] == ["z low"] * 2
-
-
-def test_near_a_wall_a_plate_goes_to_it(page) -> None:
-    page.evaluate("(() => { window.studio.view.step = 0.001; })()")
-    extent = page.evaluate("window.studio.view.named('z low').extent.max")
-    room = round(1.0 - extent[0], 6)
-    pulled(page, (room - 0.002, 0.0, 0.0))
-    assert page.evaluate(PLACE)[0][0] == pytest.approx(room, abs=1e-6)
-    page.mouse.up()
-    assert settled(page, 1)["design"]["scene"]["positions"][0]["problem"] is None
 
 
 def test_one_finger_drags_a_plate_and_a_second_one_leaves_it(page) -> None:

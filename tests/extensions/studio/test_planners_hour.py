@@ -14,7 +14,7 @@ import pytest
 from ballplate.designs import shipped
 
 from tests.extensions.studio import wording
-from tests.extensions.studio.chromium import IN_BROWSER, Studio, settled, tab, until
+from tests.extensions.studio.chromium import IN_BROWSER, Studio, settled, spot, tab, until
 
 pytestmark = [*IN_BROWSER, pytest.mark.slow]
 
@@ -37,7 +37,7 @@ def design(tmp_path: Path) -> Path:
 
 
 def drag(page, name: str, by: tuple[int, int], steps: int = 5) -> None:
-    x, y = page.evaluate(f"window.studio.view.screen({name!r})")
+    x, y = spot(page, name)
     page.mouse.move(x, y)
     page.mouse.down()
     for k in range(1, steps + 1):
@@ -382,7 +382,7 @@ def test_a_design_begins_with_the_questions_of_init(tmp_path: Path) -> None:
         page.wait_for_selector("#error-plate >> text=larger than the volume")
         # A page that is loaded again has the answers still.
         page.reload()
-        until(page, "!!document.querySelector('#error-plate').textContent")
+        until(page, "!!document.querySelector('#error-plate')?.textContent")
         assert page.input_value("#answer-volume-1") == "400" and page.evaluate(at) == "cantilever"
         answer("plate", "4", "4", "200")
         answer("temperature", "0.1")

@@ -10,7 +10,7 @@ from typing import Any
 import ballplate as bp
 import pytest
 
-from tests.extensions.studio.chromium import IN_BROWSER, Studio, settled, tab, until
+from tests.extensions.studio.chromium import IN_BROWSER, Studio, settled, spot, tab, until
 
 pytestmark = [*IN_BROWSER, pytest.mark.long]
 
@@ -35,7 +35,7 @@ class Mouse:
 
     def move(self, name: str) -> None:
         """Move the plate that is chosen along its plane."""
-        x, y = self.page.evaluate(f"window.studio.view.screen({name!r})")
+        x, y = spot(self.page, name)
         self.page.mouse.move(x, y)
         self.page.mouse.down()
         for k in range(1, 6):
@@ -87,7 +87,7 @@ class Touch(Mouse):
 
     def move(self, name: str) -> None:
         self.page.locator("#view").scroll_into_view_if_needed()
-        x, y = self.page.evaluate(f"window.studio.view.screen({name!r})")
+        x, y = spot(self.page, name)
         session = self.page.context.new_cdp_session(self.page)
 
         def touch(kind: str, *points: tuple[float, float]) -> None:

@@ -1,10 +1,11 @@
 // Names, numbers and ticks over the picture: as large at any size, never hidden.
+import { element, path } from "./paper.js";
 import { apart, arrow, between, clamp, edgesOf, plus, roundStep } from "./shapes.js";
 
 const NUMBERS = 44; // pixels from a number of an axis to the next, at least
 const [TICK, ARROW] = [6, 26];
-const FIRST = ["chosen", "near", "wrong", "ghost"]; // these are named whatever stands there
-const COLOURS = { chosen: "--accent", wrong: "--bad", off: "--quiet" };
+const LETTER = 6.8; // pixels of the width of a letter
+const FIRST = ["chosen", "wrong", "ghost"]; // these are named whatever stands there
 
 const direction = (start, end) => end.map((one, k) => (one - start[k]) / (apart(start, end) || 1));
 const millimetres = (one) => `${Number((1e3 * one).toPrecision(6))}`.replace("-", "−");
@@ -17,15 +18,14 @@ function ticks(low, high, most) {
   return [low, high, ...inner.filter((one) => one - low > 0.6 * step && high - one > 0.6 * step)];
 }
 
-export function annotate(view) {
-  const { pen, room, pixel, hands, volume: { min, max } } = view;
-  const family = getComputedStyle(view.canvas).fontFamily;
+export function annotations(view) {
+  const { room, pixel, hands, volume: { min, max } } = view;
+  const made = [];
   const taken = []; // the middle of each text, and half its size
 
   // Write off a point in a direction, unless something is there, and say whether that was done.
-  function write(words, point, out, gap, { colour = "--ink", bold = false, must = false } = {}) {
-    pen.font = `${bold ? "600 " : ""}12.5px ${family}`;
-    const half = [pen.measureText(words).width / 2, 7];
+  function write(words, point, out, gap, look = "", must = false) {
+    const half = [(LETTER * words.length) / 2, 7];
     const off = gap + Math.abs(out[0]) * half[0] + Math.abs(out[1]) * half[1];
     const at = plus(point, out, off).map((one, k) =>
       clamp(one, half[k] + 3, room[k] - half[k] - 3));
@@ -33,10 +33,7 @@ export function annotate(view) {
       at.every((one, k) => Math.abs(one - other[k]) < half[k] + size[k]));
     if (isTaken && !must) return false;
     taken.push([at, half]);
-    Object.assign(pen, { textAlign: "center", textBaseline: "middle", lineJoin: "round",
-      lineWidth: 4, strokeStyle: view.colour("--paper"), fillStyle: view.colour(colour) });
-    pen.strokeText(words, ...at);
-    pen.fillText(words, ...at);
+    made.push(element("text", { x: at[0], y: at[1], class: look }, words));
     return true;
   }
 
@@ -44,6 +41,7 @@ export function annotate(view) {
   const centre = pixel(between(min, max));
   const isOrigin = min.every((low, k) => low <= 0 && max[k] >= 0);
   const origin = isOrigin ? pixel([0, 0, 0]) : [NaN, NaN];
+  const numbers = []; // as they are written, where nothing else stands
   ["x", "y", "z"].slice(0, view.flat ? 2 : 3).forEach((name, k, { length }) => {
     const rank = ([[x0, y0], [x1, y1]]) => (k === length - 1 ? -x0 - x1 : y0 + y1);
     const edges = edgesOf(view.corners)[k].map((ends) => ends.map(pixel));
@@ -60,19 +58,17 @@ export function annotate(view) {
     const places = ticks(min[k], max[k], most).map((value) =>
       [value, between(start, end, (value - min[k]) / (max[k] - min[k]))]);
     const lines = places.map(([, place]) => [place, plus(place, out, TICK)]);
-    view.stroke([...lines, ...arrow(end, tip)], "--quiet", { isFlat: true });
-    write(`${name}, mm`, tip, along, 5, { bold: true, must: true });
-    for (const [value, place] of places) {
-      if (apart(place, origin) < 4) continue;
-      write(millimetres(value), place, out, TICK + 3, { colour: "--quiet" });
-    }
+    made.push(path([...lines, ...arrow(end, tip)], "edges"));
+    write(`${name}, mm`, tip, along, 5, "bold", true);
+    numbers.push(...places.filter(([, place]) => !(apart(place, origin) < 4))
+      .map(([value, place]) => [millimetres(value), place, out, TICK + 3, "number"]));
   });
   if (isOrigin) {
-    view.dots([[0, 0, 0]], 3, "--ink");
-    write("0", origin, direction(centre, origin), TICK + 3, { must: true });
+    made.push(element("circle", { cx: origin[0], cy: origin[1], r: 3 }));
+    write("0", origin, direction(centre, origin), TICK + 3, "", true);
   }
   for (const { from, to, label } of view.segments) {
-    write(label, pixel(between(from, to)), [0, -1], 7, { bold: true, must: true });
+    write(label, pixel(between(from, to)), [0, -1], 7, "bold", true);
   }
 
   // A plate's name is at its highest corner that is free, with the way that it is dragged.
@@ -84,8 +80,9 @@ export function annotate(view) {
     const off = hands.offset(name);
     const [inner, ...ends] = [middle, ...corners].map((point) => pixel(plus(point, off)));
     ends.sort((one, other) => one[1] - other[1]);
-    const style = { colour: COLOURS[look], bold: FIRST.includes(look) };
-    const isWritten = ends.some((end) => write(words, end, direction(inner, end), 4, style));
-    if (!isWritten) write(words, ends[0], [0, -1], 4, { ...style, must: style.bold });
+    const isWritten = ends.some((end) => write(words, end, direction(inner, end), 4, look));
+    if (!isWritten && FIRST.includes(look)) write(words, ends[0], [0, -1], 4, look, true);
   }
+  numbers.forEach((number) => write(...number));
+  return made;
 }

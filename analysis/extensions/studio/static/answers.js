@@ -15,8 +15,9 @@ export const lengths_of = (design) => design?.quantities.find(({ symbol }) => sy
 const LOOKS = { met: "good", missed: "warn", undecided: "warn" };
 function target({ met, shares, rank, within }, before, of_rest, is_old) {
   if (!met) return figure("", "No target", "target_uncertainty is not stated");
-  const head = is_old ? `Before: ${met}` : `Target ${met}${of_rest ? " by the rest" : ""}`;
-  return figure(rank.deficiency && met !== "met" ? "bad" : LOOKS[met], head, shares.join("; "),
+  const head = is_old ? `Before: ${met}` : `Target ${met}`;
+  return figure(rank.deficiency && met !== "met" ? "bad" : LOOKS[met], head,
+    of_rest ? "by the rest: " : "", shares.join("; "),
     met === "undecided" ? ", but not everything is determined" : "",
     was(share(before?.within_target) || "no target"), within === null ? null
       : make("progress", { value: within, "aria-label": "share within the target" }));
@@ -77,7 +78,7 @@ export function figures() {
   fill($("notes"), lines(notes), left_out.length && !is_old
     ? button("Fit them to the volume", () => act({ do: "fit" }), { id: "fit" }) : null);
   fill($("messages"), messages.map(message),
-    (design?.doubts ?? []).map((text) => make("li", {}, text)));
+    (design?.doubts ?? []).map((text) => make("li", { class: "doubt" }, text)));
   const [suggest, next] = $("next").children;
   suggest.classList.toggle("primary", rank?.deficiency > 0);
   next.classList.toggle("primary", is_missed && !rank.deficiency);
@@ -86,9 +87,7 @@ export function figures() {
   // Only where there is something to determine.
   suggest.hidden = !rank?.directions.length;
   suggest.textContent = `What would determine it${rank?.deficiency ? "" : " better"}?`;
-  const figured = [...$("figures").children].map((one) =>
-    [...one.children].map((part) => part.textContent).join(" "));
-  const said = [...(is_old ? [] : figured), ...notes].join("; ");
+  const said = [is_old ? "" : $("figures").innerText, ...notes].join("; ");
   if (!state.pending && $("said").textContent !== said) $("said").textContent = said;
   fill($("counts"), lines(rank
     ? [`${rank.parameters} parameters from ${rank.observations} observations`, ...rank.reasons]
@@ -108,9 +107,9 @@ function show_line(line) {
   $("text-area").open = true;
   const text = $("text");
   const all = text.value.split("\n");
-  const before = all.slice(0, line - 1).join("\n").length + (line > 1 ? 1 : 0);
+  const end = all.slice(0, line).join("\n").length;
   text.focus();
-  text.setSelectionRange(before, before + (all[line - 1] ?? "").length);
+  text.setSelectionRange(end - (all[line - 1] ?? "").length, end);
   text.scrollTop = (line - 4) * (text.scrollHeight / all.length);
 }
 
@@ -136,7 +135,7 @@ export function ask_later() {
     legend();
     quantities(drawn.quantities);
     late(drawn);
-    follow("later", {}, ({ lines: texts = [], assumptions }) => {
+    follow("later", {}, ({ lines: texts = [], assumptions = null }) => {
       fill($("scale"), lines(texts));
       assumed(assumptions);
     }, 0);

@@ -94,19 +94,12 @@ const number = ({ label, units }, id) => make("div", { class: "field" },
       : make("select", { name: `${id}-unit`, "aria-label": `unit of ${label}` },
         units.map((unit, k) => make("option", { value: k }, unit.name)))));
 
-// Choices with pictures first.
-function choices(field, name) {
-  const isDrawn = ({ shapes }) => shapes?.length > 0;
-  const choice = (one) => make("label", { class: isDrawn(one) ? "card" : "" },
-    make("input", { type: "radio", name, value: one.value, checked: one.value === field.default }),
-    isDrawn(one) ? [picture(one.shapes), make("strong", {}, one.value)] : null,
-    make("span", {}, one.words));
-  const cards = field.choices.filter(isDrawn).map(choice);
-  const others = make("div", { class: "choices" },
-    field.choices.filter((one) => !isDrawn(one)).map(choice));
-  return cards.length ? make("div", {}, make("div", { class: "cards" }, cards),
-    make("p", { class: "hint" }, "Or the order of the axes:"), others) : others;
-}
+// Choices, the first of them with pictures.
+const choices = (field, name) => make("div", { class: "cards" },
+  field.choices.map(({ value, words, shapes }) => make("label", { class: "card" },
+    make("input", { type: "radio", name, value, checked: value === field.default }),
+    shapes?.length ? [picture(shapes), make("strong", {}, value)] : null,
+    make("span", {}, words))));
 
 // The text of an answer as init takes it.
 function answer({ name, fields }) {

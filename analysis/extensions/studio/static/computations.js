@@ -16,17 +16,13 @@ function current() {
     shown: shown.get(`${last.id} ${k}`) ?? k === 0, places: one.places ?? [one.place] }));
 }
 
-// Everything of them, in the view and beside it.
+// Everything of them, in the view and beside it: of this file, what was suggested as suggestions;
+// what failed of an earlier text nowhere.
 export function drawn() {
   const { view } = page;
   view.ghost(current().filter((one) => one.shown).flatMap((one) => one.places));
   const fitted = running.findLast((one) => is_current(one) && one.result?.residuals);
   view.residuals(fitted?.result.residuals, fitted && magnified(fitted));
-  lists();
-}
-
-// Of this file, what was suggested as suggestions; what failed of an earlier text nowhere.
-function lists() {
   const is_listed = (job) => job.file === page.state.file && (job.state === "failed"
     ? is_of_now(job)
     : job.state === "running" || !["suggest", "next"].includes(job.job) || !job.result.length);
@@ -69,17 +65,11 @@ const apply = ({ settings, plan: positions, calibration, edits }) =>
   act({ do: settings ? "add" : positions ? "plan" : "repair", settings, positions, calibration,
     edits }, "applied; undo leads back");
 
-const BESIDE = "computing beside the studio …";
 // What refuses the start, or nothing.
 export async function start(job, settings = {}) {
-  let refused = "";
-  try {
-    await ask("/api/start", { job, settings });
-    tell(BESIDE);
-  } catch (error) {
-    refused = error.message;
-    tell(refused, true);
-  }
+  const refused = await ask("/api/start", { job, settings })
+    .then(() => "", ({ message }) => message);
+  tell(refused, Boolean(refused));
   poll();
   return refused;
 }
@@ -98,10 +88,9 @@ export async function poll() {
     && ["suggest", "next"].includes(job.job));
   // A plan of positions, or a fit, is drawn.
   if (running.some(({ id, state }) => before.get(id) !== state)) page.show();
-  else lists();
+  else drawn();
   if (is_new) $("suggested").scrollIntoView({ block: "nearest" });
   if (running.some((job) => job.state === "running")) polling = setTimeout(poll, 300);
-  else if ($("notice").textContent === BESIDE) tell("");
 }
 
 const NOTHING = { suggest: "nothing was found that determines more",
@@ -139,19 +128,15 @@ function computation(job) {
   );
 }
 
-const MOST_ROWS = 60; // of a sweep's cells in its table here
 function cells({ axes, cells: found }, has_page) {
   // The last keys of paths, which tell enough where there is little room.
-  const heads = axes.map((paths) => make("th", { scope: "col", title: paths.join(", ") },
-    paths.map((path) => path.split(".").at(-1)).join(", ")));
-  const figures = (cell) => [cell.deficiency, micro(cell.average), micro(cell.maximum),
-    share(cell.within) || "no target"];
-  const rows = found.slice(0, MOST_ROWS).map((cell) => [...cell.values,
-    ...(cell.reason ? [make("td", { colspan: "4" }, cell.reason)] : figures(cell))]);
-  const rest = found.length - MOST_ROWS;
+  const heads = axes.map((paths) => paths.map((path) => path.split(".").at(-1)).join(", "));
+  const rows = found.map(({ values, reason, deficiency, average, maximum, within }) =>
+    [...values, ...(reason ? [make("td", { colspan: "4" }, reason)]
+      : [deficiency, micro(average), micro(maximum), share(within) || "no target"])]);
   return [make("div", { class: "scrolled", tabindex: "0" }, make("table", {}, table(
     [...heads, "rank deficiency", "U6 average µm", "U6 max. µm", "lengths within target"], rows))),
-  rest > 0 && make("p", {}, `${rest} more cases are on the page`), has_page ? null
+  has_page ? null
     : make("p", {}, "its page needs the extra report: python -m pip install 'ballplate[report]'")];
 }
 

@@ -208,23 +208,25 @@ $("forms").onkeydown = (event) => {
   clearTimeout(waiting);
   waiting = setTimeout(state, 400, { target });
 };
-$("forms").onpointerdown = (event) => {
-  const { target: handle } = event;
-  if (!handle.matches(".handle")) return;
-  const target = handle.parentElement.querySelector("input");
-  const before = target.value;
-  const until = new AbortController();
-  const end = ({ type }) => {
-    until.abort();
-    if (type !== "pointerup") target.value = before;
-    else if (target.value !== before) state({ target });
-  };
-  const drag = ({ clientX }) => {
-    target.value = stepped(before, Math.round((clientX - event.clientX) / 8)) ?? before;
-  };
-  const cancel = (key) => { if (key.key === "Escape") end(key); };
-  handle.setPointerCapture(event.pointerId);
-  const follow = { pointermove: drag, pointerup: end, pointercancel: end, keydown: cancel };
-  Object.entries(follow).forEach(([type, does]) =>
-    document.addEventListener(type, does, { signal: until.signal }));
+
+let dragged = null; // the field of a number whose name is dragged, and what was there
+$("forms").onpointerdown = ({ target, clientX, pointerId }) => {
+  if (!target.matches(".handle")) return;
+  const input = target.parentElement.querySelector("input");
+  dragged = { input, before: input.value, clientX };
+  target.setPointerCapture(pointerId);
 };
+$("forms").onpointermove = ({ clientX }) => {
+  if (!dragged) return;
+  const { input, before, clientX: start } = dragged;
+  input.value = stepped(before, Math.round((clientX - start) / 8)) ?? before;
+};
+$("forms").onpointerup = $("forms").onpointercancel = drop;
+document.addEventListener("keydown", (event) => { if (event.key === "Escape") drop(event); });
+function drop({ type }) {
+  const { input, before } = dragged ?? {};
+  dragged = null;
+  if (!input || input.value === before) return;
+  if (type === "pointerup") state({ target: input });
+  else input.value = before;
+}

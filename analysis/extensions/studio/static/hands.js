@@ -2,7 +2,6 @@
 // is dragged elsewhere turns, moves and enlarges the view.
 import { apart, between, clamp, dot, plus } from "./shapes.js";
 
-const SNAP = 0.003; // metres from a wall at which a plate goes to it
 const OUTSIDE = 1e-6; // metres beyond a wall that count
 const HOLD = 500; // milliseconds that a finger rests where something is to be put
 const STILL = 6; // pixels that a resting pointer may move
@@ -13,14 +12,13 @@ export class Hands {
     Object.assign(this, { view, drag: null, holding: null });
     this.fingers = new Map(); // pixels of pointers that are down
     this.dropped = new Map(); // how far plates were dragged whose answers have not come
-    const on = (type, does) => view.canvas.addEventListener(type, does, { passive: false });
+    const on = (type, does) => view.svg.addEventListener(type, does, { passive: false });
     on("pointerdown", (event) => this.press(event));
     on("pointermove", (event) => this.pull(event));
     on("pointerup", (event) => this.release(event, false));
     on("pointercancel", (event) => this.release(event, true));
-    on("pointerleave", () => view.hover(null));
     // Where it was pressed: this event itself is in whole pixels.
-    on("dblclick", () => this.from && this.put(this.from));
+    on("dblclick", () => this.pressed || this.put(this.from));
     on("contextmenu", (event) => event.preventDefault());
     on("wheel", (event) => {
       event.preventDefault();
@@ -38,7 +36,7 @@ export class Hands {
   }
 
   pixel({ clientX, clientY }) {
-    const { left, top } = this.view.canvas.getBoundingClientRect();
+    const { left, top } = this.view.svg.getBoundingClientRect();
     return [clientX - left, clientY - top];
   }
 
@@ -54,31 +52,27 @@ export class Hands {
     if (event.isPrimary) fingers.clear();
     const at = this.pixel(event);
     fingers.set(pointerId, at);
-    view.canvas.setPointerCapture(pointerId);
+    view.svg.setPointerCapture(pointerId);
     clearTimeout(this.holding);
     // Two fingers move the view, and the plate is where it was.
     if (fingers.size > 1) this.drop(true);
     if (fingers.size > 1 || event.button !== 0 || !view.design) return;
     this.from = at;
-    const plate = view.under(at);
-    if (!plate) {
+    this.pressed = event.target.closest("[data-name]");
+    if (!this.pressed) {
       if (event.pointerType === "touch") this.holding = setTimeout(() => this.put(at), HOLD);
       return;
     }
-    const { place: { name } } = plate;
+    const { name } = this.pressed.dataset;
     this.drag = { name, pointerId, start: this.offset(name), by: NOWHERE };
     if (name !== view.selected) view.handlers.onSelect(name);
   }
 
   pull(event) {
     const { view, drag, fingers } = this;
-    if (!view.design) return;
     const at = this.pixel(event);
     const before = fingers.get(event.pointerId);
-    if (!before) {
-      if (!event.buttons) view.hover(view.under(at)?.place.name ?? null);
-      return;
-    }
+    if (!before || !view.design) return;
     fingers.set(event.pointerId, at);
     const isFar = apart(at, this.from ?? at) >= STILL;
     if (isFar) clearTimeout(this.holding);
@@ -138,9 +132,7 @@ export class Hands {
     // A plate that leans stops on its way.
     const isStraight = normal.some((one) => Math.abs(one) > 1 - 1e-9);
     const shares = kept.map((one, k) => (Math.abs(way[k]) > 1e-9 ? one / way[k] : 1));
-    if (!isStraight) return plus(NOWHERE, way, Math.min(...shares));
-    return kept.map((one, k) => (Math.abs(way[k]) < 1e-9 ? one
-      : [below[k], above[k]].find((wall) => Math.abs(one - wall) < SNAP) ?? one));
+    return isStraight ? kept : plus(NOWHERE, way, Math.min(...shares));
   }
 
   components = (vector) => vector.slice(0, this.view.flat ? 2 : 3);
@@ -180,16 +172,13 @@ export class Hands {
     if (this.drag) this.drag.start = NOWHERE;
   }
 
-  // A position is asked for on the volume's lower face, or else on the nearest plane of a plate.
+  // A position is asked for on the floor of the volume.
   put(at) {
     const { view } = this;
-    if (!view.design || !view.handlers.onPlace || view.under(at)) return;
+    if (!view.design) return;
     const { min, max } = view.volume;
-    const planes = view.plates.map(({ normal, middle }) => view.meet(at, normal, middle));
-    planes.sort((one, other) => view.nearness(other) - view.nearness(one));
-    const floor = view.meet(at, [0, 0, 1], min);
-    const point = [floor, ...planes].find((one) => one && this.isInside(one));
-    if (!point) return;
+    const point = view.meet(at, [0, 0, 1], min);
+    if (!point || !this.isInside(point)) return;
     const inside = rounded(point, view.step).map((one, k) => clamp(one, min[k], max[k]));
     view.handlers.onPlace(this.components(rounded(inside, 1e-6)));
   }

@@ -91,6 +91,7 @@ export function tell(text, bad = false) {
   $("notice").classList.toggle("bad", bad);
 }
 
+const SILENT = "The studio does not answer.";
 const KEPT = "Start it again with the same command: changes that are not saved are there again.";
 const UNKEPT = "Changes are not saved, and could not be kept in the folder of the file: copy the"
   + " text of the file before you leave this page.";
@@ -103,9 +104,9 @@ export async function ask(path, body) {
   try {
     response = await fetch(path, request);
   } catch {
-    await_studio();
+    refresh_in(2000);
     const isKept = !page.state || page.state.recoverable;
-    throw new Error(`The studio does not answer. ${isKept ? KEPT : UNKEPT}`);
+    throw new Error(`${SILENT} ${isKept ? KEPT : UNKEPT}`);
   }
   const text = await response.text();
   const data = /^[[{]/.test(text) ? JSON.parse(text) : { error: text.trim() };
@@ -113,14 +114,13 @@ export async function ask(path, body) {
   return data;
 }
 
-const views = {}; // by name: the last answer and what it is of, what is wanted, and the wait for it
+const views = {}; // by name: the last answer and what it is of, what is asked and wanted
 // Show a view of the present design, once nothing moves; what is of an earlier one is marked, and
 // what came after a later question is not shown.
 export function follow(name, body, show, after = 300) {
   const { fingerprint, pending, stale } = page.state;
   const view = (views[name] ??= {});
   const key = JSON.stringify([fingerprint, body]);
-  const isWanted = () => view.wanted === key && page.state.fingerprint === fingerprint;
   const finish = () => {
     if (view.of === key) show(view.answer);
     document.querySelectorAll(`[data-of=${name}]`)
@@ -129,21 +129,16 @@ export function follow(name, body, show, after = 300) {
   view.wanted = key;
   clearTimeout(view.wait);
   finish();
-  if (view.of === key || pending || stale) return;
+  if ([view.of, view.asked].includes(key) || pending || stale) return;
   view.wait = setTimeout(async () => {
+    view.asked = key;
     const answer = await ask(`/api/${name}`, body).catch(({ message }) => ({ error: message }));
-    if (!isWanted()) return;
-    Object.assign(view, { answer, of: key });
+    if (view.asked === key) view.asked = null;
+    if (view.wanted !== key || page.state.fingerprint !== fingerprint) return;
+    if (answer.error) show(answer);
+    else Object.assign(view, { answer, of: key });
     finish();
   }, after);
-}
-
-let lost = null; // waits for a studio that does not answer
-function await_studio() {
-  clearTimeout(lost);
-  lost = setTimeout(async () => {
-    if (await refresh()) tell("the studio answers again");
-  }, 2000);
 }
 
 // What another window did, or a studio that was started anew, is shown instead of what was here.
@@ -151,24 +146,27 @@ export async function refresh() {
   try {
     const found = await ask("/api/state");
     const { session, revision, pending } = page.state ?? {};
+    if ($("notice").textContent.startsWith(SILENT)) tell("the studio answers again");
     // What was asked for before the last change and answered after it is not shown.
     const isNew = found.session !== session || found.revision > revision;
     if (isNew || (found.revision === revision && found.pending !== pending)) {
       page.state = found;
       page.show();
     } else watch();
-    return true;
   } catch (error) {
     tell(error.message, true);
-    return false;
   }
 }
 
-let watching = null;
+let waiting = null;
+function refresh_in(milliseconds) {
+  clearTimeout(waiting);
+  waiting = setTimeout(() => (acting ? refresh_in(milliseconds) : refresh()), milliseconds);
+}
+
 // Figures that were not there in time are asked for until they are.
 export function watch() {
-  clearTimeout(watching);
-  if (page.state.pending) watching = setTimeout(() => (acting ? watch() : refresh()), 500);
+  if (page.state.pending) refresh_in(500);
 }
 
 let queue = Promise.resolve();
@@ -198,25 +196,20 @@ export function act(action, said = "") {
 
 let wanted = null;
 let previewing = false;
-// Ask for the figures of a design as it would be, the last one that is asked for alone.
+// Ask for the figures of a design as it would be, the last one that is asked for alone; what comes
+// after the drop is of another design.
 export async function preview(action, onFigures) {
-  // Of the design as it is now: what comes after the drop is of another one.
-  const { revision, session } = page.state;
-  wanted = { ...action, revision, session };
+  wanted = action;
   if (previewing) return;
   previewing = true;
-  while (wanted) {
-    const asked = wanted;
-    const isMeant = () => !acting && page.state.revision === asked.revision;
+  while (wanted && !acting) {
+    const { revision, session } = page.state;
+    const asked = { ...wanted, revision, session };
     wanted = null;
-    try {
-      const design = isMeant() && await ask("/api/preview", asked);
-      if (!design || !isMeant()) continue;
-      tell("");
-      onFigures(design);
-    } catch (error) {
-      if (isMeant()) tell(error.message, true);
-    }
+    const design = await ask("/api/preview", asked).catch(({ message }) => ({ error: message }));
+    if (acting || page.state.revision !== revision) break;
+    tell(design.error ?? "", Boolean(design.error));
+    if (!design.error) onFigures(design);
   }
   previewing = false;
 }

@@ -1,14 +1,17 @@
-// Shapes on paper, as the engine projects them, in the page's colours.
+// Elements of drawings, and shapes on paper as the engine projects them.
 import { boxOf, plus } from "./shapes.js";
 
 const WIDTH = 100; // of a picture, in its own units
 
-function element(name, attributes, ...inside) {
+export function element(name, attributes, ...inside) {
   const made = document.createElementNS("http://www.w3.org/2000/svg", name);
   Object.entries(attributes).forEach(([key, value]) => made.setAttribute(key, value));
   made.append(...inside);
   return made;
 }
+
+export const path = (lines, look) =>
+  element("path", { class: look, d: lines.map((line) => `M${line.join("L")}`).join("") });
 
 // A picture of polygons, styli and letters; without words it is only decoration.
 export function picture(shapes, words = "") {

@@ -23,10 +23,9 @@ function show() {
   const { state } = page;
   const { design, file } = state;
   page.design = design;
-  const title = `${file}${state.saved ? "" : " (not saved)"}`;
-  const heading = `${title}${design ? ` — ${design.title}` : ""}`;
-  $("title").textContent = begins() ? "ballplate studio" : heading;
-  document.title = `${state.saved ? "" : "• "}${file} – ballplate studio`;
+  document.title = `${file}${state.saved ? "" : " (not saved)"} – ballplate studio`;
+  $("title").textContent = begins() || !design ? document.title
+    : document.title.replace("ballplate studio", design.title);
   options($("files"), [...new Set([...state.files, file])].sort(), file);
   $("variant-label").hidden = !state.variants.length;
   options($("variants"), state.variants, state.variant);
@@ -73,11 +72,7 @@ function moving(preview_of) {
 
 const CLICKS = {
   apply: () => act({ do: "text", text: $("text").value }),
-  keep: () => {
-    const off = Boolean(page.state.kept);
-    $("details").open ||= !off;
-    act({ do: "keep", off });
-  },
+  keep: () => act({ do: "keep", off: Boolean(page.state.kept) }),
   "save-as": () => {
     const name = window.prompt("Save under another name, in the same folder", page.state.file);
     if (name) act({ do: "save", name }, "saved");

@@ -1,7 +1,9 @@
-// The volume and its plates, drawn in three dimensions; what is undetermined moves.
-import { annotate } from "./annotations.js";
+// The volume and its plates, drawn in three dimensions; what is undetermined moves. How things
+// look is in the style sheet, by their classes.
+import { annotations } from "./annotations.js";
 import { Hands } from "./hands.js";
 import { imageOf } from "./legend.js";
+import { element, path } from "./paper.js";
 import {
   apart, arrow, between, boxOf, clamp, cornersOf, dot, edgesOf, FACES, plateOf, plus, vector,
 } from "./shapes.js";
@@ -10,29 +12,18 @@ const [TURN, RISE] = [-35, 24]; // degrees: the eye of all drawings of a design
 const SHARE = 0.07; // of the volume's size: the largest displacement that is shown
 const PERIOD = 2400; // milliseconds of one swing
 const [MARGIN, LOWER] = [66, 20]; // pixels around the volume, and more of them above
-// Colours by meaning, which are the page's; balls are parts of the volume's size, dashes pixels.
-const LOOKS = {
-  quiet: { colour: "--quiet", fill: 0.1, ball: 0.0045 },
-  off: { colour: "--line", fill: 0, ball: 0.003 },
-  near: { colour: "--ink", fill: 0.1, ball: 0.0045 },
-  chosen: { colour: "--accent", fill: 0.3, ball: 0.0075, width: 1.5 },
-  wrong: { colour: "--bad", fill: 0.2, ball: 0.0075, width: 1.5 },
-  ghost: { colour: "--ink", fill: 0.04, ball: 0.0045, width: 1.5, dashes: [8, 5] },
-  forbidden: { colour: "--bad", fill: 0.14 },
-};
+const [BALL, LARGE] = [0.009, 0.015]; // parts of the volume's size: balls, and those of a choice
+const MANY = 8; // plates: more are drawn thinner
 
 export class View {
-  constructor(canvas, handlers) {
-    this.canvas = canvas;
-    this.handlers = handlers; // onSelect, onDrag, onDrop, and onPlace if there is one
-    this.pen = canvas.getContext("2d");
-    this.ratio = Math.min(window.devicePixelRatio, 2);
+  constructor(svg, handlers) {
+    this.svg = svg;
+    this.handlers = handlers; // onSelect, onDrag, onDrop and onPlace
     this.still = matchMedia("(prefers-reduced-motion: reduce)").matches;
-    this.near = null; // the name below the mouse
     this.step = 0.01;
     this.hands = new Hands(this);
     this.empty();
-    new ResizeObserver(() => this.resize()).observe(canvas);
+    new ResizeObserver(() => this.resize()).observe(svg);
     matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => this.colourMap());
   }
 
@@ -61,6 +52,7 @@ export class View {
     this.corners = cornersOf(volume);
     this.plates = positions.map((place) =>
       plateOf(place, place.probes.map((probe) => probes[probe]), this.size));
+    this.svg.classList.toggle("many", positions.length > MANY);
     this.dress();
     if (isOther) this.home();
   }
@@ -77,17 +69,17 @@ export class View {
   // Uncertainty on levels of the volume, as transparent sheets of colours.
   colourMap() {
     const { map } = this;
+    const colour = (name) => getComputedStyle(this.svg).getPropertyValue(name);
     // Where everything is undetermined there is nothing to compare.
     const slices = map?.slices.filter(({ values }) => values.flat().some(Boolean)) ?? [];
     const sheets = slices.map(({ level, values }) => {
       const corner = (i, j) => [map.x.at(i), map.y.at(j), level ?? 0];
-      const ends = [corner(0, 0), corner(-1, 0), corner(0, -1)];
-      return { ends, image: imageOf(map, values, this.colour) };
+      const image = imageOf(map, values, colour);
+      return { ends: [corner(0, 0), corner(-1, 0), corner(0, -1)], image, href: image.toDataURL() };
     });
     this.set({ sheets });
   }
 
-  colour = (name) => getComputedStyle(this.canvas).getPropertyValue(name);
   named = (name) => this.plates.find((plate) => plate.place.name === name);
 
   dress() {
@@ -96,7 +88,7 @@ export class View {
       const { name, problem, enabled } = plate.place;
       const isWrong = drag?.far && drag.name === name ? drag.leaves : problem;
       plate.look = isWrong ? "wrong" : name === this.selected ? "chosen"
-        : enabled === false ? "off" : name === this.near ? "near" : "quiet";
+        : enabled === false ? "off" : "quiet";
     }
     this.set({});
   }
@@ -129,14 +121,13 @@ export class View {
 
   // Size of the picture, and of a metre in it if the whole volume is seen.
   resize() {
-    const { canvas, ratio } = this;
-    this.room = [canvas.clientWidth, canvas.clientHeight];
-    if (!this.design || !this.room.every(Boolean)) return;
-    [canvas.width, canvas.height] = this.room.map((side) => Math.round(side * ratio));
+    const { width, height } = this.svg.getBoundingClientRect();
+    this.room = [width, height];
+    if (!this.design || !width) return;
     const sides = plus(this.seen.max, this.seen.min, -1);
     this.metre = Math.min(...this.room.map((side, k) =>
       Math.max(side - 2 * MARGIN, 100) / sides[k]));
-    this.paint(performance.now());
+    this.set({});
   }
 
   // Enlarge the picture about a pixel.
@@ -147,7 +138,7 @@ export class View {
     this.set({ zoom, shift });
   }
 
-  // Pixels of a point from the canvas's corner.
+  // Pixels of a point from the picture's corner.
   pixel = (point) => {
     const { volume, room, shift } = this;
     const [right, up] = this.eye;
@@ -175,138 +166,90 @@ export class View {
     return plus(plus(point, by), towards, -dot(normal, by) / facing);
   }
 
-  nearness = (point) => (point ? dot(point, this.eye[2]) : -Infinity);
-
-  // Where a plate, or a point in metres, is on the screen, for whoever drives the page.
-  screen(what) {
-    const point = typeof what === "string" ? this.named(what)?.middle : what;
-    const { left, top } = this.canvas.getBoundingClientRect();
-    return point ? plus(this.pixel(point), [left, top]) : null;
-  }
-
-  // The plate at a pixel, the chosen one before others.
-  under(at) {
-    const near = ({ normal, middle }) => this.nearness(this.meet(at, normal, middle));
-    const met = this.plates.filter((plate) => this.pen.isPointInPath(
-      this.faces(this.placed(plate, plate.corners)), ...at.map((one) => one * this.ratio)));
-    met.sort((one, other) => near(other) - near(one));
-    return met.find(({ place }) => place.name === this.selected) ?? met[0];
-  }
-
-  hover(name) {
-    if (name === this.near) return;
-    this.near = name;
-    this.canvas.style.cursor = name === null ? "" : "grab";
-    this.dress();
-  }
-
-  // Points of a plate where it has been dragged to.
-  placed({ place }, points) {
-    const by = this.hands.offset(place.name);
-    return points.map((point) => plus(point, by));
-  }
-
   paint(now) {
-    const { pen, canvas, ratio, residual, segments } = this;
     this.next = null;
-    pen.setTransform(ratio, 0, 0, ratio, 0, 0);
-    pen.fillStyle = this.colour("--paper");
-    pen.fillRect(0, 0, canvas.width, canvas.height);
-    if (!this.design || !this.metre) return;
+    if (!this.design || !this.metre) {
+      this.svg.replaceChildren();
+      return;
+    }
     if (this.motions && !this.still) {
       this.set({ amplitude: SHARE * this.size * Math.sin((2 * Math.PI * now) / PERIOD) });
     }
-    this.sheets.forEach((sheet) => this.sheet(sheet));
-    this.frame();
-    const outlines = this.outlines.map((outline) => [...outline, outline[0]]);
-    this.stroke(outlines, "--quiet", { dashes: [2, 3], alpha: 0.55 });
-    this.boxes.forEach((ends) => this.block(cornersOf(boxOf(ends.map(vector))), "forbidden"));
-    // Many plates above one another stay transparent, and are drawn without their styli.
-    const thin = Math.min(1, 8 / this.plates.length);
-    [...this.plates, ...this.offered].forEach((plate) =>
-      this.plate(plate, plate.look === "quiet" ? thin : 1));
-    if (this.motions) this.stroke(this.lattice(), "--bad");
-    residual?.place.forEach((place, k) => {
-      const ends = [place, plus(place, residual.value[k], residual.scale)].map(this.pixel);
-      const colour = residual.standardised[k] > 3.5 ? "--bad" : "--quiet";
-      this.stroke(arrow(...ends), colour, { isFlat: true });
-    });
-    this.stroke(segments.map(({ from, to }) => [from, to]), "--band-5", { width: 4 });
-    this.dots(segments.flatMap(({ from, to }) => [from, to]), 5, "--band-5");
-    annotate(this);
+    const nearness = ({ place, middle }) =>
+      (place.name === this.selected ? Infinity : dot(middle, this.eye[2]));
+    const plates = [...this.plates].sort((one, other) => nearness(one) - nearness(other));
+    const lengths = this.segments.map(({ from, to }) => [from, to]);
+    this.svg.replaceChildren(
+      ...this.sheets.map((sheet) => this.sheet(sheet)),
+      ...this.frame(),
+      this.lines(this.outlines.map((outline) => [...outline, outline[0]]), "outline"),
+      ...this.boxes.map((ends) => this.block(cornersOf(boxOf(ends.map(vector))), "forbidden")),
+      ...[...plates, ...this.offered].map((plate) => this.plate(plate)),
+      this.lines(this.motions ? this.lattice() : [], "lattice"),
+      ...this.arrows(),
+      this.lines(lengths, "worst"),
+      this.dots(lengths.flat(), 10, "worst"),
+      ...annotations(this),
+    );
   }
 
-  // Lines through points, which are pixels already if they are flat.
-  stroke(lines, colour, { width = 1, dashes = [], alpha = 1, isFlat = false } = {}) {
-    const { pen } = this;
-    pen.setLineDash(dashes);
-    Object.assign(pen, { strokeStyle: this.colour(colour), lineWidth: width, globalAlpha: alpha });
-    pen.stroke(pathOf(isFlat ? lines : lines.map((line) => line.map(this.pixel))));
-    pen.setLineDash([]);
-    pen.globalAlpha = 1;
-  }
+  lines = (lines, look) => path(lines.map((line) => line.map(this.pixel)), look);
+  // Lines without a length have round ends.
+  dots = (points, size, look) => element("path", { class: `dots ${look}`, "stroke-width": size,
+    d: points.map((point) => `M${this.pixel(point)}h0`).join("") });
 
-  dots(points, radius, colour, isHollow = false) {
-    const path = new Path2D();
-    for (const [x, y] of points.map(this.pixel)) {
-      path.moveTo(x + radius, y);
-      path.arc(x, y, radius, 0, 2 * Math.PI);
-    }
-    this.pen.fillStyle = this.pen.strokeStyle = this.colour(colour);
-    this.pen[isHollow ? "stroke" : "fill"](path);
-  }
-
-  sheet({ ends, image }) {
-    const { pen } = this;
+  sheet({ ends, href }) {
     const [corner, right, far] = ends.map(this.pixel);
     const [u, v] = [right, far].map((end) => plus(end, corner, -1));
-    pen.save();
-    pen.globalAlpha = 0.6;
-    pen.transform(...u, ...v, ...corner);
-    pen.drawImage(image, 0, 0, 1, 1);
-    pen.restore();
+    return element("image", { href, width: 1, height: 1, preserveAspectRatio: "none",
+      transform: `matrix(${[...u, ...v, ...corner]})` });
   }
 
   // Edges of the volume; those at the corner behind all others are dotted.
   frame() {
+    const nearness = (corner) => dot(corner, this.eye[2]);
     const behind = this.corners.reduce((one, other) =>
-      (this.nearness(other) < this.nearness(one) ? other : one));
-    for (const edge of edgesOf(this.corners).flat()) {
-      const isRear = !this.flat && edge.includes(behind);
-      this.stroke([edge], "--quiet", { dashes: isRear ? [1, 4] : [] });
-    }
+      (nearness(other) < nearness(one) ? other : one));
+    const edges = edgesOf(this.corners).flat();
+    const isRear = (edge) => !this.flat && edge.includes(behind);
+    return [this.lines(edges.filter(isRear), "rear"),
+      this.lines(edges.filter((edge) => !isRear(edge)), "edges")];
   }
 
-  // Those faces of a block that are seen.
-  faces(corners) {
+  // Those faces of a block that are seen, and all its edges.
+  block(corners, look, ...inside) {
     const at = corners.map(this.pixel);
     const isSeen = ([[x, y], [x1, y1], , [x2, y2]]) => (x1 - x) * (y2 - y) > (y1 - y) * (x2 - x);
-    return pathOf(FACES.map((face) => face.map((k) => at[k])).filter(isSeen));
+    const faces = FACES.map((face) => face.map((k) => at[k])).filter(isSeen);
+    return element("g", { class: look }, path(faces, "faces"), path(edgesOf(at).flat(), "edges"),
+      ...inside);
   }
 
-  block(corners, look, thin = 1) {
-    const { colour, fill, width, dashes } = LOOKS[look];
-    Object.assign(this.pen, { fillStyle: this.colour(colour), globalAlpha: fill * thin });
-    this.pen.fill(this.faces(corners));
-    const alpha = look === "quiet" ? 0.4 + 0.3 * thin : 1;
-    this.stroke(edgesOf(corners).flat(), colour, { width, dashes, alpha });
-  }
-
-  plate(plate, thin) {
+  plate(plate) {
     const { look, place: { read, name } } = plate;
-    const { ball, colour } = LOOKS[look];
-    this.block(this.placed(plate, plate.corners), look, thin);
-    if (look !== "off" && thin === 1) {
-      const styli = plate.styli.map((ends) => this.placed(plate, ends));
-      this.stroke(styli, "--ink", { width: 2 });
-      this.dots(styli.map(([, head]) => head), 3.5, "--ink");
-    }
-    const size = ball * (thin < 1 ? 0.6 : 1) * this.size * this.metre * this.zoom;
-    const balls = this.placed(plate, plate.balls).map((point, k) =>
+    const part = ["chosen", "wrong"].includes(look) ? LARGE : BALL;
+    const size = Math.max(2.4, part * this.size * this.metre * this.zoom);
+    const balls = plate.balls.map((point, k) =>
       plus(point, this.moved.get(`${k} ${name}`) ?? [0, 0, 0], this.amplitude));
-    for (const isRead of [true, false]) {
-      this.dots(balls.filter((_, k) => read[k] === isRead), Math.max(1.2, size), colour, !isRead);
-    }
+    const unread = balls.filter((_, k) => !read[k]);
+    const block = this.block(plate.corners, `plate ${look}`, this.lines(plate.styli, "styli"),
+      this.dots(plate.styli.map(([, head]) => head), 7, "styli"),
+      this.dots(balls, size, "balls"), this.dots(unread, size - 2, "holes"),
+      element("title", {}, name));
+    if (look === "ghost") return block;
+    block.dataset.name = name;
+    // Where it has been dragged to.
+    const [from, to] = [[0, 0, 0], this.hands.offset(name)].map(this.pixel);
+    block.setAttribute("transform", `translate(${plus(to, from, -1)})`);
+    return block;
+  }
+
+  // Residuals at the balls.
+  arrows() {
+    const { place = [], value, standardised, scale } = this.residual ?? {};
+    return place.map((from, k) => path(
+      arrow(...[from, plus(from, value[k], scale)].map(this.pixel)),
+      standardised[k] > 3.5 ? "residual large" : "residual"));
   }
 
   // The volume's lattice on its faces and through its middle, bent as the direction swings.
@@ -322,10 +265,4 @@ export class View {
     return lower.flatMap((_, axis) => others.map((fixed) => [...Array(nodes).keys()].map((k) =>
       at(fixed.toSpliced(axis, 0, k)))));
   }
-}
-
-function pathOf(lines) {
-  const path = new Path2D();
-  lines.forEach((line) => line.forEach((point, k) => path[k ? "lineTo" : "moveTo"](...point)));
-  return path;
 }
