@@ -23,7 +23,14 @@ from ballplate.extensions.repair.written import Edit, edits
 from ballplate.extensions.repair.yamltext import TextChange
 from ballplate.simulator.experiment import Experiment, Position, ReadingGroup
 from ballplate.simulator.geometry import AXIS_INDEX, QUARTER_TURNS, Pose, plane_rotation
-from ballplate.simulator.inputs import ExperimentError, Steps, parse_tree, to_list, to_python
+from ballplate.simulator.inputs import (
+    ExperimentError,
+    Steps,
+    parse_tree,
+    to_list,
+    to_python,
+    typed_length,
+)
 from ballplate.simulator.machines import Array
 
 from .document import DesignDocument, changed
@@ -344,6 +351,18 @@ def _filled(action: Action) -> Outcome:
     return filled(action.draft, _known("artefact", artefact, layouts), probes, turns, count)
 
 
+def _forbidden(action: Action) -> Outcome:
+    """Forbid artefacts in the pool to enter a corner of the volume, a quarter of each edge, by its
+    low or high end along each axis.
+    """
+    volume, corner = action.draft.machine.volume, action["corner"]
+    is_high = [_known("end", end, ("low", "high")) == "high" for end in corner][: len(volume.size)]
+    start = np.where(is_high, volume.upper - volume.size / 4.0, volume.lower)
+    ends = zip(AXIS_INDEX, start, start + volume.size / 4.0, strict=False)
+    box = {axis: [typed_length(low), typed_length(high)] for axis, low, high in ends}
+    return [TextChange(("pool", "limits", "forbidden"), box, "append")]
+
+
 def _set(action: Action) -> Outcome:
     """Set a value at a path, in the form of a file; an absent value removes it, an entry of a list
     with what holds nothing else, and one at a last step of + is a further entry of a list.
@@ -428,6 +447,7 @@ ACTIONS: Mapping[str, Callable[[Action], Outcome]] = {
     "repair": _repaired,
     "plan": _planned,
     "fill": _filled,
+    "forbid": _forbidden,
     "remove": _removed,
     "off": _switched_off,
     "on": _switched_on,

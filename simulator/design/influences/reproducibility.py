@@ -29,7 +29,8 @@ class ReproducibilitySettings(InfluenceSettings):
         description=(
             "what has a displacement of its own: each combination of position, probe and ball, such"
             " as [position, ball]"
-        )
+        ),
+        examples=[["position", "ball"]],
     )
     standard_uncertainty: Length = Field(
         description="standard deviation of the displacements along each axis"

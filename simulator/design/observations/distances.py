@@ -146,7 +146,8 @@ class DistancesSettings(CommonPartSettings):
         description=(
             "a set that the artefact has, such as corner sides, corner diagonals, corners (both),"
             " neighbours, braced or all, or a list of pairs of balls"
-        )
+        ),
+        examples=["corners"],
     )
     dimensions: Literal[2, 3] | None = Field(
         None, description="3 (default): distances in space; 2: in the artefact's plane"

@@ -164,7 +164,11 @@ def test_the_answer_comes_first_and_is_said_once_nothing_moves(design: Path) -> 
             act(page, do="off", position=name)
         settled(page, 5)
         assert page.inner_text("#verdict .big") == "Undetermined"
-        assert page.locator("[data-job=suggest].primary").count() == 1
+        background = "one => getComputedStyle(one).backgroundColor"
+        looks = [
+            page.locator(f"[data-job={job}]").evaluate(background) for job in ("suggest", "next")
+        ]
+        assert looks[0] == "rgb(10, 114, 177)" != looks[1]
         assert page.errors == []
 
 

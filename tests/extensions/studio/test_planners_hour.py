@@ -103,7 +103,7 @@ def test_an_hour(design: Path) -> None:
         settled(page, 4)
         page.wait_for_selector("#forms .field-error")
         assert page.locator("#forms .field-error").count() == 1
-        assert "text is invalid" in page.inner_text("#verdict")
+        assert "text cannot be evaluated" in page.inner_text("#verdict")
         page.click("#undo")
         settled(page, 5)
         assert "Full rank" in page.inner_text("#verdict")

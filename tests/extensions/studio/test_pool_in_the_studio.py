@@ -65,10 +65,11 @@ def test_a_corner_is_forbidden_and_allowed_again(document):
     before = pooled(filled)
     assert before["boxes"] == [] and before["count"] == len(before["names"])
     # The file's own positions are in the low corner; there is none in the upper one.
-    corner = {axis: ["900 mm", "2 m"] for axis in "xyz"}
-    forbidden = done(filled, {"do": "set", "path": [*FORBIDDEN, "+"], "value": str(corner)})
+    forbidden = done(filled, {"do": "forbid", "corner": ["high"] * 3})
     after = pooled(forbidden)
-    assert after["boxes"] == [[[0.9] * 3, [1.0] * 3]]
+    assert after["boxes"] == [[[0.75] * 3, [1.0] * 3]]
+    low = done(filled, {"do": "forbid", "corner": ["low", "high", "low"]})
+    assert pooled(low)["boxes"] == [[[0.0, 0.75, 0.0], [0.25, 1.0, 0.25]]]
     dropped = after["dropped"]["in a forbidden box"]
     assert dropped > 0 and after["count"] + dropped >= before["count"] > after["count"]
     left = done(forbidden, {"do": "set", "path": [*FORBIDDEN, 0], "value": ""})

@@ -12,11 +12,10 @@ const was = (text) => (page.state.kept ? ` (was ${text})` : "");
 export const lengths_of = (design) => design?.quantities.find(({ symbol }) => symbol === "U6");
 
 // Whether targets are met, in words that a person may act on.
-const LOOKS = { met: "good", missed: "warn", undecided: "warn" };
 function target({ met, shares, rank, within }, before, of_rest, is_old) {
   if (!met) return figure("", "No target", "target_uncertainty is not stated");
   const head = is_old ? `Before: ${met}` : `Target ${met}`;
-  return figure(rank.deficiency && met !== "met" ? "bad" : LOOKS[met], head,
+  return figure(rank.deficiency && met !== "met" ? "bad" : met, head,
     of_rest ? "by the rest: " : "", shares.join("; "),
     met === "undecided" ? ", but not everything is determined" : "",
     was(share(before?.within_target) || "no target"), within === null ? null
@@ -49,14 +48,13 @@ const rank_words = ({ deficiency, expected, directions }) => {
 };
 
 // What the figures are of, with their rank.
-function notes_on({ rank }, messages, left_out, is_old) {
+function notes_on({ rank }, left_out, is_old) {
   if (!is_old) {
     const names = left_out.map(({ name }) => name).join(", ");
     return [rank_words(rank),
       ...(names ? [`of the positions without ${names}, which cannot be read there`] : [])];
   }
-  const reason = page.state.pending ? "Computing"
-    : messages[0]?.line ? "The text is invalid" : "The text cannot be evaluated";
+  const reason = page.state.pending ? "Computing" : "The text cannot be evaluated";
   return [`${reason}; ${rank ? "these are the figures before it." : "there are no figures yet."}`];
 }
 
@@ -70,7 +68,7 @@ export function figures() {
   const is_missed = Boolean(rank) && !["met", ""].includes(met);
   const messages = moving ? left_out.map(({ name, problem }) =>
     ({ what: `position "${name}"`, text: problem })) : state.messages;
-  const notes = notes_on(design ?? {}, messages, left_out, is_old);
+  const notes = notes_on(design ?? {}, left_out, is_old);
   $("verdict").className = is_old ? "bad old" : rank?.deficiency ? "bad" : is_missed ? "warn"
     : met ? "" : "open";
   $("design").classList.toggle("unanswered", is_old);
@@ -79,21 +77,16 @@ export function figures() {
     ? button("Fit them to the volume", () => act({ do: "fit" }), { id: "fit" }) : null);
   fill($("messages"), messages.map(message),
     (design?.doubts ?? []).map((text) => make("li", { class: "doubt" }, text)));
-  const [suggest, next] = $("next").children;
-  suggest.classList.toggle("primary", rank?.deficiency > 0);
-  next.classList.toggle("primary", is_missed && !rank.deficiency);
-  view.lengths(worst ? [{ ...worst, label: `${micro(worst.uncertainty)} µm` }] : []);
+  view.set({ segments: worst ? [{ ...worst, label: `${micro(worst.uncertainty)} µm` }] : [] });
   if (moving) return;
   // Only where there is something to determine.
-  suggest.hidden = !rank?.directions.length;
-  suggest.textContent = `What would determine it${rank?.deficiency ? "" : " better"}?`;
+  $("next").firstElementChild.hidden = !rank?.directions.length;
   const said = [is_old ? "" : $("figures").innerText, ...notes].join("; ");
   if (!state.pending && $("said").textContent !== said) $("said").textContent = said;
   fill($("counts"), lines(rank
     ? [`${rank.parameters} parameters from ${rank.observations} observations`, ...rank.reasons]
     : []));
   directions(rank?.directions ?? []);
-  ask_later();
 }
 
 function message({ line, what, text }) {
@@ -169,6 +162,7 @@ function stating({ assumed: what, changes }) {
 
 function assumed(found) {
   const all = found?.assumptions ?? [];
+  page.effects = all.flatMap(({ changes }) => changes.influences?.at(-1) ?? []);
   $("assumptions").hidden = !all.length;
   fill($("rests"), found?.warning ? [found.warning, " ", stating(all[0])] : []);
   const row = (words, { average, maximum, ratio }) =>

@@ -1,13 +1,11 @@
 // The page on which a design begins: the questions of init, a file of the folder, or an example.
-import { $, act, ask, button, fill, make, page, tell } from "./page.js";
+import { $, act, ask, button, fill, follow, make, page, tell } from "./page.js";
 import { picture } from "./paper.js";
 
 const PAUSE = 250; // milliseconds without a key before a draft is asked for
 const form = $("begin-form");
 let questions = null; // as the studio asks them, and the name of the file
-let draft = null; // of the last answers
-let asked = 0; // drafts that were asked for
-let timer = null;
+let isSent = false; // the form was sent, and its draft is awaited
 
 export const begins = () => !$("begin").hidden;
 
@@ -37,7 +35,7 @@ export async function begin() {
   show(true);
   tell("");
   $("questions").querySelector("input:checked").focus();
-  update();
+  update(0);
 }
 
 function show(isShown) {
@@ -117,26 +115,21 @@ function answer({ name, fields }) {
   }).join("");
 }
 
-async function update() {
-  clearTimeout(timer);
-  asked += 1;
-  const mine = asked;
+function update(after) {
   sessionStorage.setItem("answers", JSON.stringify(Object.fromEntries(new FormData(form))));
   const answers = Object.fromEntries(questions.map((one) => [one.name, answer(one)]));
-  try {
-    const found = await ask("/api/draft", answers);
-    if (mine !== asked) return;
-    draft = found;
-    messages();
-    if (draft.text) summary(answers);
-    $("draft").classList.toggle("stale", !draft.text);
-  } catch (error) {
-    tell(error.message, true);
-  }
+  follow("draft", answers, (draft) => {
+    if (draft.error) return void tell(draft.error, true);
+    messages(draft);
+    if (draft.text) summary(draft, answers);
+    $("draft").classList.toggle("earlier", !draft.text);
+    if (isSent && form.reportValidity()) begin_with(draft.text, "a draft of your answers");
+    isSent = false;
+  }, after);
 }
 
 // What is wrong, which the browser shows once a field was left.
-function messages() {
+function messages(draft) {
   questions.forEach(({ name }) => {
     const inputs = [...$(`question-${name}`).querySelectorAll("input")];
     const wrong = inputs.find(({ validity }) => validity.patternMismatch);
@@ -146,7 +139,7 @@ function messages() {
   });
 }
 
-function summary(answers) {
+function summary(draft, answers) {
   const rows = questions.filter(({ name, usual }) => usual ?? draft.words[name])
     .map(({ label, name, usual }) => [make("dt", {}, label),
       make("dd", {}, draft.words[name] ?? (answers[name] || usual))]);
@@ -155,17 +148,12 @@ function summary(answers) {
     make("dl", {}, rows));
 }
 
-form.oninput = () => {
-  clearTimeout(timer);
-  timer = setTimeout(update, PAUSE);
-};
-form.onsubmit = async (event) => {
+form.oninput = () => update(PAUSE);
+form.onsubmit = (event) => {
   event.preventDefault();
   form.classList.add("sent");
-  await update();
-  if (form.reportValidity() && draft?.text) {
-    await begin_with(draft.text, "a draft of your answers");
-  }
+  isSent = true;
+  update(0);
 };
 $("begin-example").onclick = () => close(page.state.note);
 $("begin-flat").onclick = async () => {

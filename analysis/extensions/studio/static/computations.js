@@ -22,7 +22,7 @@ export function drawn() {
   const { view } = page;
   view.ghost(current().filter((one) => one.shown).flatMap((one) => one.places));
   const fitted = running.findLast((one) => is_current(one) && one.result?.residuals);
-  view.residuals(fitted?.result.residuals, fitted && magnified(fitted));
+  view.set({ residuals: fitted && { ...fitted.result.residuals, scale: magnified(fitted) } });
   const is_listed = (job) => job.file === page.state.file && (job.state === "failed"
     ? is_of_now(job)
     : job.state === "running" || !["suggest", "next"].includes(job.job) || !job.result.length);

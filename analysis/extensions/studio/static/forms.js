@@ -65,7 +65,7 @@ export function build() {
   for (const details of container.children) {
     const { section: key } = details.dataset;
     details.classList.toggle("wrong",
-      messages.some(({ path }) => path.split(/[.[]/)[0] === key));
+      messages.some(({ steps }) => steps[0] === key));
     const part = page.schema.properties[key];
     if (details.open) fill(details.lastElementChild, fields([key], data?.[key], part, "value"));
   }
@@ -108,36 +108,27 @@ function fields(path, data, part, label) {
 function control(path, data, possible) {
   const listed = data === undefined ? null : choices(possible);
   const said = flow(data);
-  const steps = path.reduce((text, step) =>
-    (typeof step === "number" ? `${text}[${step}]` : `${text}.${step}`));
-  const wrong = page.state.messages.filter((one) => one.path === steps);
-  const attributes = { "data-path": JSON.stringify(path), class: wrong.length ? "bad-field" : "" };
+  const steps = JSON.stringify(path);
+  const wrong = page.state.messages.filter((one) => JSON.stringify(one.steps) === steps);
+  const attributes = { "data-path": steps, class: wrong.length ? "bad-field" : "" };
   const input = make(listed?.length > 1 ? "select" : "input", listed?.length > 1 ? attributes
     : { value: said, placeholder: data === undefined ? "not stated" : "", ...attributes });
   if (listed?.length > 1) options(input, [...new Set([said, ...listed])], said);
   return [input, wrong.map(({ text }) => make("span", { class: "field-error" }, text))];
 }
 
-// What is usual of a kind that needs more than its uncertainty.
-const STEEL = { value: "11.5 um/m/K", standard_uncertainty: "0 um/m/K" };
-const AIR = { value: "20 degC", standard_uncertainty: "0.1 K", sensor_uncertainty: "0.1 K" };
-const USUAL = {
-  temperature: { artefact_expansion: STEEL, artefact_temperature: AIR,
-    scale_expansion: STEEL, scale_temperature: AIR },
-  drift: { axes: { standard_uncertainty: "0.3 um/h" } },
-  reproducibility: { each: ["position", "ball"] },
-  distances: { pairs: "corners" },
-};
-
-// An entry of a kind, with examples of what it needs.
+// An entry of a kind: an effect as the assumptions state it, or examples of what it needs.
 function usual(kind, items) {
+  const effect = page.effects.find((one) => one.kind === kind);
   const { properties, required = [] } = forms(items, { kind })[0];
-  const example = (key) =>
-    forms(properties[key])[0].examples?.find((one) => /um|ppm/.test(one)) ?? "";
+  const example = (key) => {
+    const { examples = [] } = { ...forms(properties[key])[0], ...properties[key] };
+    return examples.find((one) => /um|ppm/.test(one)) ?? examples[0] ?? "";
+  };
   const needed = Object.keys(properties).filter((key) =>
     required.includes(key) || key === "standard_uncertainty");
-  return flow({ ...Object.fromEntries(needed.map((key) => [key, example(key)])), kind,
-    ...USUAL[kind] });
+  const stated = Object.fromEntries(needed.map((key) => [key, example(key)]));
+  return flow(effect ?? { ...stated, kind });
 }
 
 // A list of entries, to which one of a kind is added, or one like the last; positions are added

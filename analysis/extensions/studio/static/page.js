@@ -7,6 +7,7 @@ export const page = {
   design: null, // that of the state, or as it would be while something moves
   schema: null,
   selected: null, // the name of the chosen position
+  effects: [], // of influences that the file does not state, with usual values
   motion: null, // the number of the direction that swings
   stopped: false, // nothing swings unless it is asked for
   typed: false, // the text beside the design has changes that are not applied
@@ -72,13 +73,13 @@ function become(old, made) {
 
 function dress(old, made) {
   if (old.getAttribute("value") !== made.getAttribute("value")) old.value = made.value;
-  if (made.type === "checkbox" && !("own" in made.dataset)) old.checked = made.checked;
+  if (made.type === "checkbox") old.checked = made.checked;
   [...old.attributes].filter(({ name }) => name !== "open" && !made.hasAttribute(name))
     .forEach(({ name }) => old.removeAttribute(name));
   [...made.attributes].forEach(({ name, value }) => old.setAttribute(name, value));
-  old.handlers?.forEach((name) => { old[name] = null; });
+  [old, made].forEach(({ handlers = [] }) =>
+    handlers.forEach((name) => { old[name] = made[name]; }));
   old.handlers = made.handlers;
-  old.handlers?.forEach((name) => { old[name] = made[name]; });
 }
 
 export function options(select, names, chosen) {
@@ -118,7 +119,7 @@ const views = {}; // by name: the last answer and what it is of, what is asked a
 // Show a view of the present design, once nothing moves; what is of an earlier one is marked, and
 // what came after a later question is not shown.
 export function follow(name, body, show, after = 300) {
-  const { fingerprint, pending, stale } = page.state;
+  const { fingerprint } = page.state;
   const view = (views[name] ??= {});
   const key = JSON.stringify([fingerprint, body]);
   const finish = () => {
@@ -129,7 +130,7 @@ export function follow(name, body, show, after = 300) {
   view.wanted = key;
   clearTimeout(view.wait);
   finish();
-  if ([view.of, view.asked].includes(key) || pending || stale) return;
+  if ([view.of, view.asked].includes(key)) return;
   view.wait = setTimeout(async () => {
     view.asked = key;
     const answer = await ask(`/api/${name}`, body).catch(({ message }) => ({ error: message }));

@@ -8,7 +8,7 @@ let probes = {}; // that read each plane
 // Show the pool of the present design, once it is unfolded or drawn.
 export function pool() {
   const isDrawn = $("show-pool").checked;
-  if (!isDrawn) page.view.pool([], []);
+  if (!isDrawn) page.view.set({ outlines: [], boxes: [] });
   if (isDrawn || $("pool").open) follow("pool", {}, show);
 }
 
@@ -19,7 +19,7 @@ function show({ error, ...found }) {
   if (error) return;
   ({ probes } = found);
   fill($("candidates"), found.names.map((one) => make("option", { value: one })));
-  if ($("show-pool").checked) page.view.pool(found.outlines, found.boxes);
+  if ($("show-pool").checked) page.view.set({ outlines: found.outlines, boxes: found.boxes });
 }
 
 function said({ count, dropped, more }) {
@@ -39,24 +39,15 @@ $("filling").onsubmit = (event) => {
   "the pool fills the volume; undo leads back");
 };
 
-const limit = (name, entry, said_then) =>
-  act({ do: "set", path: ["pool", "limits", name, "+"], value: flow(entry) }, said_then);
-
 $("forbidding").onsubmit = (event) => {
   event.preventDefault();
-  const { lower, upper } = page.state.design.scene;
-  const millimetres = (metres) => `${Number((1e3 * metres).toFixed(1))} mm`;
-  // A quarter of each edge; what touches a wall goes on beyond it.
-  const box = lower.map((low, k) => {
-    const edge = (upper[k] - low) / 4;
-    const { name, value } = event.target.elements[k];
-    const from = value === "low" ? low : upper[k] - edge;
-    return [name, [from, from + edge].map(millimetres)];
-  });
+  const corner = [...event.target.querySelectorAll("select")].map(({ value }) => value);
   $("show-pool").checked = true;
-  limit("forbidden", Object.fromEntries(box), "no artefact may enter the red box");
+  act({ do: "forbid", corner }, "no artefact may enter the red box");
 };
+
 $("leaving-out").onsubmit = (event) => {
   event.preventDefault();
-  limit("at_most", { of: { name: $("candidate").value.trim() }, count: 0 }, "left out");
+  const value = flow({ of: { name: $("candidate").value.trim() }, count: 0 });
+  act({ do: "set", path: ["pool", "limits", "at_most", "+"], value }, "left out");
 };

@@ -32,9 +32,8 @@ function item({ name, enabled, problem, readings }) {
     make("small", { title: "readings" }, enabled ? `${readings}` : "off"));
 }
 
-function details({ name, artefact, groups, plane, problem, probes, read, readings }) {
+function details({ name, artefact, plane, problem, probes, read, readings }) {
   const { scene } = page.design;
-  const many = groups > 1;
   const axes = scene.dimension === 3 ? ["x", "y", "z"] : [];
   const does = (words, action, attributes = {}) =>
     button(words, () => act({ ...action, position: name }), attributes);
@@ -43,7 +42,7 @@ function details({ name, artefact, groups, plane, problem, probes, read, reading
   const balls = scene.artefacts[artefact];
   const ball = (label, k) => does("",
     { do: "balls", balls: changed(balls, (other) => read[other], k) },
-    { title: label, "aria-label": label, "aria-pressed": String(read[k]), disabled: many });
+    { title: label, "aria-label": label, "aria-pressed": String(read[k]) });
   const across = Math.max(1, Math.round(Math.sqrt(balls.length)));
   const tips = Object.keys(scene.probes);
   const isUsed = (k) => probes.includes(tips[k]);
@@ -55,9 +54,8 @@ function details({ name, artefact, groups, plane, problem, probes, read, reading
         { disabled: plane === axis, title: `stand across ${axis}` })),
       does("Copy", { do: "copy" }), does("Remove", { do: "remove" })),
     make("div", {}, "read with: ", tips.map((tip, k) => make("label", {}, box(`probe ${tip}`,
-      isUsed(k), () => act({ do: "probes", position: name, probes: changed(tips, isUsed, k) }),
-      { disabled: many }), `${tip} `))),
+      isUsed(k), () => act({ do: "probes", position: name, probes: changed(tips, isUsed, k) })),
+    `${tip} `))),
     make("div", { class: "balls", role: "group", "aria-label": "balls that are read",
-      style: `grid-template-columns: repeat(${across}, 24px)` }, balls.map(ball)),
-    many ? make("small", {}, "several groups of readings: change them in the text") : null);
+      style: `grid-template-columns: repeat(${across}, 24px)` }, balls.map(ball)));
 }

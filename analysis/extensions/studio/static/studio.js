@@ -45,8 +45,8 @@ function show() {
   positions();
   build();
   drawn();
-  pool();
-  errors();
+  // Of what cannot be evaluated, nothing more is asked.
+  if (!state.pending && !state.stale) [ask_later, pool, errors].forEach((asks) => asks());
 }
 
 function draw(design) {

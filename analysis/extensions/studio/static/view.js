@@ -27,9 +27,11 @@ export class View {
     matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => this.colourMap());
   }
 
-  // Nothing to show: the text has been wrong since it was opened.
+  // Nothing to show: the text has been wrong since it was opened. Besides plates there may be sheets
+  // of the map, plates that are offered, segments {from, to, label}, outlines of candidates, boxes
+  // that nothing may enter, and residuals.
   empty() {
-    Object.assign(this, { design: null, bounds: null, map: null, residual: null });
+    Object.assign(this, { design: null, bounds: null, map: null, residuals: null });
     this.set({ sheets: [], plates: [], offered: [], segments: [], outlines: [], boxes: [] });
     this.move(null);
   }
@@ -97,11 +99,6 @@ export class View {
     const offered = this.design ? places : [];
     this.set({ offered: offered.map((place) => plateOf(place, [], this.size, "ghost")) });
   }
-
-  // Outlines of candidates, and boxes that nothing may enter; lengths {from, to, label}.
-  pool = (outlines, boxes) => this.set({ outlines, boxes });
-  residuals = (found, scale) => this.set({ residual: found && { ...found, scale } });
-  lengths = (segments) => this.set({ segments });
 
   // Let a direction swing, or stop; at rest it is at its largest.
   move(motions) {
@@ -246,7 +243,7 @@ export class View {
 
   // Residuals at the balls.
   arrows() {
-    const { place = [], value, standardised, scale } = this.residual ?? {};
+    const { place = [], value, standardised, scale } = this.residuals ?? {};
     return place.map((from, k) => path(
       arrow(...[from, plus(from, value[k], scale)].map(this.pixel)),
       standardised[k] > 3.5 ? "residual large" : "residual"));
