@@ -14,8 +14,8 @@ from ballplate.simulator.experiment import Experiment, Position
 from ballplate.simulator.geometry import AXIS_INDEX, IN_PLANE_AXES, Axis, corners
 from ballplate.simulator.inputs import to_python, typed_length
 
-# Outlines that are drawn, and candidates that are named.
-MOST_OUTLINES, MOST_NAMED = 1000, 2000
+# Outlines that are drawn.
+MOST_OUTLINES = 1000
 
 # Ends of ranges are whole tenths of a millimetre.
 TENTH = 1e-4
@@ -25,12 +25,11 @@ GROUP_KEYS = frozenset({"planes", "levels", "corners", "centres"})
 
 def pool_of(experiment: Experiment) -> Data:
     """Return the candidates of an experiment's pool besides its own positions, as plain data:
-    their names, the corners of their outlines in metres, each once, why others were dropped,
-    forbidden boxes within the volume, and the probes that usually read each plane.
+    their count and, in words, why others were dropped, the corners of their outlines in metres,
+    each once, forbidden boxes within the volume, and the probes that usually read each plane.
     """
     pool, (lower, upper) = experiment.pool, experiment.machine.volume.corners
-    candidates, at_most = ((), ()) if pool is None else (pool.candidates, pool.at_most)
-    out = {candidates[k].name for limit in at_most if limit.count == 0 for k in limit.members}
+    candidates, dropped = ((), {}) if pool is None else (pool.candidates, pool.dropped)
     items = [candidate.item for candidate in candidates if not candidate.drawn]
     places = [item for item in items if isinstance(item, Position)]
     outlines: dict[Any, None] = {}
@@ -43,11 +42,11 @@ def pool_of(experiment: Experiment) -> Data:
         planes = {"z": None}
     return {
         "count": len(places),
-        "dropped": {} if pool is None else dict(pool.dropped),
-        "names": [place.name for place in places if place.name not in out][:MOST_NAMED],
-        "left_out": sorted(out),
+        "words": "No candidates yet: fill the volume. " * (not places)
+        + f"{len(places)} candidates besides the positions"
+        + "; not offered: " * bool(dropped)
+        + ", ".join(f"{number} {reason}" for reason, number in dropped.items()),
         "outlines": list(outlines)[:MOST_OUTLINES],
-        "more": max(0, len(outlines) - MOST_OUTLINES),
         "boxes": [] if pool is None else np.clip(pool.forbidden, lower, upper),
         "probes": {
             plane: probes_across(experiment, artefact, axis) for plane, axis in planes.items()

@@ -3,7 +3,6 @@ import { flow, lead } from "./forms.js";
 import { legend } from "./legend.js";
 import { $, act, button, fill, follow, make, micro, page, share, table } from "./page.js";
 
-const counted = (number) => number.toLocaleString("en");
 const rounded = (number) => `${Number(number.toPrecision(3))}`;
 const figure = (look, text, ...words) => make("div", { class: `figure ${look}` },
   make("span", { class: "big" }, text), make("span", {}, words));
@@ -32,7 +31,7 @@ function answered(design, of_rest, is_old) {
   return [
     undetermined ? figure("bad", "Undetermined", undetermined === count
       ? "All distances are undetermined."
-      : `${counted(undetermined)} of ${counted(count)} distances are undetermined.`) : [],
+      : `${undetermined.toLocaleString("en")} of ${count.toLocaleString("en")} distances are undetermined.`) : [],
     undetermined === count ? [] : [
       figure("", `${micro(average)} µm`, `U6${others} on average`, was(micro(before?.average))),
       figure("", `${micro(maximum)} µm`, `U6${others} at most`, was(micro(before?.maximum)))],
@@ -48,11 +47,13 @@ const rank_words = ({ deficiency, expected, directions }) => {
 };
 
 // What the figures are of, with their rank.
-function notes_on({ rank }, left_out, is_old) {
+function notes_on({ rank, met }, left_out, is_old) {
   if (!is_old) {
     const names = left_out.map(({ name }) => name).join(", ");
     return [rank_words(rank),
-      ...(names ? [`of the positions without ${names}, which cannot be read there`] : [])];
+      ...(names ? [`of the positions without ${names}, which cannot be read there`] : []),
+      ...(met === "missed" && !rank.deficiency
+        ? [`ballplate reach ${page.state.file} solves for what the target needs`] : [])];
   }
   const reason = page.state.pending ? "Computing" : "The text cannot be evaluated";
   return [`${reason}; ${rank ? "these are the figures before it." : "there are no figures yet."}`];
@@ -174,7 +175,7 @@ function assumed(found) {
     [row("all of these", { ...found, ratio: 1 }), ...rows]));
 }
 
-const SHOWN_UNITS = { m: "µm", rad: "µrad", 1: "ppm" };
+export const UNITS = { m: "µm", rad: "µrad", 1: "ppm" };
 function quantities(found) {
   const { kept } = page.state;
   const cell = (row, key) => {
@@ -188,7 +189,7 @@ function quantities(found) {
       one.undetermined && one.undetermined < one.count
         ? ` (${one.undetermined} of ${one.count} undetermined)` : ""),
     ...(one.average === null && !kept ? [make("td", { colspan: "2" }, "undetermined")]
-      : [cell(one, "average"), cell(one, "maximum")]), SHOWN_UNITS[one.unit] ?? one.unit];
+      : [cell(one, "average"), cell(one, "maximum")]), UNITS[one.unit] ?? one.unit];
   fill($("quantities"),
     table(["standard uncertainty of", "average", "max.", ""], found.map(row)));
 }

@@ -24,7 +24,6 @@ export async function begin() {
       .forEach(([name, value]) => { form.elements[name].value = value; });
   }
   const others = files.filter((name) => name !== file);
-  $("begin-files").hidden = !others.length;
   fill($("begin-files").lastElementChild, others.map((name) => make("li", {},
     button(name, async () => { if (await open(name)) close(page.state.note); }))));
   $("begin-example").hidden = !untouched;

@@ -84,12 +84,9 @@ export async function poll() {
     tell(error.message, true);
     return;
   }
-  const is_new = running.some((job) => is_current(job) && before.get(job.id) === "running"
-    && ["suggest", "next"].includes(job.job));
   // A plan of positions, or a fit, is drawn.
   if (running.some(({ id, state }) => before.get(id) !== state)) page.show();
   else drawn();
-  if (is_new) $("suggested").scrollIntoView({ block: "nearest" });
   if (running.some((job) => job.state === "running")) polling = setTimeout(poll, 300);
 }
 

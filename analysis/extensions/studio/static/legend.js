@@ -11,7 +11,7 @@ const MEANINGS = {
   points: "Standard uncertainty of a corrected co-ordinate, which depends on the origin",
 };
 const valuesOf = ({ slices }) => slices.flatMap(({ values }) => values.flat());
-const knownOf = (map) => valuesOf(map).filter((value) => value !== null);
+const knownOf = (map) => valuesOf(map).filter(Number.isFinite);
 
 // Without a target, multiples of a round number of metres.
 function bandsOf(map) {

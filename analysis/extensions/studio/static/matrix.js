@@ -1,9 +1,9 @@
 // Errors by positions: how much of each error's information goes with each position.
+import { UNITS } from "./answers.js";
 import { candidate } from "./computations.js";
 import { $, button, fill, follow, make, micro, page } from "./page.js";
 import { choose } from "./positions.js";
 
-const UNITS = { m: "µm", rad: "µrad", 1: "ppm" };
 const percent = (part) => `${Number((100 * part).toPrecision(part < 0.01 ? 1 : 2))}`;
 const known = (value, words) => (value === null ? "–" : words(value));
 // As everywhere on the page, half a minute shows.

@@ -14,8 +14,7 @@ export function positions() {
     ({ name, problem, enabled: true, readings: "unclear" }));
   fill($("positions"), [...list, ...others].map(item));
   const place = list.find((one) => one.name === page.selected);
-  $("position").hidden = !place;
-  if (place) details(place);
+  fill($("position"), place ? details(place) : []);
 }
 
 const box = (label, checked, onchange, attributes = {}) =>
@@ -46,8 +45,7 @@ function details({ name, artefact, plane, problem, probes, read, readings }) {
   const across = Math.max(1, Math.round(Math.sqrt(balls.length)));
   const tips = Object.keys(scene.probes);
   const isUsed = (k) => probes.includes(tips[k]);
-  fill($("position"),
-    make("strong", {}, name), make("div", {}, `${artefact}; ${readings} readings`),
+  return [make("strong", {}, name), make("div", {}, `${artefact}; ${readings} readings`),
     problem ? make("div", { class: "field-error" }, problem) : null,
     make("div", { class: "bar" }, does("Turn", { do: "turn" }, { id: "turn" }),
       axes.map((axis) => does(`⟂ ${axis}`, { do: "stand", across: axis },
@@ -57,5 +55,5 @@ function details({ name, artefact, plane, problem, probes, read, readings }) {
       isUsed(k), () => act({ do: "probes", position: name, probes: changed(tips, isUsed, k) })),
     `${tip} `))),
     make("div", { class: "balls", role: "group", "aria-label": "balls that are read",
-      style: `grid-template-columns: repeat(${across}, 24px)` }, balls.map(ball)));
+      style: `grid-template-columns: repeat(${across}, 24px)` }, balls.map(ball))];
 }

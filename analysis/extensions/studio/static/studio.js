@@ -27,7 +27,6 @@ function show() {
   $("title").textContent = begins() || !design ? document.title
     : document.title.replace("ballplate studio", design.title);
   options($("files"), [...new Set([...state.files, file])].sort(), file);
-  $("variant-label").hidden = !state.variants.length;
   options($("variants"), state.variants, state.variant);
   $("undo").disabled = !state.back;
   $("redo").disabled = !state.forward;
@@ -37,7 +36,6 @@ function show() {
   $("hours").defaultValue = /^#.* --hours ([\d.]+)/m.exec(state.text)?.[1] ?? "";
   page.typed &&= $("text").value !== state.text;
   if (!page.typed) $("text").value = state.text;
-  $("apply").disabled = !page.typed;
   if (design) draw(design);
   else view.empty();
   figures();
@@ -95,10 +93,7 @@ $("files").onchange = async ({ target: { value } }) => {
   else show();
 };
 $("variants").onchange = ({ target: { value } }) => act({ do: "variant", name: value });
-$("text").oninput = () => {
-  page.typed = $("text").value !== page.state.text;
-  $("apply").disabled = !page.typed;
-};
+$("text").oninput = () => { page.typed = $("text").value !== page.state.text; };
 $("step").onchange = ({ target: { value } }) => { view.step = Number(value); };
 $("errors").ontoggle = errors;
 $("pool").ontoggle = $("show-pool").onchange = pool;
