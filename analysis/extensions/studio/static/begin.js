@@ -45,7 +45,6 @@ function show(isShown) {
 
 function close(said = "") {
   show(false);
-  page.view.resize();
   page.view.home();
   $("view").focus({ preventScroll: true });
   window.scrollTo(0, 0);

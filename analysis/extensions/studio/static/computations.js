@@ -85,8 +85,10 @@ export async function poll() {
     return;
   }
   // A plan of positions, or a fit, is drawn.
-  if (running.some(({ id, state }) => before.get(id) !== state)) page.show();
+  const is_new = running.some(({ id, state }) => before.get(id) !== state);
+  if (is_new) page.show();
   else drawn();
+  if (is_new && before.size && current().length) $("suggested").scrollIntoView({ block: "nearest" });
   if (running.some((job) => job.state === "running")) polling = setTimeout(poll, 300);
 }
 

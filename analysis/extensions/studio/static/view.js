@@ -17,10 +17,8 @@ const MANY = 8; // plates: more are drawn thinner
 
 export class View {
   constructor(svg, handlers) {
-    this.svg = svg;
-    this.handlers = handlers; // onSelect, onDrag, onDrop and onPlace
+    Object.assign(this, { svg, handlers, step: 0.01 }); // onSelect, onDrag, onDrop and onPlace
     this.still = matchMedia("(prefers-reduced-motion: reduce)").matches;
-    this.step = 0.01;
     this.hands = new Hands(this);
     this.empty();
     new ResizeObserver(() => this.resize()).observe(svg);
