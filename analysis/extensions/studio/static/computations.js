@@ -88,7 +88,7 @@ export async function poll() {
   const is_new = running.some(({ id, state }) => before.get(id) !== state);
   if (is_new) page.show();
   else drawn();
-  if (is_new && before.size && current().length) $("suggested").scrollIntoView({ block: "nearest" });
+  if (is_new && before.size) $("suggestions").scrollIntoView({ block: "nearest" });
   if (running.some((job) => job.state === "running")) polling = setTimeout(poll, 300);
 }
 

@@ -17,7 +17,8 @@ const MANY = 8; // plates: more are drawn thinner
 
 export class View {
   constructor(svg, handlers) {
-    Object.assign(this, { svg, handlers, step: 0.01 }); // onSelect, onDrag, onDrop and onPlace
+    // Handlers are onSelect, onDrag, onDrop and onPlace.
+    Object.assign(this, { svg, handlers, step: 0.01 });
     this.still = matchMedia("(prefers-reduced-motion: reduce)").matches;
     this.hands = new Hands(this);
     this.empty();
