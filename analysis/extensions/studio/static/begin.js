@@ -14,8 +14,7 @@ export async function begin() {
   const { file, files, note, untouched } = page.state;
   if (!questions) {
     const found = await ask("/api/questions");
-    const none = `${note ? `${note}; ` : ""}no questions are asked: ${found.missing}`;
-    if (found.missing) return void tell(none);
+    if (found.missing) return void tell(`${note} No questions are asked: ${found.missing}`);
     $("questions").replaceChildren(...found.questions.map(group));
     questions = [...found.questions, { name: "name", label: "Name of the file", fields: [{}] }];
     // Answers of this tab outlive a page that is loaded again.

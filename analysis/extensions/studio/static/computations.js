@@ -118,8 +118,8 @@ function computation(job) {
     ending ? make("small", {}, "ends with the best so far ") : null,
     job.page ? make("a", { href: `/pages/${id}`, target: "_blank", rel: "noopener",
       "data-page": "" }, "open its page") : null,
-    is_of_now(job) ? null : make("small", {}, " of an earlier design"),
     // What is of an earlier design is read on request alone.
+    is_of_now(job) ? null : make("small", {}, " of an earlier design"),
     text ? [make("button", { type: "button", popovertarget: `text-${id}` }, "read it whole"),
       make("pre", { popover: "auto", id: `text-${id}` }, text),
       is_of_now(job) && make("pre", { tabindex: "0" }, text)] : null,

@@ -10,8 +10,8 @@ const MEANINGS = {
   lengths: "Largest standard uncertainty of the lengths from each point",
   points: "Standard uncertainty of a corrected co-ordinate, which depends on the origin",
 };
-const valuesOf = ({ slices }) => slices.flatMap(({ values }) => values.flat());
-const knownOf = (map) => valuesOf(map).filter(Number.isFinite);
+const knownOf = ({ slices }) =>
+  slices.flatMap(({ values }) => values.flat()).filter(Number.isFinite);
 
 // Without a target, multiples of a round number of metres.
 function bandsOf(map) {
@@ -59,6 +59,6 @@ export function legend() {
     number(low), isRatio && low === 1 && " = target", k === length - 1 && `${unit} or more`);
   fill($("legend"), isRatio ? MEANINGS.target + target : MEANINGS[$("map").value],
     `; here ${number(Math.min(...known))} to ${number(Math.max(...known))}${unit}`,
-    known.length < valuesOf(map).length && "; grey: undetermined",
+    "; grey: undetermined",
     make("ul", { class: "bands" }, bandsOf(map).map(band)));
 }

@@ -10,7 +10,7 @@ import {
 
 const [TURN, RISE] = [-35, 24]; // degrees: the eye of all drawings of a design
 const SHARE = 0.07; // of the volume's size: the largest displacement that is shown
-const PERIOD = 2400; // milliseconds of one swing
+const [PERIOD, PAUSE] = [2400, 60]; // milliseconds of one swing, and from a picture to the next
 const [MARGIN, LOWER] = [66, 20]; // pixels around the volume, and more of them above
 const [BALL, LARGE] = [0.009, 0.015]; // parts of the volume's size: balls, and those of a choice
 const MANY = 8; // plates: more are drawn thinner
@@ -23,12 +23,11 @@ export class View {
     this.hands = new Hands(this);
     this.empty();
     new ResizeObserver(() => this.resize()).observe(svg);
-    matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => this.colourMap());
+    matchMedia("(prefers-color-scheme: dark)").onchange = () => this.colourMap();
   }
 
-  // Nothing to show: the text has been wrong since it was opened. Besides plates there may be sheets
-  // of the map, plates that are offered, segments {from, to, label}, outlines of candidates, boxes
-  // that nothing may enter, and residuals.
+  // Nothing to show: the text has been wrong since it was opened. Outlines are those of candidates,
+  // boxes hold nothing, and segments are {from, to, label}.
   empty() {
     Object.assign(this, { design: null, bounds: null, map: null, residuals: null });
     this.set({ sheets: [], plates: [], offered: [], segments: [], outlines: [], boxes: [] });
@@ -169,7 +168,9 @@ export class View {
       return;
     }
     if (this.motions && !this.still) {
-      this.set({ amplitude: SHARE * this.size * Math.sin((2 * Math.PI * now) / PERIOD) });
+      this.amplitude = SHARE * this.size * Math.sin((2 * Math.PI * now) / PERIOD);
+      clearTimeout(this.swing);
+      this.swing = setTimeout(() => this.set({}), PAUSE);
     }
     const nearness = ({ place, middle }) =>
       (place.name === this.selected ? Infinity : dot(middle, this.eye[2]));
