@@ -206,7 +206,7 @@ def _whole(experiment: Experiment) -> Position:
 
 
 def _fitted(action: Action) -> Outcome:
-    """Move all positions so that they fill the volume as they filled the space that they take."""
+    """Move the positions that leave the volume into it, as they lie in the space that all take."""
     fitted = action.draft
     enabled = [place for place in fitted.positions if place.enabled]
     if not enabled:
@@ -218,8 +218,10 @@ def _fitted(action: Action) -> Outcome:
     was_free = (high.max(axis=0) - low.min(axis=0)) - (high - low)
     is_free = np.maximum(fitted.machine.volume.size - (high - low), 0.0)
     share = np.where(was_free > STEP, (low - low.min(axis=0)) / np.maximum(was_free, STEP), 0.5)
-    for place, by in zip(enabled, fitted.machine.volume.lower + share * is_free - low, strict=True):
-        fitted = _placed(fitted, place, by)
+    lower, upper = fitted.machine.volume.lower, fitted.machine.volume.upper
+    leaves = ((low < lower - STEP) | (high > upper + STEP)).any(axis=1)
+    for k in np.flatnonzero(leaves):
+        fitted = _placed(fitted, enabled[k], lower + share[k] * is_free[k] - low[k])
     return fitted
 
 
