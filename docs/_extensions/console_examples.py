@@ -331,8 +331,9 @@ def _on_terminal(action: Callable[[], int], folder: Path) -> tuple[int, str]:
         if not piece:
             break
         pieces.append(piece)
-    os.close(terminal)
+    # Not before: an action whose terminal is closed as it ends is told to hang up.
     _, status = os.waitpid(process, 0)
+    os.close(terminal)
     return os.waitstatus_to_exitcode(status), b"".join(pieces).decode("utf-8", "replace")
 
 
