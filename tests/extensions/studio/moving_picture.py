@@ -33,7 +33,7 @@ def main(file: Path) -> None:
         lines = Path(shipped("quickstart.yaml")).read_text("utf-8").splitlines(keepends=True)
         kept = [line for line in lines if not any(f"name: {name}," in line for name in LEFT_OUT)]
         design.write_text("".join(kept).replace("in six positions", "in four positions"), "utf-8")
-        with Studio(design) as studio, tab(1200, 720) as page:
+        with Studio(design) as studio, tab(1200, 790) as page:
             # Nothing moves by itself: each picture is that of its time.
             page.emulate_media(reduced_motion="reduce")
             page.goto(studio.address)
