@@ -155,10 +155,6 @@ def test_an_experiment_written_in_python(tmp_path: Path) -> None:
             lambda: bp.diff("a.yaml", "b.yaml", dates=("2026-11-22",)),  # type: ignore[arg-type]
             "dates=.*; give two",
         ),
-        (
-            lambda: bp.diff("a.yaml", "b.yaml", points=[0.1, 0.2, 0.3]),  # type: ignore[list-item]
-            "points: give a list of points",
-        ),
     ],
 )
 def test_wrong_arguments_are_refused(call: Callable[[], object], told: str) -> None:

@@ -35,15 +35,16 @@ def draw_design(design: Design, words: str, path: str | Path | None = None) -> F
     :raises ValueError: the suffix is of no picture format.
     :raises OSError: the file cannot be written.
     """
-    drawn = scene(design)
-    is_named = names_fit([place.name for place in drawn.places])
     with drawing(330.0) as figure:
-        draw_scene(blank_axes(figure), drawn, by_number=not is_named)
+        draw_scene(blank_axes(figure), scene(design))
         return save(figure, path, words)
 
 
-def draw_scene(axes: Axes, drawn: Scene, by_number: bool) -> None:
-    """Draw the volume and its positions, labelled by names or numbers, on axes without a frame."""
+def draw_scene(axes: Axes, drawn: Scene) -> None:
+    """Draw the volume and its positions, labelled by names, or by numbers if these are too long, on
+    axes without a frame.
+    """
+    by_number = not names_fit([place.name for place in drawn.places])
     label_points, size = draw_box(axes, drawn.box), drawn.box.size
     for place in drawn.places:
         _place(axes, place)

@@ -107,13 +107,20 @@ def test_files_in_each_others_place_are_told(
         (["run", "--budget", "readings.csv", design], "the experiment file comes first"),
         (["fit", design, "map.npz"], "map.npz is no table of readings"),
         (["next", design, "map.yaml"], "map.yaml is no table of readings"),
-        (["adjust", "map.yaml", "--scale", "x=1 ppm", "--after", "r.csv"], "r.csv is no map file"),
+        (
+            ["adjust", "map.yaml", "--scale", "x=1 ppm", "--after", "r.csv"],
+            "r.csv:1:1: is no map file",
+        ),
     ):
         if "--after" in arguments:
-            fit = bp.fit(bp.quickstart(), bp.simulate(bp.quickstart()))
+            readings = bp.simulate(bp.quickstart())
+            readings.to_csv(tmp_path / "r.csv", index=False)
+            fit = bp.fit(bp.quickstart(), readings)
             bp.write_map(fit.to_map(), tmp_path / "map.yaml")  # type: ignore[attr-defined]
-            arguments = [str(tmp_path / one) if one == "map.yaml" else one for one in arguments]
-        assert main(arguments) == 2, arguments
+            files = ("map.yaml", "r.csv")
+            arguments = [str(tmp_path / one) if one in files else one for one in arguments]
+        # A file for an option is refused as a file, with its line.
+        assert main(arguments) == (3 if "--after" in arguments else 2), arguments
         assert words in capsys.readouterr().err
 
 

@@ -95,11 +95,9 @@ WALK = {
         prints=False,
     ),
     "adjust": Walk(
-        EXPERIMENT
-        | {"READINGS": "readings.csv", "--certificate": "certificate.csv", "--after": "again.csv"},
+        {"MAP": "map.yaml", "--after": "map-again.yaml"},
         {"-o": "after.yaml"},
         ("--turn", "y-x=1 urad", "--uncertainty", "2%"),
-        also=("balls.csv",),
     ),
     "correct": Walk(
         {
@@ -135,7 +133,6 @@ WALK = {
         {
             "MAP": "map.yaml",
             "SECOND": "second-map.yaml",
-            "--points": "corners.csv",
             "--readings": "readings.csv",
         },
         {"-o": "d.csv", "--plot": "d.svg"},
@@ -252,8 +249,9 @@ def shelf(tmp_path_factory: pytest.TempPathFactory) -> Path:
     again = ["-o", str(folder / "again.csv"), "--seed", "2"]
     assert main(["simulate", str(folder / "design.yaml"), *again]) == 0
     (folder / "corners.csv").write_text("name,x_mm,y_mm\nA,50,50\nB,450,50\n", encoding="utf-8")
-    fit = ["fit", str(folder / "design.yaml"), str(readings), "-o", str(folder / "map.yaml")]
-    assert main(fit) == 0
+    for table, name in ((readings, "map.yaml"), (folder / "again.csv", "map-again.yaml")):
+        fit = ["fit", str(folder / "design.yaml"), str(table), "-o", str(folder / name)]
+        assert main(fit) == 0
     shutil.copy(folder / "map.yaml", folder / "second-map.yaml")
     # In the plane, where a model has few curves to be drawn.
     few = {"kind": "kinematic", "position_coefficients": 2, "rotation_coefficients": 1}

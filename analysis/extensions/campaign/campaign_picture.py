@@ -67,7 +67,7 @@ def draw_campaign(selection: Selection, path: str | Path | None = None) -> Figur
         axes = placed_axes(figure, 0.0, 0.0, WIDTH, SCENE)
         axes.set_axis_off()
         axes.set_aspect("equal")
-        draw_scene(axes, scene(selection.prediction.design), by_number=True)
+        draw_scene(axes, scene(selection.prediction.design))
         return save(figure, path, words(selection))
 
 

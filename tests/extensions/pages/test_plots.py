@@ -80,7 +80,7 @@ def test_predictions_and_plans_draw_their_positions(tmp_path: Path) -> None:
     figure = campaign.plot(str(tmp_path / "plan.png"))
     assert (tmp_path / "plan.png").read_bytes().startswith(b"\x89PNG")
     drawn = {text.get_text() for axes in figure.axes for text in axes.texts}
-    assert {campaign.title_of(one) for one in campaign.chosen} <= drawn
+    assert set(campaign.prediction.design.positions.names) <= drawn
 
 
 def test_what_cannot_be_drawn_is_refused(planar: Fit, tmp_path: Path) -> None:
