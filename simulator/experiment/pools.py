@@ -406,8 +406,8 @@ def _through_walls(boxes: Array, volume: Volume) -> Array:
     """Return boxes (n, 2, d), those that reach a wall of the volume without an end there: what lies
     on the wall is within them, and does not touch them alone.
     """
-    lower = np.where(boxes[:, 0] <= volume.lower, -np.inf, boxes[:, 0])
-    upper = np.where(boxes[:, 1] >= volume.upper, np.inf, boxes[:, 1])
+    lower = np.where(boxes[:, 0] <= volume.lower + TOLERANCE, -np.inf, boxes[:, 0])
+    upper = np.where(boxes[:, 1] >= volume.upper - TOLERANCE, np.inf, boxes[:, 1])
     return frozen(np.stack([lower, upper], axis=1))
 
 
