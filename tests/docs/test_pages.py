@@ -6,6 +6,8 @@ from __future__ import annotations
 
 import argparse
 import base64
+import html
+import json
 import re
 import subprocess
 import sys
@@ -98,6 +100,22 @@ def test_examples_have_run(built: Path) -> None:
     for figure in ("3.13(0.23)", "0.9594", "12.238", "0.377"):
         assert figure in text
     assert "<mtable" in (built / "explanation/mathematics.html").read_text(encoding="utf-8")
+
+
+def test_outputs_of_the_notebook_are_those_of_its_page(built: Path) -> None:
+    """Whose programs the build has run."""
+    notebook = json.loads((DOCS / "how-to/from-python.ipynb").read_text(encoding="utf-8"))
+    outputs = [one for cell in notebook["cells"] for one in cell.get("outputs", [])]
+    stored = "".join(one.get("text", "") for one in outputs)
+    text = (built / "how-to/from-python.html").read_text(encoding="utf-8")
+    blocks = re.findall(r'class="highlight-text .*?<pre>(.*?)</pre>', text, re.DOTALL)
+    of_page = "\n".join(html.unescape(re.sub("<.*?>", "", block)) for block in blocks)
+    words = [re.sub(r"\s*\n\s*", "\n", one.strip()) for one in (stored, of_page)]
+    number = r"-?\d+(?:\.\d+)?"
+    assert words[0]
+    assert re.sub(number, "#", words[0]) == re.sub(number, "#", words[1])
+    values = [[float(value) for value in re.findall(number, one)] for one in words]
+    assert values[0] == pytest.approx(values[1], rel=1e-3, abs=2e-3)
 
 
 def test_an_example_that_fails_ends_the_build(tmp_path: Path) -> None:
