@@ -1,7 +1,7 @@
 // The verdict, its figures, what is assumed and what is undetermined.
 import { flow, lead } from "./forms.js";
 import { legend } from "./legend.js";
-import { $, act, button, fill, follow, make, micro, page, share, table } from "./page.js";
+import { $, act, button, fill, follow, make, mark, micro, page, share, table } from "./page.js";
 
 const rounded = (number) => `${Number(number.toPrecision(3))}`;
 const figure = (look, text, ...words) => make("div", { class: `figure ${look}` },
@@ -120,9 +120,9 @@ function directions(found) {
       make("strong", {}, ` ${weak ? "weak" : "undetermined"} `), words))));
 }
 
-// The map and what swings come once nothing moves; scale and assumptions, which take longer than
-// all the rest, after them.
+// The map and what swings come once nothing moves; scale and assumptions, which take longer, last.
 export function ask_later() {
+  mark("later", {});
   follow("drawn", { map: $("map").value, motion: page.motion }, (drawn) => {
     if (drawn.error) return;
     page.view.draw(drawn);

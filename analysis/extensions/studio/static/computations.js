@@ -16,8 +16,7 @@ function current() {
     shown: shown.get(`${last.id} ${k}`) ?? k === 0, places: one.places ?? [one.place] }));
 }
 
-// Everything of them, in the view and beside it: of this file, what was suggested as suggestions;
-// what failed of an earlier text nowhere.
+// All of them, in the view and beside it; what failed of an earlier text is not shown.
 export function drawn() {
   const { view } = page;
   view.ghost(current().filter((one) => one.shown).flatMap((one) => one.places));

@@ -116,16 +116,19 @@ export async function ask(path, body) {
 }
 
 const views = {}; // by name: the last answer and what it is of, what is asked and wanted
-// Show a view of the present design, once nothing moves; what is of an earlier one is marked, and
-// what came after a later question is not shown.
+const key_of = (body) => JSON.stringify([page.state.fingerprint, body]);
+// Mark what shows a view of an earlier design.
+export const mark = (name, body) => document.querySelectorAll(`[data-of=${name}]`)
+  .forEach((one) => one.classList.toggle("stale", views[name]?.of !== key_of(body)));
+
+// Show a view of the present design, once nothing moves; what came after a later question is not.
 export function follow(name, body, show, after = 300) {
   const { fingerprint } = page.state;
   const view = (views[name] ??= {});
-  const key = JSON.stringify([fingerprint, body]);
+  const key = key_of(body);
   const finish = () => {
     if (view.of === key) show(view.answer);
-    document.querySelectorAll(`[data-of=${name}]`)
-      .forEach((one) => one.classList.toggle("stale", view.of !== key));
+    mark(name, body);
   };
   view.wanted = key;
   clearTimeout(view.wait);

@@ -1,5 +1,4 @@
-// The pool that a plan chooses from: filled, drawn in the volume, and limited; its form has all of
-// it.
+// The pool that a plan chooses from: filled, drawn and limited; all of it is in its form.
 import { $, act, follow, page } from "./page.js";
 
 let probes = {}; // that read each plane

@@ -1,5 +1,4 @@
-// The volume and its plates, drawn in three dimensions; what is undetermined moves. How things
-// look is in the style sheet, by their classes.
+// The volume and its plates in three dimensions; what is undetermined moves. CSS has the looks.
 import { annotations } from "./annotations.js";
 import { Hands } from "./hands.js";
 import { imageOf } from "./legend.js";
