@@ -218,10 +218,10 @@ def _fitted(action: Action) -> Outcome:
     was_free = (high.max(axis=0) - low.min(axis=0)) - (high - low)
     is_free = np.maximum(fitted.machine.volume.size - (high - low), 0.0)
     share = np.where(was_free > STEP, (low - low.min(axis=0)) / np.maximum(was_free, STEP), 0.5)
-    lower, upper = fitted.machine.volume.lower, fitted.machine.volume.upper
-    leaves = ((low < lower - STEP) | (high > upper + STEP)).any(axis=1)
-    for k in np.flatnonzero(leaves):
-        fitted = _placed(fitted, enabled[k], lower + share[k] * is_free[k] - low[k])
+    lowest, highest = fitted.machine.volume.of_readings
+    for k in np.flatnonzero(((low < lowest) | (high > highest)).any(axis=1)):
+        by = fitted.machine.volume.lower + share[k] * is_free[k] - low[k]
+        fitted = _placed(fitted, enabled[k], by)
     return fitted
 
 

@@ -111,6 +111,14 @@ def test_the_last_position_goes_and_the_first_comes(document):
     assert judgement(first).answer["rank"]["deficiency"] > 0
 
 
+def test_what_may_be_read_where_it_is_is_not_moved(document):
+    """A thousandth of the volume beyond it is no fault."""
+    out = done(document, {"do": "move", "position": "z low", "by": [-0.0005, 0.0, 0.0]})
+    problems = [place["problem"] for place in scene_of(out)["positions"]]
+    fitted = done(out, {"do": "fit"})
+    assert problems == [None] * len(problems) and fitted.text == out.text
+
+
 @pytest.mark.parametrize("sides", [(1.2, 0.9, 0.7), (3.0, 2.0, 1.0), (0.62, 0.62, 0.62)])
 def test_positions_are_fitted_to_another_volume(document, sides):
     """All are within it, and those that were stay where they were."""
