@@ -7,7 +7,6 @@ import os
 import re
 import tempfile
 from collections.abc import Mapping, Sequence
-from contextlib import suppress
 from itertools import product
 from pathlib import Path
 from typing import Any
@@ -34,13 +33,13 @@ Axes = Mapping[tuple[str, ...], tuple[str, ...]]
 
 def swept(document: DesignDocument, settings: Mapping[str, Any], report: Report) -> dict[str, Any]:
     """Compute a sweep over `axes`, each with `paths` and `values`: the text of each combination,
-    and the `page`, empty if its modules are not installed.
+    and the `page`.
 
     :raises ActionError: an axis is incomplete, or there are too many combinations.
     :raises ExperimentError: the text is invalid, a path leads nowhere, or a value would run a model
         in Python in a design that the user has not opened by name.
     """
-    axes, page = _axes(settings.get("axes")), ""
+    axes = _axes(settings.get("axes"))
     with tempfile.TemporaryDirectory() as folder:
         file = _written(document, axes, Path(folder))
         try:
@@ -50,10 +49,10 @@ def swept(document: DesignDocument, settings: Mapping[str, Any], report: Report)
             raise ActionError("; ".join(message.text for message in error.messages)) from None
         store = file.with_suffix(".sqlite")
         result = computed(sweep, store, report=report)
-        with suppress(ImportError):
-            from ballplate.extensions.sweeps.report import sweep_page
+        # Imported late: it loads slowly, and few sessions sweep.
+        from ballplate.extensions.sweeps.report import sweep_page
 
-            page = sweep_page.sweep_page(store, None, document.trust.modules, None, unreported)
+        page = sweep_page.sweep_page(store, None, document.trust.modules, None, unreported)
     return {
         "headline": result.headline(),
         "axes": [list(paths) for paths in axes],

@@ -30,11 +30,15 @@ def document(tmp_path: Path) -> DesignDocument:
     return changed(opened(path), text.replace("[5, 5]", "[4, 4]"))
 
 
-def test_every_combination_is_what_run_says_of_it(document, tmp_path, monkeypatch):
-    steps = []
+@pytest.fixture
+def page_of_sweep(monkeypatch):
     monkeypatch.setattr(
         "ballplate.extensions.sweeps.report.sweep_page.sweep_page", lambda *_: "the page"
     )
+
+
+def test_every_combination_is_what_run_says_of_it(document, tmp_path, page_of_sweep):
+    steps = []
     axes = [
         {"paths": ["machine.repeatability"], "values": ["0.1 um", "0.4 um"]},
         {
@@ -66,15 +70,7 @@ def test_every_combination_is_what_run_says_of_it(document, tmp_path, monkeypatc
     assert found["page"] == "the page"
 
 
-@pytest.fixture
-def pageless(monkeypatch):
-    def fail(*_, **__):
-        raise ImportError("matplotlib")
-
-    monkeypatch.setattr("ballplate.extensions.sweeps.report.sweep_page.sweep_page", fail)
-
-
-def test_values_may_name_files_beside_the_design(document, pageless):
+def test_values_may_name_files_beside_the_design(document, page_of_sweep):
     axes = [
         {
             "paths": ["artefacts.plate"],
@@ -85,10 +81,10 @@ def test_values_may_name_files_beside_the_design(document, pageless):
     assert text != document.text
     found = swept(changed(document, text), {"axes": axes}, unreported)
     assert [cell["reason"] for cell in found["cells"]] == ["", ""], found
-    assert len({cell["average"] for cell in found["cells"]}) == 2 and found["page"] == ""
+    assert len({cell["average"] for cell in found["cells"]}) == 2 and found["page"] == "the page"
 
 
-def test_a_cell_that_fails_says_why(document, pageless):
+def test_a_cell_that_fails_says_why(document, page_of_sweep):
     axes = [{"paths": ["machine.repeatability"], "values": ["0.2 um", "2 furlongs"]}]
     good, bad = swept(document, {"axes": axes}, unreported)["cells"]
     assert good["reason"] == "" and "furlongs" in bad["reason"] and bad["average"] is None

@@ -122,20 +122,18 @@ function computation(job) {
     text ? [make("button", { type: "button", popovertarget: `text-${id}` }, "read it whole"),
       make("pre", { popover: "auto", id: `text-${id}` }, text),
       is_of_now(job) && make("pre", { tabindex: "0" }, text)] : null,
-    state === "done" && job.job === "sweep" ? cells(result, job.page) : null,
+    state === "done" && job.job === "sweep" ? cells(result) : null,
   );
 }
 
-function cells({ axes, cells: found }, has_page) {
+function cells({ axes, cells: found }) {
   // The last keys of paths, which tell enough where there is little room.
   const heads = axes.map((paths) => paths.map((path) => path.split(".").at(-1)).join(", "));
   const rows = found.map(({ values, reason, deficiency, average, maximum, within }) =>
     [...values, ...(reason ? [make("td", { colspan: "4" }, reason)]
       : [deficiency, micro(average), micro(maximum), share(within) || "no target"])]);
-  return [make("div", { class: "scrolled", tabindex: "0" }, make("table", {}, table(
-    [...heads, "rank deficiency", "U6 average µm", "U6 max. µm", "lengths within target"], rows))),
-  has_page ? null
-    : make("p", {}, "its page needs the extra report: python -m pip install 'ballplate[report]'")];
+  return make("div", { class: "scrolled", tabindex: "0" }, make("table", {}, table(
+    [...heads, "rank deficiency", "U6 average µm", "U6 max. µm", "lengths within target"], rows)));
 }
 
 // Paths of all values of a design, entries of lists by their names where they have any.
