@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -177,7 +178,7 @@ def test_a_part_in_common_is_that_covariance(
     values = lengths if kind == "distances" else coordinates
     at = values(of, np.zeros(of.parameters))
     constant = 1e-7 if "+" in str(part.get("common")) else 0.0
-    shared = constant * np.sign(at) + 0.5e-6 * at
+    shared = constant + 0.5e-6 * at
     own, share = 4e-14 * np.ones(len(at)), np.outer(shared, shared)
     if "correlation" in part:
         own, share = 0.1 * own, 0.9 * np.full((len(at), len(at)), 4e-14)
@@ -200,6 +201,75 @@ def test_a_wrong_part_in_common_is_refused(
 ) -> None:
     with pytest.raises(bp.ExperimentError, match=rf"calibration\[0\]\.{fault}:"):
         written(tmp_path, item)
+
+
+def test_a_constant_part_in_common_of_coordinates_has_no_step(tmp_path: Path) -> None:
+    """A frame moved by a nanometre, across or beside the balls' own axes, changes nothing."""
+    item = {"kind": "coordinates", "standard_uncertainty": "0.2 um", "common": "0.3 um"}
+
+    def average(offset: float) -> float:
+        balls = {
+            name: [f"{300 * j - 300 + offset} mm", f"{300 * i - 300 + offset} mm", f"{offset} mm"]
+            for i in range(3)
+            for j in range(3)
+            for name in [f"r{i + 1}c{j + 1}"]
+        }
+        plate = {"kind": "balls", "coordinates": balls}
+        run = bp.run(written(tmp_path, item, artefacts={"plate": plate}))
+        return run.quantities["U5"].average
+
+    at = average(0.0)
+    assert average(1e-6) == pytest.approx(at, rel=1e-6)
+    assert average(-1e-6) == pytest.approx(at, rel=1e-6)
+
+
+def equal_correlations(folder: Path, entry: str, one: str = "1") -> Experiment:
+    """All 36 distances of nine balls, correlated by the text of an entry."""
+    names = [f"{a} {b}" for k, a in enumerate(BALLS) for b in BALLS[k + 1 :]]
+    rows = [["correlation", *names]]
+    rows += [[a, *(one if a == b else entry for b in names)] for a in names]
+    (folder / "r.csv").write_text("\n".join(",".join(row) for row in rows), encoding="utf-8")
+    item = {"kind": "distances", "pairs": "all", "standard_uncertainty": "0.3 um"}
+    return written(folder, {**item, "covariance": "r.csv"})
+
+
+@pytest.mark.parametrize(("entry", "doubts"), [("0.9", 1), ("0.90", 0), ("0.9000", 0)])
+def test_digits_of_a_correlation_do_not_change_it(tmp_path: Path, entry: str, doubts: int) -> None:
+    stated = equal_correlations(tmp_path, entry)
+    item = {"kind": "distances", "pairs": "all", "standard_uncertainty": "0.3 um"}
+    expected = bp.run(written(tmp_path, {**item, "correlation": 0.9}))
+    found = bp.run(stated)
+    for symbol in QUANTITIES:
+        own, other = found.quantities[symbol], expected.quantities[symbol]
+        assert own.average == pytest.approx(other.average, rel=1e-9)
+    assert sum("give more digits" in doubt for doubt in stated.doubts) == doubts
+
+
+def test_a_matrix_that_rounding_made_indefinite_is_the_nearest_covariance(tmp_path: Path) -> None:
+    """Five values of two causes, to two decimals: near the matrix of all digits, and said."""
+    covariance = random_covariance(len(PAIRS), 4, rank=2)
+    size = np.sqrt(np.diag(covariance))
+    exact = covariance / np.outer(size, size)
+    rounded = exact.round(2)
+    assert np.linalg.eigvalsh(rounded)[0] < 0.0
+    names = [" ".join(pair) for pair in PAIRS]
+    file = covariance_file(tmp_path / "r.csv", names, rounded, "correlation")
+    text = re.sub(r"(\.\d)(?=[,\n])", r"\g<1>0", (tmp_path / file).read_text(encoding="utf-8"))
+    (tmp_path / file).write_text(text, encoding="utf-8")
+    stated = written(tmp_path, distances(covariance=file, standard_uncertainty="0.2 um"))
+    assert ["give more digits" in doubt for doubt in stated.doubts] == [True]
+    (root,) = lay_out(stated).of(JointValues).roots
+    used = (root.vectors * root.deviations**2) @ root.vectors.T
+    assert np.linalg.eigvalsh(used)[0] > 1e-3
+    assert np.abs(used - exact).max() < -2.0 * np.linalg.eigvalsh(rounded)[0] + 0.005
+
+
+def test_equal_values_to_few_digits_are_not_exactly_equal(tmp_path: Path) -> None:
+    """A correlation of 1.00 may be 0.995; of 1, it is 1."""
+    rounded, exact = equal_correlations(tmp_path, "1.00"), equal_correlations(tmp_path, "1")
+    ratio = bp.run(rounded).quantities["U5"].average / bp.run(exact).quantities["U5"].average
+    assert ratio > 1.0
+    assert rounded.doubts and not exact.doubts
 
 
 def test_a_negative_part_in_common_is_told_as_such(tmp_path: Path) -> None:

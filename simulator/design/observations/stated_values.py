@@ -56,7 +56,8 @@ class CommonPartSettings(CertificateSettings):
         None,
         description=(
             "standard uncertainty that all values have in common, beside that of each, such as"
-            " 0.5 um/m of one wavelength and one temperature; of co-ordinates it grows from 0"
+            " 0.5 um/m of one wavelength and one temperature; of co-ordinates, the constant part is"
+            " the same in all, the other proportional to each, with its sign"
         ),
     )
     correlation: Annotated[float, Field(ge=0, lt=1)] | None = Field(
@@ -214,6 +215,8 @@ def uncertainties_of(
             f"is no covariance: its correlations have {error}; correct it, or give more digits",
         )
         return None
+    if text := root.doubt:
+        problems.doubt(place, text)
     return Uncertainties(_frozen(size), root)
 
 
@@ -228,8 +231,8 @@ def _common(settings: Any, of_values: Array, lengths: Array) -> Array | None:
         return np.asarray(np.diag(own) + settings.correlation * np.outer(common, common))
     if settings.common is None:
         return None
-    # Co-ordinates on both sides of the origin move apart.
-    common = settings.common.at(np.abs(lengths)) * np.sign(lengths)
+    # One cause: of co-ordinates, it shifts all alike and stretches them about the origin.
+    common = settings.common.at(lengths)
     return np.asarray(np.diag(of_values**2) + np.outer(common, common))
 
 
@@ -307,6 +310,8 @@ def _of_file(
         text = 'missing; a correlation needs "standard_uncertainty", or uncertainties in values'
         problems.add((*steps, "standard_uncertainty"), text)
         return None
+    # A value's correlation with itself is 1, to whatever digits.
+    np.fill_diagonal(rounding, 0.0)
     return values * scale, rounding * scale, True
 
 

@@ -99,12 +99,14 @@ class CovarianceRoot:
     """Roots of a covariance matrix D V diag(s^2) V' D of m values: `own` (m,) is D, their standard
     uncertainties, `vectors` (m, m) the V, `deviations` (m,) the s.
 
-    Values that are exact have an eigenvector each of their own.
+    Values that are exact have an eigenvector each of their own. `doubt` says what the digits of
+    the stated matrix leave open, if that matters.
     """
 
     own: Array
     vectors: Array
     deviations: Array
+    doubt: str = ""
 
     def whitened(self, rows: Array) -> Array:
         """`rows` (m, ...) made uncorrelated and of unit variance: diag(1/s) V' D^-1 rows."""
@@ -133,11 +135,14 @@ class CovarianceRoot:
 def covariance_root(covariance: Array, rounding: Array | float = 0.0) -> CovarianceRoot:
     """Return the root of a covariance (m, m) whose entries are known to `rounding`.
 
-    The matrix may be singular: eigenvalues of the correlations below `SINGULAR`, or below the
-    resolution of the entries' digits, count as zero. Such a combination is exact to a millionth of
-    the standard uncertainties, or to the resolution of the digits.
+    The matrix is taken as stated. Eigenvalues of the correlations below `SINGULAR` are those of
+    combinations that are exact to a millionth of the standard uncertainties. If rounding of the
+    entries made an eigenvalue zero or negative, eigenvalues are at least as large as that one, and
+    as half a unit of the last digit: the nearest matrix without exact combinations that only the
+    digits make.
 
-    :raises IndefiniteError: an eigenvalue that is negative by more than rounding.
+    :raises IndefiniteError: an eigenvalue that is more negative than rounding of the entries can
+        make it (by at most their root sum of squares, Weyl's inequality).
 
     >>> root = covariance_root(np.array([[25.0, 16.0], [16.0, 25.0]]))
     >>> white = root.whitened(np.eye(2))
@@ -148,16 +153,28 @@ def covariance_root(covariance: Array, rounding: Array | float = 0.0) -> Covaria
     size = np.sqrt(np.diag(covariance))
     exact = size <= EXACT
     variances = np.where(exact, EXACT, size)
-    inner = ~exact
+    inner, doubt = ~exact, ""
     vectors, deviations = np.eye(len(variances)), np.ones(len(variances))
     if inner.any():
         scale = np.outer(variances[inner], variances[inner])
         correlation = covariance[np.ix_(inner, inner)] / scale
         values, eigenvectors = np.linalg.eigh((correlation + correlation.T) / 2.0)
         share = np.broadcast_to(rounding, covariance.shape)[np.ix_(inner, inner)] / scale
-        floor = max(SINGULAR, float(np.sqrt((share**2).sum())))
-        if values[0] < -floor * len(values):
+        least, size_of_rounding = float(values[0]), float(np.sqrt((share**2).sum()))
+        if least < -size_of_rounding - SINGULAR * len(values):
             raise IndefiniteError(float(values[0] / values[-1]))
+        raised = least <= SINGULAR
+        floor = max(SINGULAR, -least, float(share.max())) if raised else SINGULAR
+        # The expected norm of a symmetric matrix of such independent errors (Wigner).
+        change = 2.0 * size_of_rounding / np.sqrt(3.0 * len(values))
+        if least < change and change > SINGULAR:
+            doubt = (
+                f"its digits leave open whether some combinations of values are known better than"
+                f" stated: the smallest eigenvalue of the correlations is {least:.2g}, and rounding"
+                f" can change it by {change:.2g}; "
+                + (f"{floor:.2g} is used" if raised else "the entries are used as stated")
+                + "; give more digits"
+            )
         vectors[np.ix_(inner, inner)] = eigenvectors
         deviations[inner] = np.sqrt(np.maximum(values, floor))
-    return CovarianceRoot(variances, vectors, deviations)
+    return CovarianceRoot(variances, vectors, deviations, doubt)
