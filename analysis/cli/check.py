@@ -13,7 +13,7 @@ from ballplate.simulator.inputs.extensions import service
 
 from .common import add_file, add_formats, percentage
 from .interruption import signatures, written
-from .notes import note, tell_notes, warn
+from .notes import note, note_singular_values, tell_notes, warn
 from .outputs import UsageError
 
 if TYPE_CHECKING:
@@ -166,5 +166,6 @@ def _print(checked: CheckedFile, options: Namespace) -> None:
     elif options.format == "text":
         for design in checked.designs:
             print_lines(design.prediction.lines())
+            note_singular_values(options, design.prediction.verdict)
     if options.format in ("text", "json"):
         print_errors(checked.messages, options)

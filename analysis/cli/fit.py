@@ -26,7 +26,7 @@ from .common import (
     whole,
 )
 from .compare import add_pairs
-from .notes import warn
+from .notes import note_singular_values, warn
 from .outputs import UsageError, Writer, add_force, add_output, write
 from .reading_options import add_readings, observed_readings, warn_of
 
@@ -169,6 +169,8 @@ def run(options: Namespace) -> int:
     if options.output and options.output in contents and fitted.left_out:
         warn([left_out_words(fitted)])
     show(options, result)
+    if isinstance(result, Fit):
+        note_singular_values(options, result.verdict)
     return warn_of(result)
 
 

@@ -7,6 +7,10 @@ import time
 from argparse import ArgumentParser, Namespace
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from ballplate.rank import Verdict
 
 
 def add_telling(parser: ArgumentParser) -> None:
@@ -49,6 +53,14 @@ def tell_notes(notes: Iterable[object]) -> None:
     """Print detected settings, one line each."""
     for note in notes:
         complain(f"note: {note}")
+
+
+def note_singular_values(options: Namespace, verdict: Verdict) -> None:
+    """Print the singular values that decided a rank, if asked to be verbose."""
+    if options.verbose and len(verdict.singular_values):
+        from ballplate.results import singular_value_words
+
+        note(options, singular_value_words(verdict))
 
 
 @contextmanager

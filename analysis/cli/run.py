@@ -9,7 +9,7 @@ from ballplate.presentation.formatting import Data
 from ballplate.simulator.inputs.extensions import function, service
 
 from .common import add_file, add_json, add_page, add_workers, percentage, trial_count, whole
-from .notes import complain
+from .notes import complain, note_singular_values
 from .outputs import UsageError, add_force, write
 
 if TYPE_CHECKING:
@@ -84,6 +84,7 @@ def run(options: Namespace) -> int:
             _write_page(options, plans[-1])
         if not options.json:
             print_lines([*([""] if len(plans) > 1 else []), *plans[-1].lines()])
+            note_singular_values(options, plans[-1].verdict)
             if options.assumptions:
                 assumed = plans[-1].assumptions
                 none = ["assumptions: not evaluated; U6 is undetermined, zero or not computed"]

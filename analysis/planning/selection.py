@@ -239,7 +239,7 @@ def _dropped(campaign: Campaign) -> str:
     if not words:
         return ""
     more = [f"{len(words) - TOLD} reasons more"] if len(words) > TOLD else []
-    return f" (and not offered: {'; '.join([*words[:TOLD], *more])})"
+    return f" (and left out: {'; '.join([*words[:TOLD], *more])})"
 
 
 def _comparison(campaign: Campaign) -> list[str]:
@@ -251,7 +251,7 @@ def _comparison(campaign: Campaign) -> list[str]:
         words = campaign.drawn_words + ("" if campaign.drawn_is_within else " (more than allowed)")
         rows.append([words, *_value(campaign, campaign.drawn), *_spent(campaign.drawn_spent)])
     if campaign.target is not None:
-        words = "target (of u)" if campaign.criterion.endswith(MAXIMUM) else "mean target (of u)"
+        words = "target / k" if campaign.criterion.endswith(MAXIMUM) else "mean of target / k"
         rows.append([words, *_value(campaign, campaign.target), "", "", ""])
     return aligned(rows, [False, True, False, True, True, True])
 

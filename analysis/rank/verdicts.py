@@ -20,6 +20,7 @@ from ballplate.simulator.geometry.motions import without_rigid_motion
 from ballplate.simulator.inputs.extensions import optional_service
 from ballplate.simulator.inputs.quantities import Target
 from ballplate.simulator.inputs.settings import number_of
+from ballplate.simulator.machines import AXIS_ERRORS
 from ballplate.simulator.machines.protocol import Array, HasLines, Unit
 
 # Shares of a direction that move points by less than this fraction of its largest are not reported.
@@ -416,7 +417,10 @@ def _function_parts(
             form = " ".join(filter(None, (shape(t, values[k]), lines[k].words)))
         else:
             peak, form = float(a[members[0]]), ""
-        function_part = FunctionPart(name, parameter.meaning, peak, parameter.unit, form)
+        meaning = parameter.meaning
+        if form == "linear" and name in AXIS_ERRORS and AXIS_ERRORS[name].is_straightness:
+            meaning, form = AXIS_ERRORS[name].slope_meaning, ""
+        function_part = FunctionPart(name, meaning, peak, parameter.unit, form)
         parts.append((effect[members].max(), function_part))
     order = np.argsort(-comparable([size for size, _ in parts]), kind="stable")
     return tuple(parts[k][1] for k in order)
@@ -497,16 +501,19 @@ def deformation(places: Array, displacement: Array) -> str:
 
 
 def in_words(direction: Direction) -> str:
-    """Return a direction as a sentence: the changes that trade against each other, with sizes."""
+    """Return a direction as a sentence: the changes that trade against each other, with sizes; of
+    a weak one the largest.
+    """
     parts = []
+    is_null = np.isinf(direction.standard_deviation)
     if direction.functions:
-        described = [_function_words(part) for part in direction.functions[:8]]
+        described = [_function_words(part) for part in direction.functions[: 8 if is_null else 3]]
         more = len(direction.functions) - len(described)
         further = f" and {number_of(more, 'further error')}" if more > 0 else ""
         parts.append(", ".join(described) + further)
     for artefact in direction.artefacts:
         parts.append(f"{artefact.name} {artefact.words} (balls by up to {length(artefact.peak)})")
-    if direction.positions:
+    if direction.positions and (is_null or not direction.functions):
         parts.append(f"moved positions: {moved_positions(direction)}")
     if direction.probes:
         parts.append(
@@ -523,7 +530,7 @@ def in_words(direction: Direction) -> str:
                 f"{part.name} ({_amount(part.change, part.unit)})" for part in direction.influences
             )
         )
-    if np.isinf(direction.standard_deviation):
+    if is_null:
         end = (
             "change together without changing any observation"
             if len(parts) > 1

@@ -27,6 +27,12 @@ if TYPE_CHECKING:
     from .prediction import Prediction
     from .residuals import reading_residuals
     from .sigmas_by_campaign import campaign_sigmas, with_sigmas
-    from .text_blocks import scale_lines, scale_warnings, target_lines, verdict_lines
+    from .text_blocks import (
+        scale_lines,
+        scale_warnings,
+        singular_value_words,
+        target_lines,
+        verdict_lines,
+    )
 
 __getattr__, __dir__ = lazily(__name__, __file__)

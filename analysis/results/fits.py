@@ -144,7 +144,7 @@ class Fit(FitResult):
     def lines(self) -> list[str]:
         record = self.solution.iterations
         lengths = self.quantities.get("U6")
-        verdict = verdict_lines(self.verdict, True, lengths, self.unread)
+        verdict = verdict_lines(self.verdict, lengths, self.unread)
         lines = [self.heading, *verdict]
         origin = "estimated from the residuals" if self.sigma_is_estimated else "as given"
         summary = (
@@ -175,6 +175,12 @@ class Fit(FitResult):
             estimate for estimate in self.estimates if estimate.kind not in ("origin", "ball")
         ]
         lines += table_lines(ESTIMATE_COLUMNS, printed, "kind")
+        quoted = self.design.model.reported().names
+        if any(e.kind == "machine" and e.name not in quoted for e in printed):
+            lines.append(
+                "([1], [2], … are coefficients of the basis in which errors are estimated;"
+                f" U3 is of others, such as {quoted[-1]}, which --monomials lists)"
+            )
         lines.append(
             "(origins of positions and co-ordinates of balls are among the estimates of --json)"
         )

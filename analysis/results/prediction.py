@@ -124,7 +124,7 @@ class Prediction(Result):
 
     def table_lines(self) -> list[str]:
         """Title, verdict and table, without replicates."""
-        rank, *further = verdict_lines(self.verdict, with_values=True, lengths=self.lengths)
+        rank, *further = verdict_lines(self.verdict, lengths=self.lengths)
         lines = [self.heading, rank, *scale_warnings(self.scale), *further]
         lines += [] if self.quantities else target_lines(self.lengths)
         lines += [*map_lines(self.experiment), *scale_lines(self.scale)]

@@ -125,7 +125,6 @@ def task_data(tasks: Sequence[TaskUncertainty]) -> Data:
 
 def verdict_lines(
     judged: Verdict,
-    with_values: bool = False,
     lengths: Quantity | None = None,
     unread: Collection[str] = (),
 ) -> list[str]:
@@ -140,14 +139,6 @@ def verdict_lines(
         rank += ", as expected" if judged.as_expected else f", expected {expected}"
         rank += " (the file does not say otherwise)" if judged.expected is None else ""
     lines.append(f"{rank}; {judged.parameters} parameters, {judged.observations} observations")
-    values = judged.singular_values
-    if len(values) and with_values:
-        rank_of = len(values) - judged.deficiency
-        text = "no singular value is above rounding"
-        if rank_of:
-            largest, smallest = printable(values[0]), printable(values[rank_of - 1])
-            text = f"singular values {largest:.3g} to {smallest:.3g}{_border(judged)}"
-        lines.append(text + ", in standard deviations per micrometre")
     for title, directions in (("undetermined", judged.null), ("weakly determined", judged.weak)):
         listed = [
             (k, direction)
@@ -285,6 +276,17 @@ def scale_data(scale: Scale | None) -> Data | None:
             "U6_maximum": loose.maximum,
         },
     }
+
+
+def singular_value_words(judged: Verdict) -> str:
+    """Return the largest and smallest singular value that count, and those that follow."""
+    values = judged.singular_values
+    rank = len(values) - judged.deficiency
+    text = "no singular value is above rounding"
+    if rank:
+        largest, smallest = printable(values[0]), printable(values[rank - 1])
+        text = f"singular values {largest:.3g} to {smallest:.3g}{_border(judged)}"
+    return text + ", in standard deviations per micrometre"
 
 
 def _border(judged: Verdict) -> str:

@@ -71,7 +71,7 @@ class Candidates:
         """Add a candidate unless the same exists already."""
         key = _identity(candidate.item) if isinstance(candidate.item, Position) else candidate.name
         if key in self.seen and not candidate.drawn:
-            self.drop("the same as others")
+            self.drop("same place as another")
             return
         self.seen.setdefault(key, candidate.name)
         name, k = candidate.name, 1

@@ -68,6 +68,15 @@ class AxisError:
             word = "yaw" if component == "Z" else "pitch"
         return f"{word} of {axis} about {component}"
 
+    @property
+    def slope_meaning(self) -> str:
+        """Description of a straightness that grows in proportion to the axis.
+
+        >>> AXIS_ERRORS["EXZ"].slope_meaning
+        'squareness of Z to X'
+        """
+        return f"squareness of {TRANSLATIONS[self.axis]} to {TRANSLATIONS[self.component]}"
+
 
 @dataclass(frozen=True)
 class SquarenessError:

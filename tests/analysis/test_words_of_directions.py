@@ -5,12 +5,14 @@ from __future__ import annotations
 import re
 from itertools import product
 
+import ballplate as bp
 import numpy as np
 import pytest
 from ballplate.extensions.repair.placing import bars
 from ballplate.rank.verdicts import deformation, shape
 
 from tests.analysis import wording
+from tests.reference.small_quickstart import small_sections
 
 GRID = np.array([[0.1 * x, 0.15 * y, 0.0] for x in range(4) for y in range(3)])
 # Equal moments, so that a shear is half a turn and half a symmetric strain.
@@ -163,3 +165,20 @@ def in_words(words: str, d: int) -> np.ndarray:
         return np.cos(angle) * first + np.sin(angle) * second
     diagonal = np.array([float(one) for one in re.findall(r"-?\d+", words)])
     return diagonal / np.linalg.norm(diagonal)
+
+
+@pytest.mark.parametrize(
+    ("axis", "name", "meaning"),
+    [("z", "EXZ", "Z to X"), ("z", "EYZ", "Z to Y"), ("y", "EYZ", "Z to Y")],
+)
+def test_a_straightness_in_proportion_to_the_axis_is_a_squareness(
+    axis: str, name: str, meaning: str
+) -> None:
+    """Two positions in planes across an axis leave squarenesses undetermined."""
+    sections = small_sections()
+    sections["positions"] = [p for p in sections["positions"] if p["plane"] == axis]
+    sections["error_model"] |= {"position_coefficients": 2, "rotation_coefficients": 1}
+    verdict = bp.run(bp.experiment(sections)).verdict
+    words = [str(direction) for direction in verdict.null]
+    assert any(f"{name} (squareness of {meaning})" in line for line in words), words
+    assert not any("straightness" in line and "linear" in line for line in words)

@@ -125,3 +125,23 @@ def test_check_shows_how_far_it_has_come(
     assert re.search(r"[0-9]/[0-9] kinds of changes, [0-9:]+ so far, ", "".join(search[2]))
     assert told(capsys, "check", gauge, "-q")[2] == []
     assert told(capsys, "check", "designs/quickstart.yaml")[2] == []
+
+
+@pytest.mark.parametrize("command", ["check", "run"])
+def test_singular_values_are_printed_on_request(
+    capsys: pytest.CaptureFixture[str], command: str
+) -> None:
+    _, plain, quiet = told(capsys, command, QUICKSTART)
+    _, out, verbose = told(capsys, command, QUICKSTART, "-v")
+    assert plain == out and not any("singular" in line for line in [plain, *quiet])
+    assert sum(line.startswith("singular values 117 to 0.118,") for line in verbose) == 1
+
+
+def test_a_basis_that_is_not_that_of_u3_is_named(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    told(capsys, "simulate", QUICKSTART, "-o", tmp_path / "r.csv")
+    _, other, _ = told(capsys, "fit", QUICKSTART, tmp_path / "r.csv")
+    _, same, _ = told(capsys, "fit", QUICKSTART, tmp_path / "r.csv", "--monomials")
+    assert "EBZ[3]" in other and "coefficients of the basis" in other
+    assert "EBZ t^3" in same and "coefficients of the basis" not in same

@@ -116,7 +116,7 @@ def test_every_combination_is_there_but_what_is_drawn(tmp_path: Path) -> None:
         "gauge",
         "dear",
     ]
-    assert pool.dropped == {"the same as others": 1}
+    assert pool.dropped == {"same place as another": 1}
     assert [one.drawn for one in pool.candidates] == [True] + 10 * [False]
     assert [one.group for one in pool.candidates] == ["", *7 * ["some"], "bar", "gauge", "dear"]
     assert [one.plane for one in pool.candidates] == [*4 * "z", *4 * "x", "", "", ""]
@@ -235,7 +235,7 @@ def test_a_large_pool_loads_soon() -> None:
     (experiment,) = load(FOLDER / "plate-pool.yaml", planning=True)
     assert process_time() - began < 2.0
     assert experiment.pool is not None and len(experiment.pool.candidates) == 1260
-    assert experiment.pool.dropped == {"the same as others": 6}
+    assert experiment.pool.dropped == {"same place as another": 6}
 
 
 def test_out_of_volume_and_reach_and_edge_are_counted(tmp_path: Path) -> None:

@@ -91,7 +91,7 @@ def test_never_worse_than_drawn_at_the_same_cost(drawn: Path) -> None:
     assert found.target == pytest.approx(2e-6 + 0.33e-6 / 0.1 * 0.3, rel=0.5)
     # A choice whose average is below that of the target can miss it with many distances.
     tables = "\n".join(found.lines()).partition("chosen: ")[0]
-    mean, share = tables.partition("mean target (of u)")[2].split("\n", 1)
+    mean, share = tables.partition("mean of target / k")[2].split("\n", 1)
     assert float(mean.split()[0]) == pytest.approx(1e6 * found.target, rel=1e-3)
     assert f": {percent(found.prediction.lengths.within_target)} of 190 lengths" in share
 

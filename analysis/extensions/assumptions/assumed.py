@@ -6,9 +6,10 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
 from ballplate.simulator.design import Calibration
 from ballplate.simulator.experiment import Experiment
-from ballplate.simulator.inputs import LengthFunction, child, length_text, to_python
+from ballplate.simulator.inputs import LengthFunction, child, length_text, listing, to_python
 
 # Thermal expansion of steel, which most plates and scales are compared with.
 STEEL = "11.5 um/m/K"
@@ -171,12 +172,21 @@ def _temperature(experiment: Experiment, stated: Mapping[str, Any]) -> Predictio
 
 
 def _sag(experiment: Experiment, stated: Mapping[str, Any]) -> PredictionAssumption | None:
-    u = stated.get("sag", "0.3 um")
     plates = [name for name, entry in experiment.artefacts.items() if entry.role == "plate"]
-    added = [{"kind": "sag", "artefact": name, "standard_uncertainty": u} for name in plates]
-    source = "a steel plate of half a metre on three supports"
-    words = ("sag", "rigid plates", f"largest sag known to {u}", source)
+    u = {name: stated.get("sag") or _usual_sag(experiment, name) for name in plates}
+    added = [{"kind": "sag", "artefact": name, "standard_uncertainty": u[name]} for name in plates]
+    source = "0.3 µm of a steel plate of half a metre on three supports, with the square of size"
+    sags = listing(dict.fromkeys(u.values()))
+    words = ("sag", "rigid plates", f"largest sag known to {sags}", source)
     return _unless_stated(experiment, words, *added)
+
+
+def _usual_sag(experiment: Experiment, plate: str) -> str:
+    """Return the sag of a plate as thick in proportion as one of half a metre that sags by 0.3 µm:
+    it grows with the square of size.
+    """
+    longest = float(np.ptp(experiment.layouts[plate].coordinates, axis=0).max())
+    return length_text(float(f"{0.3e-6 * (longest / 0.5) ** 2:.2g}"))
 
 
 def _drift(experiment: Experiment, stated: Mapping[str, Any]) -> PredictionAssumption | None:

@@ -95,7 +95,7 @@ class Assumptions(Result):
 
     def _table(self, effects: Sequence[AssumptionEffect]) -> list[str]:
         rows = [["assumed", "U6 in µm if instead", "average", "maximum", "times"]]
-        rows.append(["all of these", "", *_micrometres(self.average, self.maximum), "1"])
+        rows.append(["as the file states", "", *_micrometres(self.average, self.maximum), "1"])
         for effect in effects:
             assumption = effect.assumption
             values = _micrometres(effect.average, effect.maximum)

@@ -35,7 +35,11 @@ class AssumptionsSettings(Settings):
         ),
     )
     sag: PositiveLength | None = Field(
-        None, description="standard uncertainty of a plate's largest sag; default 0.3 um"
+        None,
+        description=(
+            "standard uncertainty of a plate's largest sag; default 0.3 um of a plate of 0.5 m,"
+            " with the square of its size"
+        ),
     )
     drift: LengthDrift | None = Field(
         None, description="standard uncertainty of the drift along each axis; default 0.3 um/h"

@@ -112,13 +112,10 @@ class ComparedModels(FitResult):
                 ),
             ]
         if self.beaten.count:
-            count, least = self.beaten.count, chance_words(self.beaten.least)
-            some, does = ("the one larger model", "does not explain")
-            if count > 1:
-                some, does = f"the {count} larger models", "do not explain"
             why = (
-                f"{some} that this design determines {does} significantly more; smallest p-value"
-                f" {least}, of {self.beaten.by}"
+                "no larger model is significantly better (p ="
+                f" {chance_words(self.beaten.chance)} after allowing for the number of models,"
+                f" {self.beaten.count}; of {self.beaten.by})"
             )
         else:
             why = "it is the largest that this design determines"

@@ -303,7 +303,7 @@ def _assumptions(run: QuotedData) -> Html:
     if "assumptions" not in run:
         return Html()
     table_of = run.at("assumptions")
-    rows = [["all of these", "", table_of.micro("average"), table_of.micro("maximum"), ""]]
+    rows = [["as the file states", "", table_of.micro("average"), table_of.micro("maximum"), ""]]
     for effect in table_of.at("assumptions").each():
         values = [
             effect.micro("average"),

@@ -44,7 +44,7 @@ def pool_of(experiment: Experiment) -> Data:
         "count": len(places),
         "words": "No candidates yet: fill the volume. " * (not places)
         + f"{len(places)} candidates besides the positions"
-        + "; not offered: " * bool(dropped)
+        + "; left out: " * bool(dropped)
         + ", ".join(f"{number} {reason}" for reason, number in dropped.items()),
         "outlines": list(outlines)[:MOST_OUTLINES],
         "boxes": [] if pool is None else np.clip(pool.forbidden, lower, upper),

@@ -320,3 +320,14 @@ def test_the_page_has_all_rows() -> None:
         assert f">{effect.assumption.assumed}<" in page
         path = f'value="{effect.average!r}" data-path="/run/assumptions/assumptions/{k}/average"'
         assert path in page
+
+
+@pytest.mark.parametrize(("side", "sag"), [("250 mm", "0.075 um"), ("1 m", "1.2 um")])
+def test_the_usual_sag_grows_with_the_square_of_the_plate(side: str, sag: str) -> None:
+    plate = {"kind": "grid", "balls": [3, 3], "size": [side, "200 mm"]}
+    experiment = bp.experiment(
+        small_sections(artefacts={"plate": plate}, machine={"volume": ["2 m"] * 3})
+        | {"machine": {"volume": ["2 m"] * 3, "repeatability": "0.2 um"}}
+    )
+    (added,) = by_name(bp.assumptions(experiment))["sag"].assumption.changes["influences"]
+    assert added["standard_uncertainty"] == sag

@@ -53,7 +53,7 @@ def test_a_pool_that_fills_the_volume_is_a_group_for_each_plane(document):
     assert pool is not None and "outside the volume" not in pool.dropped
     # Of 3 levels, 3 x 3 places and 2 turns in each plane, some are positions of the file.
     offered = [one for one in pool.candidates if not one.drawn]
-    assert len(offered) + pool.dropped.get("the same as others", 0) == 3 * 3 * 9 * 2
+    assert len(offered) + pool.dropped.get("same place as another", 0) == 3 * 3 * 9 * 2
     # Again with other planes: the groups are replaced.
     again = done(filled, FILL | {"probes": {"z": ["down"]}, "quarter_turns": [0], "count": 2})
     assert again.text.count("planes:") == 1 and "count: 2" in again.text

@@ -172,7 +172,7 @@ function assumed(found) {
     make("strong", {}, one.assumed), `, instead ${one.instead} `, stating(one)), one));
   fill($("assumptions").lastElementChild, table(
     ["U6 in µm without what is assumed", "average", "max.", "times"],
-    [row("all of these", { ...found, ratio: 1 }), ...rows]));
+    [row("as the file states", { ...found, ratio: 1 }), ...rows]));
 }
 
 export const UNITS = { m: "µm", rad: "µrad", 1: "ppm" };
