@@ -69,7 +69,7 @@ class Reservation(Settings):
 
 
 class OneSided(Settings):
-    """A quantity whose published values are all on one side of ballplate's, without explanation."""
+    """A quantity whose published values are all on one side of ballplate's."""
 
     quantity: str
     statistic: Statistic

@@ -310,7 +310,7 @@ def _progress(compared: ComparedProgress) -> list[Block]:
             _figure(line.published),
             _figure(line.ours),
             _wanted_of(line),
-            yes(line.agrees),
+            "-" if line.rule == "shown" else yes(line.agrees),
         )
         for line in compared.lines
     ]
@@ -330,7 +330,7 @@ def _verdict(compared: ComparedProgress) -> str:
 
 def _wanted_of(line: ProgressLine) -> str:
     if line.rule == "shown":
-        return "anything"
+        return "not compared"
     return (
         f"at most {line.limit:g} times"
         if line.rule == "most"
@@ -455,7 +455,7 @@ def _summary(reproduction: Reproduction) -> list[Block]:
         parts.append(("open differences, unexplained", f"{unexplained} values"))
     parts += [
         (
-            f"{side.stated.statistic} {side.stated.quantity} above computed, unexplained",
+            f"{side.stated.statistic} {side.stated.quantity} above computed",
             f"{side.above} of {len(side.ratios)}",
         )
         for side in reproduction.sides

@@ -78,7 +78,7 @@ def test_text_of_one_experiment(capsys: pytest.CaptureFixture[str]) -> None:
     assert "Erratum in Table 11" in out and "Open differences" in out
     assert re.search(
         r"printed average U4 is above the computed one in all 2 columns: after the common factor by"
-        r" 1\.0\d\d to 1\.0\d\d\. The draw of evaluation points does not explain it",
+        r" 1\.0\d\d to 1\.0\d\d\. The report's points of section 6\.2 were few or not uniform",
         out,
     )
     tables = [line for line in out.splitlines() if "  " in line]
