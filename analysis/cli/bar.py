@@ -8,8 +8,17 @@ from threading import RLock
 from ballplate.simulator.computing.steps import ProgressStep
 from tqdm import tqdm
 
-# What is told beside the bar, and in lines without one.
-FORM = "{n_fmt}/{total_fmt} {desc}, {elapsed} so far, {remaining} left{postfix}"
+# Columns below which progress is text alone.
+LEAST_WIDTH_OF_BAR = 100
+
+
+def _form(step: ProgressStep, columns: int | None = None) -> str:
+    """Return tqdm's format of a step, for a terminal of some `columns` or for lines."""
+    left = "{remaining} left" if step.is_last else "{remaining} left of this step"
+    if columns is not None and columns < LEAST_WIDTH_OF_BAR:
+        return "{n_fmt}/{total_fmt} {desc}, " + left + "{postfix}"
+    text = "{n_fmt}/{total_fmt} {desc}, {elapsed} so far, " + left + "{postfix}"
+    return text if columns is None else "|{bar}| " + text
 
 
 class Bar(tqdm):
@@ -20,18 +29,17 @@ class Bar(tqdm):
     monitor_interval = 0
     _lock = RLock()
 
-    def __init__(self, purpose: str, total: int, before: int) -> None:
-        form = "|{bar}| " + FORM
+    def __init__(self, step: ProgressStep) -> None:
         # Sizes are given, as tqdm draws nothing on a terminal that does not know its own.
         super().__init__(
-            desc=purpose,
-            total=total,
-            initial=before,
+            desc=step.what,
+            total=step.wanted,
+            initial=step.before,
             miniters=1,
             leave=False,
             ncols=width(),
             nrows=2,
-            bar_format=form,
+            bar_format=_form(step, width()),
         )
 
 
@@ -52,6 +60,6 @@ def line(step: ProgressStep, elapsed: float) -> str:
         elapsed,
         prefix=step.what,
         initial=step.before,
-        bar_format=FORM,
+        bar_format=_form(step),
         postfix=step.remark or None,
     )

@@ -54,7 +54,7 @@ class ProgressDisplay:
         from ballplate.cli.bar import Bar, width
 
         if self.bar is None:
-            self.bar = Bar(step.what, step.wanted, step.before)
+            self.bar = Bar(step)
         self.bar.total, self.bar.ncols = step.wanted, width()
         self.bar.set_postfix_str(step.remark, refresh=False)
         self.bar.update(step.done - self.bar.n)

@@ -165,8 +165,12 @@ def _campaign(
     candidates, standing = offered.candidates, offered.standing
     whole, completed_by = offered.weighed
     steady = without_drift(experiment)
+
+    def report_earlier(step: ProgressStep) -> None:
+        report(replace(step, is_last=False))
+
     information = pool_information(
-        steady, whole, is_about_balls(request.criterion), completed_by, report
+        steady, whole, is_about_balls(request.criterion), completed_by, report_earlier
     )
     gap = None
     gap_of = optional_service("pool_gap") if information.deficiency else None
@@ -197,7 +201,7 @@ def _campaign(
     _refuse_impossible(experiment, limits, candidates)
     problem = SelectionProblem(information, wanted, limits)
 
-    best, relaxed = _search(problem, drawn, request.seed, workers, report)
+    best, relaxed = _search(problem, drawn, request.seed, workers, report_earlier)
     if relaxed is not None:
         relaxed.check(request.criterion, best.value)
     _refuse_lacking(experiment, problem, best, begun)
@@ -243,7 +247,7 @@ def _campaign(
         + (", with what is kept" if set(reference) - set(drawn) else ""),
         limits.spent(reference) if drawn else None,
         wanted.target,
-        _gains(problem, best, candidates, report),
+        _gains(problem, best, candidates, report_earlier if request.curve else report),
         _left_out(unlimited, best, candidates),
         predict(replace(timed, expected_rank_deficiency=expected or None), with_scale=True),
         tuple(_curve(problem, best, candidates, workers, report)) if request.curve else (),
@@ -480,7 +484,7 @@ def _best_words(problem: SelectionProblem, selections: Sequence[Found]) -> str:
         return "none determines everything yet"
     spent = problem.constraints.spent(best.chosen)
     value = f"{1e6 * best.value:.4g} µm" if criterion.unit == "m" else f"{best.value:.4g}"
-    return f"best so far {criterion.name} {value} with {spent.budget}"
+    return f"best {criterion.name} {value}, {spent.budget}"
 
 
 @single_threaded

@@ -10,6 +10,7 @@ import sys
 import threading
 import time
 from argparse import Namespace
+from dataclasses import replace
 from pathlib import Path
 
 import ballplate as bp
@@ -208,6 +209,22 @@ def test_the_bar_fits_the_terminal(width: int, monkeypatch: pytest.MonkeyPatch) 
     assert "\x1b" not in terminal.text
 
 
+def test_eighty_columns_hold_all_that_is_known_of_a_step(monkeypatch: pytest.MonkeyPatch) -> None:
+    terminal = Terminal()
+    monkeypatch.setattr(sys, "stderr", terminal)
+    monkeypatch.setenv("COLUMNS", "80")
+    step = ProgressStep("starts of the search", 3, 30, "best U6 0.3155 µm, 4.025 h", is_last=False)
+    with progress(Namespace(quiet=False, verbose=False)) as shown:
+        shown.show(replace(step, done=0))
+        assert shown.bar is not None
+        shown.bar.start_t -= 20
+        shown.show(step)
+        shown.bar.refresh()
+        drawn = terminal.lines[-1].strip()
+    assert drawn.startswith("3/30 starts of the search, ") and drawn.endswith("4.025 h")
+    assert "left of this step" in drawn
+
+
 def test_each_step_has_a_bar_of_its_own(monkeypatch: pytest.MonkeyPatch) -> None:
     terminal = Terminal()
     monkeypatch.setattr(sys, "stderr", terminal)
@@ -253,4 +270,7 @@ def test_every_step_of_a_plan_tells_how_much_there_is(tmp_path: Path) -> None:
     assert {"candidates", "gains", "budgets of the curve"} < set(steps)
     for what, reports in steps.items():
         wanted = reports[-1].wanted
-        assert reports == [ProgressStep(what, done, wanted) for done in range(wanted + 1)]
+        is_last = what == "budgets of the curve"
+        assert reports == [
+            ProgressStep(what, done, wanted, is_last=is_last) for done in range(wanted + 1)
+        ]

@@ -57,7 +57,7 @@ def test_a_pool_is_filled_limited_and_planned_from(page):
     # Stopped, the plan is the best so far; applied, it is one step.
     fields(page, "#hours", "8")
     page.click("#plan")
-    page.wait_for_selector("#jobs .step >> text=best so far", timeout=200_000)
+    page.wait_for_selector("#jobs .step >> text=best U6", timeout=200_000)
     page.click("#jobs button >> text=stop")
     page.wait_for_selector("#suggestions li >> text=the plan", timeout=200_000)
     filled = page.evaluate("window.studio.state().text")

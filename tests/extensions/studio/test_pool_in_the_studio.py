@@ -169,7 +169,7 @@ def test_a_plan_that_is_stopped_has_the_best_choice_so_far(document):
     try:
         number = session.start("plan", {"hours": 8})
         end = time.monotonic() + 120
-        while "best so far U6" not in (job := session.jobs()[0])["step"]:
+        while "best U6" not in (job := session.jobs()[0])["step"]:
             assert job["state"] == "running" and time.monotonic() < end, job
             time.sleep(0.05)
         assert "positions" in job["step"]
