@@ -51,7 +51,14 @@ class LengthGroups:
         """Shares of lengths within the target (g,), undetermined ones counted as not; NaN of an
         empty group.
         """
-        within = self.within_expanded if expanded else self.within
+        return self._share(self.within_expanded if expanded else self.within)
+
+    @property
+    def missed(self) -> Array:
+        """Shares of lengths that miss the target (g,), by the uncertainty that it applies to."""
+        return 1.0 - self._share(self.within_target)
+
+    def _share(self, within: Integers) -> Array:
         return np.where(self.count > 0, within / np.maximum(self.count, 1), np.nan)
 
 

@@ -220,5 +220,6 @@ def _group_data(heads: list[dict[str, Any]], groups: LengthGroups) -> list[Data]
         **picked(groups, "undetermined", "average", "maximum", "average_ratio", "maximum_ratio"),
         share_within=groups.share(),
         share_expanded_within=groups.share(True),
+        share_missed=groups.missed,
     )
     return [head | row for head, row in zip(heads, rows, strict=True)]

@@ -6,21 +6,21 @@ import numpy as np
 
 from .charts import Chart, Trace, chart_svg, figure, figures, legend
 from .elements import Html, element, joined, note, table
-from .level_maps import MapPoint, level_map
+from .level_maps import MISSED, MapPoint, even_bounds, level_legend, level_map
 from .quoted import QuotedData
 
 
 def lengths_section(lengths: QuotedData, target: str) -> Html:
-    """Section with maps of the largest uncertainty of lengths from each point, by level, and by
-    length; relative to the `target`, if there is one.
+    """Section with maps of the share of lengths from each point that miss the `target`, by level,
+    or of their largest uncertainty without one, and uncertainties by length.
     """
     data = lengths.data
     k = data["target_coverage_factor"] if target else data["coverage_factor"]
     points = np.array([point["point"] for point in data["by_point"]])
     levels = np.unique(points[:, 2]) if points.shape[1] == 3 else np.zeros(1)
     u = "u" if k == 1.0 else f"{k:g} u"
-    title = f"Largest ratio of {u} to the target" if target else f"Largest {k:g} u, µm,"
-    maps = []
+    title = f"Share, %, with {u} above the target," if target else f"Largest {u}, µm,"
+    bounds, maps = _bounds(lengths, k, bool(target)), []
     for level in levels.tolist():
         chosen = (
             np.flatnonzero(points[:, 2] == level)
@@ -29,7 +29,9 @@ def lengths_section(lengths: QuotedData, target: str) -> Html:
         )
         level_words = f", z = {1e3 * level:.6g} mm" if points.shape[1] == 3 else ""
         words = f"{title} of the lengths from each point{level_words}"
-        maps.append(figure(f"{words}.", _map(lengths, chosen.tolist(), k, bool(target), words)))
+        points_of_level = _points(lengths, chosen.tolist(), k, bool(target))
+        drawn = level_map(points_of_level, bounds, words, 2 if target else 3)
+        maps.append(figure(f"{words}.", drawn))
     whole = lengths.at("all")
     is_open = whole.data["undetermined"] == whole.data["lengths"]
     head = [
@@ -53,43 +55,46 @@ def lengths_section(lengths: QuotedData, target: str) -> Html:
         ]
     if is_open:
         return element("p", *head, ".")
-    meaning = "Darker is larger."
-    if target:
-        meaning = "Up to 1 (blue) the target is met, above 1 (orange) it is missed; in either"
-        meaning += " colour darker is larger."
-    legends = note(f"{meaning} Some lengths from points with – are undetermined.")
     return joined(
         [
             element("p", *head, "."),
             figures(*maps),
-            legends,
+            level_legend(bounds, lambda bound: f"{bound:.3g} {'%' if target else 'µm'}"),
+            note("Some lengths from points with – are undetermined.")
+            if whole.data["undetermined"]
+            else "",
             _by_length(lengths, target),
             _by_direction(lengths, bool(target)),
         ]
     )
 
 
-def _map(lengths: QuotedData, chosen: list[int], k: float, of_target: bool, words: str) -> Html:
-    """Return the map of a level, with a value per point."""
-    name, factor = ("maximum_ratio", k) if of_target else ("maximum", 1e6 * k)
-    by_point = lengths.data["by_point"]
-    finite = [factor * point[name] for point in by_point if point[name] is not None]
+def _bounds(lengths: QuotedData, k: float, of_target: bool) -> tuple[float, ...]:
+    """Return the bounds of the maps' bands, the same at all levels."""
+    if of_target:
+        return tuple(100.0 * share for share in MISSED)
+    values = [point["maximum"] for point in lengths.data["by_point"] if point["maximum"]]
+    return even_bounds(1e6 * k * min(values), 1e6 * k * max(values)) if values else (0.0,)
+
+
+def _points(lengths: QuotedData, chosen: list[int], k: float, of_target: bool) -> list[MapPoint]:
+    """Return the points of a level with their values."""
+    name, factor = ("share_missed", 100.0) if of_target else ("maximum", 1e6 * k)
     points = []
     for i in chosen:
-        x, y = by_point[i]["point"][:2]
+        point = lengths.data["by_point"][i]
+        x, y = point["point"][:2]
         # What is known of some of its lengths would hide that others are unknown.
-        value = None if by_point[i]["undetermined"] else by_point[i][name]
-        if value is None:
+        if point["undetermined"] or point[name] is None:
             points.append(MapPoint(x, y, None))
             continue
         attributes = {
             "data_path": lengths.at("by_point", i, name).path,
-            "data_value": repr(value),
+            "data_value": repr(point[name]),
             "data_factor": repr(factor),
         }
-        points.append(MapPoint(x, y, factor * value, attributes))
-    ends = (min(finite), max(finite)) if finite else (0.0, 1.0)
-    return level_map(points, ends, words, 1.0 if of_target else np.inf)
+        points.append(MapPoint(x, y, factor * point[name], attributes))
+    return points
 
 
 def _by_length(lengths: QuotedData, target: str) -> Html:

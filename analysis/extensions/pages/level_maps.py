@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -10,7 +10,9 @@ from ballplate.presentation import number
 
 from .elements import Html, element, joined
 
-SHADES = 8
+# Upper bounds of the bands of a map of shares of lengths that miss their target; the first holds
+# those that miss none. The studio draws the same.
+MISSED = (0.0, 0.05, 0.1, 0.25, 0.5, 0.75)
 # Of a map: width of a cell, its height, and the room around.
 CELL, ROW, LEFT, BELOW, ABOVE = 46.0, 26.0, 46.0, 32.0, 18.0
 
@@ -28,10 +30,10 @@ class MapPoint:
 
 
 def level_map(
-    points: Iterable[MapPoint], ends: tuple[float, float], words: str, limit: float = np.inf
+    points: Iterable[MapPoint], bounds: Sequence[float], words: str, digits: int = 3
 ) -> Html:
-    """Return the map of points on a grid, shaded between the `ends` of all levels; above a limit
-    in another colour.
+    """Return the map of points on a grid, shaded by bands with these upper bounds, the last band
+    without one.
     """
     points = list(points)
     x, y = np.unique([point.x for point in points]), np.unique([point.y for point in points])
@@ -39,7 +41,7 @@ def level_map(
     for point in points:
         column, row = np.searchsorted(x, point.x), len(y) - 1 - np.searchsorted(y, point.y)
         left_edge, top = LEFT + CELL * column, ABOVE + ROW * row
-        kind = "open" if point.value is None else _shade(point.value, *ends, limit)
+        kind = "open" if point.value is None else f"band-{_band(point.value, bounds)}"
         parts.append(
             Html(
                 f'<rect class="{kind}" x="{left_edge:g}" y="{top:g}" width="{CELL:g}"'
@@ -49,8 +51,8 @@ def level_map(
         parts.append(
             element(
                 "text",
-                "–" if point.value is None else number(point.value, 3),
-                class_=None if point.value is None else "place",
+                "–" if point.value is None else number(point.value, digits),
+                class_=None if point.value is None else f"place on-{kind}",
                 x=f"{left_edge + CELL / 2:g}",
                 y=f"{top + ROW / 2 + 3.5:g}",
                 text_anchor="middle",
@@ -76,18 +78,34 @@ def level_map(
     )
 
 
-def _shade(value: float, low: float, high: float, limit: float) -> str:
-    """A step of colour among values from `low` to `high`; above a limit, one of another colour.
+def even_bounds(low: float, high: float) -> tuple[float, ...]:
+    """Return the upper bounds of equal bands between two ends, the last one left out.
 
-    >>> [_shade(value, 0.2, 3.0, 1.0) for value in (0.2, 1.0, 1.1, 3.0)]
-    ['heat-0', 'heat-7', 'over-0', 'over-7']
+    >>> even_bounds(0.0, 7.0)
+    (1.0, 2.0, 3.0, 4.0, 5.0, 6.0)
     """
-    is_over = value > limit
-    first, last = (max(low, limit), high) if is_over else (low, min(high, limit))
-    # Equal values but for rounding have no order to show.
-    share = (value - first) / (last - first) if last - first > 1e-9 * last else 0.0
-    name = "over" if is_over else "heat"
-    return f"{name}-{min(int(SHADES * (share + 1e-9)), SHADES - 1)}"
+    return tuple(np.linspace(low, high, len(MISSED) + 2)[1:-1].tolist())
+
+
+def level_legend(bounds: Sequence[float], shown: Callable[[float], str]) -> Html:
+    """Return the legend of a map, made of the bounds of its bands as `shown`."""
+    texts = [shown(bound) for bound in bounds]
+    words = [f"up to {text}" for text in texts] + [f"more than {texts[-1]}"]
+    words[0] = texts[0] if bounds[0] == 0.0 else words[0]
+    items = [
+        element("li", element("span", class_=f"swatch band-{k}", aria_hidden="true"), text)
+        for k, text in enumerate(words)
+    ]
+    return element("ul", *items, class_="legend bands")
+
+
+def _band(value: float, bounds: Sequence[float]) -> int:
+    """Return the band of a value; one on a bound, but for rounding, is below it.
+
+    >>> [_band(share, MISSED) for share in (0.0, 0.01, 0.1, 0.9)]
+    [0, 1, 2, 6]
+    """
+    return int(np.searchsorted(bounds, value * (1.0 - 1e-9)))
 
 
 def _label(x: float, y: float, text: str, anchor: str) -> Html:

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 from ballplate.extensions.maps.length_map import length_map, length_settings
+from ballplate.extensions.pages.level_maps import MISSED
 from ballplate.extensions.pages.motions import (
     moved_balls,
     moved_points,
@@ -201,18 +202,23 @@ def motions(linearisation: Linearisation, target: Target | None, index: int) -> 
 
 
 def _length_map(experiment: Experiment, linearisation: Linearisation) -> Data:
-    """Return the largest uncertainty of the lengths from each point of a grid, as a ratio to the
-    target, or in metres without one; None if one of them is undetermined.
+    """Return the share of the lengths from each point of a grid that miss the target, or their
+    largest uncertainty in metres without one; None if one of them is undetermined.
     """
     counts = (LENGTH_NODES, LENGTH_NODES, len(LEVELS))[: experiment.dimension]
     target = target_in_words(experiment)
     settings = length_settings(experiment, target or NO_TARGET, counts)
     lengths = length_map(experiment, settings, at=linearisation)
     groups = lengths.by_point
-    values = settings.target_factor * groups.maximum_ratio if target else groups.maximum
+    values = groups.missed if target else groups.maximum
     values = np.where(groups.undetermined > 0, np.nan, values)
     of_levels = values.reshape(LENGTH_NODES, LENGTH_NODES, -1).T
-    scale = {"largest": float(np.nanmax(values, initial=0.0)), "unit": "target" if target else "m"}
+    ratios = settings.target_factor * groups.maximum_ratio
+    scale = {
+        "unit": "missed" if target else "m",
+        "bounds": MISSED,
+        "largest": float(np.nanmax(ratios, initial=0.0)),
+    }
     mapped = in_slices(linearisation.design, of_levels)
     return {**picked(mapped, "x", "y", "slices"), "scale": scale}
 

@@ -138,40 +138,36 @@ def test_every_figure_of_a_designs_page_is_that_of_the_json(variant: str) -> Non
 
 
 @pytest.mark.parametrize("met", ["some", "all", "none"])
-def test_ratios_have_steps_of_colour_on_either_side_of_the_target(met: str) -> None:
-    """Eight equal parts of what is met, from the smallest ratio on, and eight of what is missed, up
-    to the largest.
+def test_the_map_has_bands_of_the_share_of_lengths_that_miss_the_target(met: str) -> None:
+    """Colours and legend are those of the same bounds, whatever is missed; the first band holds
+    the points whose lengths all meet the target.
     """
     experiment = small()
     points = bp.lengths(experiment, "1 um", 5).to_dict()["by_point"]
-    ratios = np.array([one["maximum_ratio"] for one in points])
+    largest = np.array([one["maximum_ratio"] for one in points])
     limit = {
-        "some": 1.001 * np.quantile(ratios, 0.6),
-        "all": 2 * ratios.max(),
-        "none": ratios.min() / 2,
+        "some": np.quantile(largest, 0.3),
+        "all": 2 * largest.max(),
+        "none": min(one["average_ratio"] for one in points) / 20,
     }
     target = {"target_uncertainty": f"{limit[met]:.6g} um", "coverage_factor": 1}
     changed = experiment.with_(**target)
     page = page_of_design(changed, bp.run(changed))
-    places = r'<rect class="(\w+)-(\d)"[^>]*/><text class="place"[^>]*data-value="([^"]+)"'
+    places = (
+        r'<rect class="band-(\d)"[^>]*/><text class="place on-band-\1"[^>]*data-value="([^"]+)"'
+    )
     found = re.findall(places, page)
-    shown = np.array([float(value) for _, _, value in found])
-    assert len(found) == len(points) and wording.IN_EITHER_COLOUR_DARKER_IS_LARGER in page
-    assert {name for name, _, _ in found} == {
-        "some": {"heat", "over"},
-        "all": {"heat"},
-        "none": {"over"},
-    }[met]
-    for kind, low, high in (
-        ("heat", shown.min(), min(shown.max(), 1.0)),
-        ("over", max(shown.min(), 1.0), shown.max()),
-    ):
-        chosen = np.array([name == kind for name, _, _ in found])
-        assert (chosen == ((shown > 1.0) == (kind == "over"))).all()
-        steps = np.array([int(step) for _, step, _ in found])[chosen]
-        edges = np.linspace(low, high, 9)[1:-1]
-        assert steps.tolist() == np.searchsorted(edges, shown[chosen], side="right").tolist()
-        assert len(set(steps.tolist())) > 2 or not chosen.any()
+    bands = np.array([int(band) for band, _ in found])
+    shares = np.array([float(value) for _, value in found])
+    assert len(found) > 20
+    below = np.array([-1.0, 0.0, 0.05, 0.1, 0.25, 0.5, 0.75])
+    above = np.array([0.0, 0.05, 0.1, 0.25, 0.5, 0.75, 1.0])
+    assert ((below[bands] < shares) & (shares <= above[bands])).all()
+    assert {"all": set(bands) == {0}, "none": set(bands) == {6}, "some": len(set(bands)) > 2}[met]
+    (legend,) = re.findall(r'<ul class="legend bands">(.*?)</ul>', page)
+    entries = re.findall(r'<span class="swatch band-(\d)"[^>]*></span>([^<]*)', legend)
+    texts = ["0 %", *(f"up to {k} %" for k in (5, 10, 25, 50, 75)), "more than 75 %"]
+    assert entries == [(str(k), text) for k, text in enumerate(texts)]
 
 
 def test_what_a_person_wrote_is_escaped(tmp_path: Path) -> None:

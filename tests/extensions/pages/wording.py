@@ -3,7 +3,6 @@
 APPLY_TO_SWEEPS_ONLY = "apply to sweeps only"
 BY_THE_FULL_ESTIMATOR_AND_REVERSAL = "by the full estimator and reversal only"
 CAMPAIGN_OF_QUICKSTART = "<Campaign of quickstart: 7 of "
-IN_EITHER_COLOUR_DARKER_IS_LARGER = "in either colour darker is larger"
 NEITHER_AN_EXPERIMENT_NOR_THE_PATH = "neither an experiment nor the path"
 NOT_TESTED_TOO_MANY_ENTRIES = "Not tested: too many entries."
 NO_LARGER_THAN_STATED = "no larger than stated"

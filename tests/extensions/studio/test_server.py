@@ -391,18 +391,19 @@ def test_the_map_of_lengths_is_that_of_run(client, design):
     (experiment,) = load(design)
     lengths = length_map(experiment, length_settings(experiment, grid=(9, 9, 3)))
     drawn = found["map"]
-    assert drawn["scale"]["unit"] == "target"
-    ratios = {
-        tuple(point): ratio
-        for point, ratio in zip(
-            lengths.points.round(9).tolist(), lengths.by_point.maximum_ratio, strict=True
-        )
+    assert drawn["scale"]["unit"] == "missed"
+    groups = lengths.by_point
+    assert drawn["scale"]["largest"] == pytest.approx(groups.maximum_ratio.max())
+    missed = 1.0 - groups.within_target / groups.count
+    shares = {
+        tuple(point): share
+        for point, share in zip(lengths.points.round(9).tolist(), missed, strict=True)
     }
     for level in drawn["slices"]:
         for y, row in zip(drawn["y"], level["values"], strict=True):
             for x, value in zip(drawn["x"], row, strict=True):
                 place = round(x, 9), round(y, 9), round(level["level"], 9)
-                assert value == pytest.approx(ratios[place], rel=1e-3)
+                assert value == pytest.approx(shares[place], abs=1e-9)
     # Without a target it is in metres; where some lengths are undetermined, nothing is shown.
     text = client.get("/api/state").json()["text"].replace("target_uncertainty:", "# target:")
     client.post("/api/do", json={"do": "text", "text": text})

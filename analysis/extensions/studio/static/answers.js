@@ -13,10 +13,16 @@ export const lengths_of = (design) => design?.quantities.find(({ symbol }) => sy
 // Whether targets are met, in words that a person may act on.
 function target({ met, shares, rank, within }, before, of_rest, is_old) {
   if (!met) return figure("", "No target", "target_uncertainty is not stated");
-  const head = is_old ? `Before: ${met}` : `Target ${met}`;
-  return figure(rank.deficiency && met !== "met" ? "bad" : met, head,
+  // Known once the map has come: what is met where it is evaluated may be missed elsewhere.
+  const { of, largest } = page.elsewhere ?? {};
+  const beyond = met === "met" && of === page.design ? largest : NaN;
+  const head = is_old ? `Before: ${met}` : beyond > 1 ? "Target missed elsewhere" : `Target ${met}`;
+  const look = rank.deficiency && met !== "met" ? "bad" : met !== "met" ? met
+    : beyond > 1 ? "missed" : beyond <= 1 ? "met" : "";
+  return figure(look, head,
     of_rest ? "by the rest: " : "", shares.join("; "),
     met === "undecided" ? ", but not everything is determined" : "",
+    beyond > 1 ? `; elsewhere in the volume, lengths reach ${rounded(beyond)} times the target` : "",
     was(share(before?.within_target) || "no target"), within === null ? null
       : make("progress", { value: within, "aria-label": "share within the target" }));
 }
@@ -136,15 +142,15 @@ export function ask_later() {
   }, 100);
 }
 
-// What comes with the map: the time of measuring, and lengths elsewhere that miss the target.
+// What comes with the map: the time of measuring, and whether lengths elsewhere miss the target.
 function late({ hours, usual, map }) {
-  const { kept, design } = page.state;
+  const { kept } = page.state;
   const { largest, unit } = map?.scale ?? {};
+  page.elsewhere = unit === "missed" ? { of: page.design, largest } : null;
+  figures();
   const time = (value) => (value ? `${Number(value.toFixed(2))} h` : "–");
   fill($("late"), figure("", time(hours), "of measuring", usual ? ", with usual times" : "",
-    was(time(kept?.hours))), design.met === "met" && unit === "target" && largest > 1
-    ? make("p", {}, `Elsewhere in the volume, lengths reach ${rounded(largest)} times the target.`)
-    : null);
+    was(time(kept?.hours))));
   $("hours").placeholder = `as now: ${Number(hours.toFixed(2))}`;
 }
 

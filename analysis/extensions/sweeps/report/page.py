@@ -11,7 +11,7 @@ from ballplate.extensions.pages.charts import figure, figures
 from ballplate.extensions.pages.design_views import volume_view
 from ballplate.extensions.pages.document import Page, PageSection, facts_list, written
 from ballplate.extensions.pages.elements import Html, element, folded, joined, note, sentence
-from ballplate.extensions.pages.level_maps import MapPoint, level_map
+from ballplate.extensions.pages.level_maps import MapPoint, even_bounds, level_legend, level_map
 from ballplate.extensions.pages.spatial import still_figure
 from ballplate.presentation import (
     MOST_BALLS,
@@ -273,7 +273,7 @@ def _drawn_map(experiment: Experiment, results: ReportedSweep, cell: int) -> Htm
         )
     values = np.stack([1e6 * level_slice.values for level_slice in drawn.slices])[:, ::4, ::4]
     known = values[np.isfinite(values)]
-    ends = (float(known.min()), float(known.max())) if len(known) else (0.0, 1.0)
+    bounds = even_bounds(float(known.min()), float(known.max())) if len(known) else (0.0,)
     pictures = []
     for level_slice, of_level in zip(drawn.slices, values, strict=True):
         level = "" if level_slice.level is None else f", z = {1e3 * level_slice.level + 0.0:.6g} mm"
@@ -283,5 +283,11 @@ def _drawn_map(experiment: Experiment, results: ReportedSweep, cell: int) -> Htm
             for y, row in zip(drawn.y[::4].tolist(), of_level.tolist(), strict=True)
             for x, value in zip(drawn.x[::4].tolist(), row, strict=True)
         ]
-        pictures.append(figure(f"{label}. Darker is larger.", level_map(points, ends, label)))
-    return joined([sentence(words), figures(*pictures)])
+        pictures.append(figure(f"{label}.", level_map(points, bounds, label)))
+    return joined(
+        [
+            sentence(words),
+            figures(*pictures),
+            level_legend(bounds, lambda bound: f"{bound:.3g} µm"),
+        ]
+    )
