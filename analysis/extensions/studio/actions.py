@@ -21,11 +21,13 @@ from ballplate.extensions.repair.placing import middle_of
 from ballplate.extensions.repair.positions import free_name, with_added
 from ballplate.extensions.repair.written import Edit, edits
 from ballplate.extensions.repair.yamltext import TextChange
+from ballplate.simulator.computing import comparable
 from ballplate.simulator.experiment import Experiment, Position, ReadingGroup
 from ballplate.simulator.geometry import AXIS_INDEX, QUARTER_TURNS, Pose, plane_rotation
 from ballplate.simulator.inputs import (
     ExperimentError,
     Steps,
+    length_text,
     parse_tree,
     to_list,
     to_python,
@@ -39,6 +41,8 @@ from .filling import filled
 
 # Places are written to this many metres, a hundredth of a millimetre.
 STEP = 1e-5
+
+AXES = tuple(AXIS_INDEX)
 
 # Places along an axis of a pool that fills the volume.
 MOST_PLACES = 20
@@ -184,8 +188,9 @@ def _copied(action: Action) -> Outcome:
 
 
 def _put(action: Action) -> Outcome:
-    """Add a position with the middle of its balls at a point, like the one that is named or the
-    last one, or else across z with all balls and probes.
+    """Add a position like the one that is named or the last one, or else across z with all balls
+    and probes: with the middle of its balls at a point, or far from the others without one; as
+    near to it as its scale readings lie within the volume, so that a plate stands on the floor.
     """
     draft = action.draft
     if action.get("like") is not None:
@@ -193,7 +198,30 @@ def _put(action: Action) -> Outcome:
     else:
         place = draft.positions[-1] if draft.positions else _whole(draft)
     place = replace(place, name=free_name(draft, place.name), enabled=True)
-    return _placed(draft, place, action.vector("at") - _middle(draft, place))
+    low, high = _free_motion(draft, place)
+    if (low > high + STEP).any():
+        k = int((low - high).argmax())
+        raise ActionError(
+            f"position {place.name} has no room along {AXES[k]}: its readings span"
+            f" {length_text(float(low[k] - high[k]))} more than the volume; choose a smaller plate"
+        )
+    if action.get("at") is not None:
+        by = np.clip(action.vector("at") - _middle(draft, place), low, high)
+        return _placed(draft, place, by)
+    steps = np.stack(np.meshgrid(*zip(low, (low + high) / 2.0, high, strict=True)), axis=-1)
+    motions = steps.reshape(-1, draft.dimension)
+    taken = np.array([_middle(draft, other) for other in draft.positions] or [low * np.nan])
+    apart = np.linalg.norm(_middle(draft, place) + motions[:, None] - taken, axis=2).min(axis=1)
+    return _placed(draft, place, motions[int(np.argmax(comparable(np.nan_to_num(apart))))])
+
+
+def _free_motion(experiment: Experiment, place: Position) -> tuple[Array, Array]:
+    """Return how far a position can move (d,) back and forth along each axis, in metres, with its
+    scale readings within the volume.
+    """
+    rows = scale_readings(place, experiment.layouts[place.artefact], experiment.probes)
+    volume = experiment.machine.volume
+    return volume.lower - rows.min(axis=0), volume.upper - rows.max(axis=0)
 
 
 def _whole(experiment: Experiment) -> Position:
@@ -219,7 +247,17 @@ def _fitted(action: Action) -> Outcome:
     is_free = np.maximum(fitted.machine.volume.size - (high - low), 0.0)
     share = np.where(was_free > STEP, (low - low.min(axis=0)) / np.maximum(was_free, STEP), 0.5)
     lowest, highest = fitted.machine.volume.of_readings
-    for k in np.flatnonzero(((low < lowest) | (high > highest)).any(axis=1)):
+    outside = np.flatnonzero(((low < lowest) | (high > highest)).any(axis=1)).tolist()
+    if not outside:
+        raise ActionError("all positions lie within the volume; correct what is said of them")
+    for k in outside:
+        excess = high[k] - low[k] - (highest - lowest)
+        if (excess > 0.0).any():
+            axis = int(excess.argmax())
+            raise ActionError(
+                f"position {enabled[k].name} takes {length_text(float((high - low)[k, axis]))}"
+                f" along {AXES[axis]}, more than the volume; choose a smaller plate, or turn it"
+            )
         by = fitted.machine.volume.lower + share[k] * is_free[k] - low[k]
         fitted = _placed(fitted, enabled[k], by)
     return fitted

@@ -9,7 +9,7 @@ from contextlib import suppress
 from typing import Any
 
 import numpy as np
-from ballplate.extensions.repair.changes import ChangeKind, apply_all
+from ballplate.extensions.repair.changes import ChangeKind, apply_all, scale_readings
 from ballplate.extensions.repair.offers import offers
 from ballplate.extensions.repair.repair_search import Repair, repairs
 from ballplate.extensions.repair.repair_tables import caveat, changes_in_words
@@ -20,7 +20,8 @@ from ballplate.simulator.computing import Report, counted, unreported
 from ballplate.simulator.experiment import Experiment, Position
 from ballplate.simulator.inputs import ExperimentError
 
-from .answers import place_data
+from .actions import done
+from .answers import hours_of, place_data
 from .document import DesignDocument
 from .drafts import evaluable_of
 
@@ -89,14 +90,34 @@ def next_positions(
                 order = planned.deficiency, np.nan_to_num(lengths.average, nan=np.inf)
                 candidates.append((order, change, lengths))
     candidates.sort(key=lambda candidate: candidate[0])
-    return [
-        {
-            "words": change.words,
+    best: dict[object, tuple[Any, ...]] = {}
+    for candidate in candidates:
+        best.setdefault(_kind(experiment, candidate[1].adds), candidate)
+    before = hours_of(experiment)["hours"]
+    shown = []
+    for order, change, lengths in list(best.values())[:MOST_SHOWN]:
+        settings = position_settings(experiment, change.adds)
+        added = done(document, {"do": "add", "settings": settings})
+        after = evaluable_of(added, planning=True)
+        row = {
+            "words": change.words.partition(" again ")[2] or change.words,
             "deficiency": order[0],
             **picked(lengths, "average", "maximum"),
+            "minutes": 60.0 * (hours_of(after)["hours"] - before),
             "place": place_data(experiment, change.adds),
-            "settings": position_settings(experiment, change.adds),
+            "settings": settings,
         }
-        for order, change, lengths in candidates[:MOST_SHOWN]
-        if isinstance(change.adds, Position)
-    ]
+        shown.append(row)
+    return shown
+
+
+def _kind(experiment: Experiment, position: Position) -> object:
+    """Return what positions have alike that differ in little but a shift: probes, plane, and the
+    third of the volume that they are in along its normal.
+    """
+    rows = scale_readings(position, experiment.layouts[position.artefact], experiment.probes)
+    normal = np.abs(position.pose.rotation[:, -1]).round(3)
+    volume = experiment.machine.volume
+    along = float((rows.mean(axis=0) - volume.lower) / volume.size @ normal)
+    third = min(int(3.0 * along), 2) if experiment.dimension == 3 else 0
+    return position.artefact, position.probes, tuple(normal.tolist()), third

@@ -12,7 +12,7 @@ from ballplate.designs import shipped
 pytest.importorskip("starlette", reason="the studio is an extra")
 
 from ballplate.extensions.studio import judging
-from ballplate.extensions.studio.actions import done
+from ballplate.extensions.studio.actions import ActionError, done
 from ballplate.extensions.studio.document import DesignDocument, experiment_of, opened, undone
 from ballplate.extensions.studio.judging import judgement, previewed
 from ballplate.extensions.studio.session import Session
@@ -115,11 +115,34 @@ def test_what_may_be_read_where_it_is_is_not_moved(document):
     """A thousandth of the volume beyond it is no fault."""
     out = done(document, {"do": "move", "position": "z low", "by": [-0.0005, 0.0, 0.0]})
     problems = [place["problem"] for place in scene_of(out)["positions"]]
-    fitted = done(out, {"do": "fit"})
-    assert problems == [None] * len(problems) and fitted.text == out.text
+    assert problems == [None] * len(problems)
+    with pytest.raises(ActionError, match="all positions lie within the volume"):
+        done(out, {"do": "fit"})
 
 
-@pytest.mark.parametrize("sides", [(1.2, 0.9, 0.7), (3.0, 2.0, 1.0), (0.62, 0.62, 0.62)])
+def test_a_plate_larger_than_the_volume_is_named_when_it_cannot_be_fitted(document):
+    small = done(
+        document, {"do": "set", "path": ["machine", "volume"], "value": "[1 m, 1 m, 0.4 m]"}
+    )
+    with pytest.raises(ActionError, match=r"position x low takes .* along z, more than the volume"):
+        done(small, {"do": "fit"})
+
+
+@pytest.mark.parametrize("like", ["z low", "x high", "y low"])
+def test_an_added_position_lies_within_the_volume_wherever_it_is_asked_for(document, like):
+    """A plate stands on the floor that is pointed at; none is outside, and each has a new place."""
+    spots = [[x, y, 0.0] for x in (0, 0.25, 0.5, 0.75, 1) for y in (0, 0.25, 0.5, 0.75, 1)]
+    for spot in spots:
+        put = done(document, {"do": "put", "at": spot, "like": like})
+        assert not any(place["problem"] for place in scene_of(put)["positions"]), spot
+    taken = [np.mean(place["balls"], axis=0) for place in scene_of(document)["positions"]]
+    free = scene_of(done(document, {"do": "put", "like": like}))["positions"]
+    assert not any(place["problem"] for place in free) and len(free) == len(taken) + 1
+    middle = np.mean(free[-1]["balls"], axis=0)
+    assert min(np.linalg.norm(middle - other) for other in taken) > 0.05
+
+
+@pytest.mark.parametrize("sides", [(1.2, 0.9, 0.7), (3.0, 2.0, 0.9), (0.62, 0.62, 0.62)])
 def test_positions_are_fitted_to_another_volume(document, sides):
     """All are within it, and those that were stay where they were."""
     written = ", ".join(f"{1e3 * side:g} mm" for side in sides)
@@ -164,7 +187,7 @@ def test_a_preview_of_a_plate_outside_says_so_and_has_figures(document):
         {"do": "turn", "position": "y high"},
         {"do": "stand", "position": "z low", "across": "x"},
         {"do": "put", "at": [0.5, 0.5, 0.5]},
-        {"do": "fit"},
+        {"do": "put"},
         {"do": "off", "position": "z high"},
         {"do": "set", "path": ["machine", "repeatability"], "value": "0.4 um"},
         {"do": "text", "text": TEXT.replace("0.2 um", "0.3 um")},

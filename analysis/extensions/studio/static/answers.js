@@ -22,7 +22,7 @@ function target({ met, shares, rank, within }, before, of_rest, is_old) {
   return figure(look, head,
     of_rest ? "by the rest: " : "", shares.join("; "),
     met === "undecided" ? ", but not everything is determined" : "",
-    beyond > 1 ? `; elsewhere in the volume, lengths reach ${rounded(beyond)} times the target` : "",
+    beyond > 1 ? `; elsewhere in the volume up to ${rounded(beyond)} times the target` : "",
     was(share(before?.within_target) || "no target"), within === null ? null
       : make("progress", { value: within, "aria-label": "share within the target" }));
 }

@@ -25,7 +25,9 @@ export function drawn() {
   const is_listed = (job) => job.file === page.state.file && (job.state === "failed"
     ? is_of_now(job)
     : job.state === "running" || !["suggest", "next"].includes(job.job) || !job.result.length);
-  fill($("suggestions"), current().map(suggestion));
+  const offered = current();
+  fill($("suggestions"), offered.some(({ settings }) => settings)
+    ? make("li", {}, next(offered)) : offered.map(suggestion));
   fill($("jobs"), running.filter(is_listed).map(computation));
 }
 
@@ -35,29 +37,39 @@ function magnified({ result }) {
   return Number(((0.06 * page.view.size) / Math.max(...sizes, 1e-12)).toPrecision(2));
 }
 
-// The settings of the next position that lowers U6 most for each reading, if it was asked for.
-export function candidate() {
-  const before = lengths_of(page.state.design)?.average;
-  const gain = ({ average, place }) => (before - (average ?? before)) / place.readings;
-  const added = current().filter((one) => one.settings);
-  return added.sort((one, other) => gain(other) - gain(one) || 0)[0]?.settings;
-}
+// The settings of the next position that lowers U6 most, if it was asked for.
+export const candidate = () => current().find((one) => one.settings)?.settings;
 
 function suggestion(one) {
-  const { average, maximum, deficiency, weak, faint, key } = one;
+  const { average, maximum, deficiency, weak, faint } = one;
   const figure = Number.isFinite(average)
     ? `U6 ${micro(average)} µm on average, ${micro(maximum)} µm at most`
     : deficiency ? `rank deficiency ${deficiency} left` : "";
-  const toggle = () => {
-    shown.set(key, !one.shown);
-    page.show();
-  };
   return make("li", {}, make("div", {}, one.words), make("div", {}, figure,
     weak ? `; ${weak} ${weak > 1 ? "directions stay" : "direction stays"} weak` : "",
     faint ? "; barely determined" : ""),
-  make("div", { class: "bar" },
-    button(one.shown ? "hide" : "show", toggle, { "aria-pressed": String(one.shown) }),
-    button("apply", () => apply(one), { "data-apply": "" })));
+  make("div", { class: "bar" }, buttons(one)));
+}
+
+function buttons(one) {
+  const toggle = () => {
+    shown.set(one.key, !one.shown);
+    page.show();
+  };
+  return [button(one.shown ? "hide" : "show", toggle, { "aria-pressed": String(one.shown) }), " ",
+    button("apply", () => apply(one), { "data-apply": "" })];
+}
+
+// Next positions, with what an hour of each is worth.
+function next(offered) {
+  const before = lengths_of(page.state.design)?.average;
+  const gain = ({ average, minutes }) =>
+    (Number.isFinite(before - average) ? micro((before - average) * (60 / minutes)) : "–");
+  return make("table", {}, table(
+    ["next position", "readings", "min", "U6, µm", "less per h"],
+    offered.flatMap((one) => [[make("td", { colspan: "5" }, one.words)],
+      [make("td", {}, buttons(one)), one.place.readings, Math.round(one.minutes),
+        one.deficiency ? `deficiency ${one.deficiency}` : micro(one.average), gain(one)]])));
 }
 
 const apply = ({ settings, plan: positions, calibration, edits }) =>
@@ -133,7 +145,7 @@ function cells({ axes, cells: found }) {
     [...values, ...(reason ? [make("td", { colspan: "4" }, reason)]
       : [deficiency, micro(average), micro(maximum), share(within) || "no target"])]);
   return make("div", { class: "scrolled", tabindex: "0" }, make("table", {}, table(
-    [...heads, "rank deficiency", "U6 average µm", "U6 max. µm", "lengths within target"], rows)));
+    [...heads, "rank deficiency", "U6 average µm", "U6 max. µm", "within target"], rows)));
 }
 
 // Paths of all values of a design, entries of lists by their names where they have any.

@@ -12,7 +12,7 @@ const MEANINGS = {
 const knownOf = ({ slices }) =>
   slices.flatMap(({ values }) => values.flat()).filter(Number.isFinite);
 
-// Upper bounds of all bands but the last: those of shares, or multiples of a round number of metres.
+// Upper bounds of bands, without the last: those of shares, or multiples of a round length.
 function boundsOf(map) {
   if (map.scale?.unit === "missed") return map.scale.bounds;
   const step = roundStep(Math.max(...knownOf(map)) / BANDS);

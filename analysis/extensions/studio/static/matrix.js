@@ -51,15 +51,6 @@ function error_row(error, parts, isLost, directions) {
     u === null ? "undetermined" : `${micro(u)} ${UNITS[unit] ?? unit}`, cells);
 }
 
-// What a candidate lowers U6 by, for each reading and minute that it costs.
-function gain({ name, readings, minutes, average }, before) {
-  const by = (cost) => `${Number((1e9 * (before - average) / cost).toPrecision(2))} nm`;
-  const isKnown = before !== null && average !== null;
-  return hint(`+ ${name}, the next position`,
-    isKnown && `: U6 falls by ${micro(before - average)} µm, ${by(readings)} for each reading`,
-    isKnown && minutes && ` and ${by(minutes)} for each minute`);
-}
-
 // The table in a box, whose right edge fades as long as there is more behind it.
 function matrix({ error, ...data }) {
   if (error || !data.errors) return error ?? "";
@@ -70,7 +61,6 @@ function matrix({ error, ...data }) {
     make("div", { class: "scrolled whole", tabindex: "0", role: "region",
       "aria-label": "Errors by positions" },
     make("table", { class: "matrix" }, head(data), make("tbody", {}, rows))),
-    ...positions.filter((one) => one.is_added).map((one) => gain(one, data.average)),
     lost.flat().some(Boolean) ? hint("all: without it, the error is undetermined.") : ""];
 }
 

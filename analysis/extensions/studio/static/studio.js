@@ -14,7 +14,7 @@ const view = new View($("view"), {
   onSelect: choose,
   onDrag: (name, by) => preview({ do: "move", position: name, by }, moving),
   onDrop: (name, by) => act({ do: "move", position: name, by }),
-  onPlace: (at) => act({ do: "put", at, like: page.selected ?? undefined }, "position added"),
+  onPlace: (at) => add(at),
 });
 page.view = view;
 page.show = show;
@@ -68,6 +68,8 @@ function moving(preview_of) {
   positions();
 }
 
+const add = (at) => act({ do: "put", at, like: page.selected ?? undefined }, "position added");
+
 const CLICKS = {
   apply: () => act({ do: "text", text: $("text").value }),
   keep: () => act({ do: "keep", off: Boolean(page.state.kept) }),
@@ -80,6 +82,7 @@ const CLICKS = {
     act({ do: "reopen" }, "read again; undo leads back to the text that was here");
   },
   home: () => view.home(),
+  put: () => add(),
 };
 Object.entries(CLICKS).forEach(([id, does]) => { $(id).onclick = does; });
 document.querySelectorAll("[data-do]").forEach((one) => {
@@ -128,6 +131,7 @@ const ARROWS = {
 let pressed = -Infinity;
 $("view").addEventListener("keydown", (event) => {
   const { selected, state } = page;
+  if (event.key.toLowerCase() === "n" && state.design) add();
   const place = state.design?.scene.positions.find((one) => one.name === selected);
   if (!place) return;
   const [axis, sign] = ARROWS[event.key] ?? [];
