@@ -177,14 +177,13 @@ def test_the_map_is_of_lengths_and_of_points_on_request(design: Path) -> None:
         page.goto(studio.address)
         until(page, "!!window.studio?.view.map")
         legend = page.inner_text("#legend")
-        assert "ratio to the target 0.5 µm" in legend and "here 0.2 to 0.48" in legend
+        assert "that miss the target 0.5 µm" in legend and "here 0 % to 0 %" in legend
         bands = page.locator("#legend li")
-        steps = ["0", "0.25", "0.5", "0.75", "1 = target", "1.5", "2 or more"]
+        steps = ["0 %", *(f"to {k} %" for k in (5, 10, 25, 50, 75)), "over 75 %"]
         assert bands.all_inner_texts() == steps
         corner = page.evaluate(CORNER)
         # The same steps for another target, where the same map has other colours.
         act(page, do="set", path=["target_uncertainty"], value="0.15 um")
-        page.wait_for_selector("#legend >> text=here 0.")
         until(page, "document.querySelector('#legend').innerText.includes('0.15 µm')")
         assert bands.all_inner_texts() == steps
         until(page, f"{CORNER} !== {corner!r}")

@@ -70,7 +70,7 @@ export class View {
     const { map } = this;
     const colour = (name) => getComputedStyle(this.svg).getPropertyValue(name);
     // Where everything is undetermined there is nothing to compare.
-    const slices = map?.slices.filter(({ values }) => values.flat().some(Boolean)) ?? [];
+    const slices = map?.slices.filter(({ values }) => values.flat().some(Number.isFinite)) ?? [];
     const sheets = slices.map(({ level, values }) => {
       const corner = (i, j) => [map.x.at(i), map.y.at(j), level ?? 0];
       const image = imageOf(map, values, colour);
