@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from typing import TypeVar
 
 import numpy as np
 from ballplate.simulator.computing import single_threaded
@@ -15,12 +14,11 @@ from ballplate.simulator.machines import Array, Integers
 from .bias_patterns import patterns
 from .events import SLIP, Cause, all_directions, cause, event_groups
 from .remainders import HIDDEN, Columns, Leftover, leftover, orthonormal
+from .rivals import BELIEVED, LOG_ODDS_LIMIT, log_p
 from .scatter import Scatter, log_chances, ratio, scatters, with_scatter
 from .smooth import Smooth, smooth_errors
 from .suspects import Diagnosis, MoreScatter, Suspect, Unexplained
 from .tails import log_chance, normal_equivalent
-
-Explanation = TypeVar("Explanation")
 
 # Significance level of the whole search: half for gross errors, half for everything else.
 FAMILY = 0.01
@@ -34,18 +32,12 @@ ROUNDING = 1e-6
 # A direction with at most this remaining share equals one that was removed.
 SAME = 1e-3
 
-# Odds by which a gross error must be less probable by chance than any other explanation.
-LOG_ODDS_LIMIT = math.log(1000.0)
-
 # p-values below which a position is one of several that expand together, and a direction one of a
 # cause's several.
 TOGETHER, DIRECTIONS = math.log(1e-4), math.log(1e-2)
 
 # p-value below which a smooth error explains more than a gross error that it contains.
 CONTAINED = math.log(1e-2)
-
-# Stated uncertainties are accepted if the residuals without a suspect have at least this p-value.
-BELIEVED = math.log(1e-2)
 
 # Residuals below this share of the stated uncertainties are not attributed to the model, a drift or
 # noise.
@@ -106,10 +98,6 @@ class Search:
         self.nominal = nominal = leftover(self.drawn, None, freedom)
         events = patterns(at.design, self.drawn.state, None, every_start=True)
         self.of_drawn = Columns(events.matrix, event_groups(events), nominal)
-        self.dimensions = [
-            basis_of(nominal, smooth.columns).shape[1]
-            for smooth in smooth_errors(at.design, self.drawn.state)
-        ]
         start = leftover(at, x, freedom)
         self.sum_of_squares, self.freedom = start.sum_of_squares, freedom
         self._begin(start)
@@ -125,17 +113,20 @@ class Search:
         # are those at the readings that the estimate expects.
         linearised = linearise(self.design, self.state, None, self.drawn.spectrum)
         self.expected = leftover(linearised, None, start.freedom)
-        smooths = smooth_errors(self.design, self.state)
+        # All of them: rotations of a milliradian show more of a smooth error than the nominal
+        # design does.
         reduced = [
-            replace(smooth, columns=self.visible(smooth.columns, most))
-            for smooth, most in zip(smooths, self.dimensions, strict=True)
+            replace(smooth, columns=self.visible(smooth.columns))
+            for smooth in smooth_errors(self.design, self.state)
         ]
         self.smooth = [smooth for smooth in reduced if smooth.columns.shape[1]]
         self.scatters = scatters(self.design)
         self.other_tests = max(len(self.smooth) + len(self.scatters), 1)
 
-    def visible(self, columns: Array, most: int) -> Array:
-        """Return a basis (n, q) of what residuals show of biases (n, k), in `most` directions."""
+    def visible(self, columns: Array, most: int | None = None) -> Array:
+        """Return a basis (n, q) of what residuals show of biases (n, k), in at most `most`
+        directions.
+        """
         return basis_of(self.start, basis_of(self.expected, columns, most))
 
     @property
@@ -206,9 +197,7 @@ class Search:
         `remainder`.
         """
         total, freedom = remainder.sum_of_squares, remainder.freedom
-        log_p_of_rest = log_chance(total - square, total, freedom - dimensions, freedom, True)
-        by_size = not self.estimated and float(log_p_of_rest) > BELIEVED
-        return float(log_chance(square, total, dimensions, freedom, by_size))
+        return log_p(square, dimensions, total, freedom, self.estimated)
 
     def _best_event(self) -> _Event:
         """Return the event with the smallest p-value; of equal ones, the first."""
@@ -222,11 +211,11 @@ class Search:
             best_index = int(
                 np.flatnonzero(log_chances_of_group <= log_chances_of_group.min() * (1.0 - 1e-9))[0]
             )
-            log_p = self.log_p(
+            found = self.log_p(
                 explained.square[best_index], explained.dimensions[best_index], self.left
             )
-            if log_p < best.log_p * (1.0 + 1e-9):
-                best = _Event(log_p, group[best_index])
+            if found < best.log_p * (1.0 + 1e-9):
+                best = _Event(found, group[best_index])
         return best
 
     def _smooth_chances(self, event: _Event) -> Array:
@@ -413,28 +402,6 @@ class Search:
                     if alternative != own_cause:
                         alternatives.setdefault(alternative, tuple(row.tolist()))
         return tuple(alternatives.values())
-
-
-def variance(least: float, freedom: int, sigma_is_estimated: bool) -> float:
-    """Return the variance of residuals of which `least` remains, relative to the stated one."""
-    return max(least / freedom, 1.0) if sigma_is_estimated else 1.0
-
-
-def clear_odds(least: float, freedom: int, sigma_is_estimated: bool) -> float:
-    """Return the difference of sums of squares that makes one explanation clearly better."""
-    return 2.0 * LOG_ODDS_LIMIT * variance(least, freedom, sigma_is_estimated)
-
-
-def unbeaten(
-    fits: list[tuple[float, Explanation]], freedom: int, sigma_is_estimated: bool
-) -> list[Explanation]:
-    """Return the explanations, given with remaining sums of squares, that the best does not clearly
-    beat.
-    """
-    fits = sorted(fits, key=lambda fit: fit[0])
-    least = min((remaining for remaining, _ in fits), default=0.0)
-    most = least + clear_odds(least, freedom, sigma_is_estimated)
-    return [explanation for remaining, explanation in fits if remaining <= most]
 
 
 def basis_of(remainder: Leftover, columns: Array, most: int | None = None) -> Array:
