@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from ballplate.simulator.computing import single_threaded
+from ballplate.simulator.design import Design, State, expected_readings
 from ballplate.simulator.estimation import Linearisation, linearise
 from ballplate.simulator.machines import Array, Integers
 
@@ -42,6 +43,9 @@ CONTAINED = math.log(1e-2)
 # Residuals below this share of the stated uncertainties are not attributed to the model, a drift or
 # noise.
 HARMLESS = 0.1
+
+# Standard uncertainties from which on a machine error is not one of the noise only.
+CLEAR_ERRORS = 10.0
 
 # Squared standard deviations that bound the possible starts of a slip.
 RANGE = 9.0
@@ -99,6 +103,19 @@ class Search:
         events = patterns(at.design, self.drawn.state, None, every_start=True)
         self.of_drawn = Columns(events.matrix, event_groups(events), nominal)
         start = leftover(at, x, freedom)
+        # Rotations of a milliradian move readings by millimetres: smooth errors then show in
+        # directions that the nominal design hides, which noise itself does not determine.
+        variance = start.sum_of_squares / freedom if sigma_is_estimated else 1.0
+        u = at.of_shared(np.eye(len(at.layout))[at.layout.model])
+        is_clear = at.state.a**2 > CLEAR_ERRORS**2 * variance * u**2
+        machine = replace(self.drawn.state, a=np.where(is_clear, at.state.a, 0.0))
+        expected = _expected(at.design, machine)
+        linearised = linearise(at.design, machine, expected, self.drawn.spectrum)
+        shown = leftover(linearised, expected, freedom)
+        self.dimensions = [
+            basis_of(shown, smooth.columns).shape[1]
+            for smooth in smooth_errors(at.design, self.drawn.state)
+        ]
         self.sum_of_squares, self.freedom = start.sum_of_squares, freedom
         self._begin(start)
 
@@ -111,22 +128,20 @@ class Search:
         self.tests = max(self.columns.tests(), 1)
         # Residuals are independent of the estimate, but not of the readings. Therefore directions
         # are those at the readings that the estimate expects.
-        linearised = linearise(self.design, self.state, None, self.drawn.spectrum)
-        self.expected = leftover(linearised, None, start.freedom)
-        # All of them: rotations of a milliradian show more of a smooth error than the nominal
-        # design does.
+        expected = _expected(self.design, self.state)
+        linearised = linearise(self.design, self.state, expected, self.drawn.spectrum)
+        self.expected = leftover(linearised, expected, start.freedom)
+        smooths = smooth_errors(self.design, self.state)
         reduced = [
-            replace(smooth, columns=self.visible(smooth.columns))
-            for smooth in smooth_errors(self.design, self.state)
+            replace(smooth, columns=self.visible(smooth.columns, most))
+            for smooth, most in zip(smooths, self.dimensions, strict=True)
         ]
         self.smooth = [smooth for smooth in reduced if smooth.columns.shape[1]]
         self.scatters = scatters(self.design)
         self.other_tests = max(len(self.smooth) + len(self.scatters), 1)
 
-    def visible(self, columns: Array, most: int | None = None) -> Array:
-        """Return a basis (n, q) of what residuals show of biases (n, k), in at most `most`
-        directions.
-        """
+    def visible(self, columns: Array, most: int) -> Array:
+        """Return a basis (n, q) of what residuals show of biases (n, k), in `most` directions."""
         return basis_of(self.start, basis_of(self.expected, columns, most))
 
     @property
@@ -402,6 +417,15 @@ class Search:
                     if alternative != own_cause:
                         alternatives.setdefault(alternative, tuple(row.tolist()))
         return tuple(alternatives.values())
+
+
+def _expected(design: Design, state: State) -> Array:
+    """Return the scale readings (m, d) that a state lets expect, with its machine errors."""
+    x, offsets = (
+        expected_readings(design, state, design.readings),
+        state.probes[design.readings.probe],
+    )
+    return x - design.model.error(x, state.a, offsets)
 
 
 def basis_of(remainder: Leftover, columns: Array, most: int | None = None) -> Array:
