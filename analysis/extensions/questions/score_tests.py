@@ -145,27 +145,30 @@ def contradictions(
     beyond: dict[int, float] = {}
     while len(found) < MOST and left.freedom >= 3:
         chances = log_chances(search, left, every)
-        some = np.flatnonzero(chances < limit).tolist()
+        # Most of what another chain changes to first order is not in its own fit, which decides.
+        chains = np.array([each.cause.assumed == CHAIN for each in every])
+        some = np.flatnonzero((chances < limit) | (chains & (chances.min() < limit))).tolist()
         given = left.sum_of_squares, left.freedom, limit, search.estimated
-        stand = standing(_fits(search, left, every, some, beyond), *given)
+        stand = [
+            (k, count, search.log_p(left.sum_of_squares - remaining, count, left))
+            for remaining, count, k in standing(_fits(search, left, every, some, beyond), *given)
+        ]
         if not stand:
             break
         # Further terms of the error model are an explanation where no other does as well.
-        best = min((k for k, _ in stand), key=lambda k: (every[k].is_of_model, chances[k]))
-        widest = max(count for k, count in stand[:1] + [one for one in stand if one[0] == best])
-        others = dict.fromkeys(k for k, count in stand if k != best and count <= widest)
-        found.append(
-            Contradiction(every[best], float(chances[best]), tuple(every[k] for k in others))
-        )
+        best, count, log_p = min(stand, key=lambda one: (every[one[0]].is_of_model, one[2]))
+        widest = max(count, stand[0][1])
+        others = dict.fromkeys(k for k, count, _ in stand if k != best and count <= widest)
+        found.append(Contradiction(every[best], log_p, tuple(every[k] for k in others)))
         left = left.without(every[best].basis)
     return found, left
 
 
 def _fits(
     search: Search, left: Leftover, every: list[Tested], some: list[int], beyond: dict[int, float]
-) -> list[tuple[float, int, tuple[int, int]]]:
+) -> list[tuple[float, int, tuple[float, int, int]]]:
     """Return the sums of squares that fits with some causes leave, with each cause's number of
-    parameters: itself and that number again. A wider cause is also tried by each parameter alone.
+    parameters, and both again with the cause. A wider one is also tried by each parameter alone.
 
     `beyond` gets what the fits of designs leave beyond the first order, which without earlier
     causes is about the same. Causes that the first order leaves far behind are not fitted.
@@ -181,16 +184,17 @@ def _fits(
             # Another chain has no further parameters, but is one of several.
             count = int(dimensions) if each.cause.assumed != CHAIN else 1
             if count:
-                to_first_order.append((left.sum_of_squares - square, count, (k, count)))
+                to_first_order.append((left.sum_of_squares - square, count, k))
     given = min((one[0] for one in to_first_order), default=0.0), left.freedom, search.estimated
     least, unit, fits = math.inf, 2.0 * variance(*given), []
-    for remaining, count, (k, _) in sorted(to_first_order, key=lambda one: one[0] + unit * one[1]):
+    for remaining, count, k in sorted(to_first_order, key=lambda one: one[0] + unit * one[1]):
         if remaining + unit * count > least + clear_odds(*given):
             break
         if k not in beyond:
             beyond[k] = _beyond_first_order(search, every[k])
-        fits.append((remaining + beyond[k], count, (k, count)))
-        least = min(least, fits[-1][0] + unit * count)
+        left_by_fit = remaining + beyond[k]
+        fits.append((left_by_fit, count, (left_by_fit, count, k)))
+        least = min(least, left_by_fit + unit * count)
     return fits
 
 

@@ -22,6 +22,7 @@ from ballplate.extensions.laboratory.wrong_offsets import (
 from ballplate.simulator.design import Design, Flags, Priors
 from ballplate.simulator.estimation import (
     Linearisation,
+    Solution,
     as_drawn,
     estimate,
     linearise,
@@ -79,6 +80,13 @@ def diagnosis_with_refits(
     return search.offsets() or first_order
 
 
+# The words of an error, a fit without it, its design, and the error, None of another arrangement.
+_Fit = tuple[str, Solution, Design, WrongOffsets | None]
+
+# Ratio of sizes from which on the smaller one of two errors that explain alike is meant.
+FAR_LARGER = 100.0
+
+
 @dataclass(frozen=True)
 class _Refits:
     """A fit, and its diagnosis to first order."""
@@ -114,9 +122,6 @@ class _Refits:
         """
         design, given = self.at.design, (self.total, self.freedom, limit, self.estimated)
         near = standing(expected, *given)
-        if near and not near[0].is_off:
-            # Of a wrong sign, any offset may be an error of some size.
-            near = [mistake for mistake in near if not mistake.is_off]
         if not near:
             return None
         corrected = (
@@ -132,7 +137,7 @@ class _Refits:
             for words, other, mistake in chain(corrected, chains)
             if (solution := estimate(other, self.x)).status == "converged"
         ]
-        best = standing(fits, *given)
+        best = _plausible(standing(fits, *given))
         if not best or best[0][3] is None:
             return None
         words, (_, solution, right, first) = tuple(each[0] for each in best), best[0]
@@ -158,6 +163,19 @@ class _Refits:
     def _log_p(self, remaining: float, dimensions: int) -> float:
         """Return the logarithm of the p-value of a remaining sum of squares."""
         return log_p(max(self.total - remaining, 0.0), dimensions, self.total, self.freedom, True)
+
+
+def _plausible(fits: list[_Fit]) -> list[_Fit]:
+    """Return fits without those of single offsets whose errors are far larger than that of another
+    single one, or as large as the wrong sign or exchange that is best.
+    """
+    size = [0.0 if mistake is None else float(np.abs(mistake.change).max()) for *_, mistake in fits]
+    is_off = [mistake is not None and mistake.is_off for *_, mistake in fits]
+    most = FAR_LARGER * min((s for s, off in zip(size, is_off, strict=True) if off), default=0.0)
+    if fits and not is_off[0] and size[0]:
+        most = min(most, size[0] / FAR_LARGER)
+    kept = zip(fits, size, is_off, strict=True)
+    return [each for each, s, off in kept if not off or s <= most]
 
 
 def _corrected(design: Design, mistake: WrongOffsets) -> Design:

@@ -6,12 +6,14 @@ Run as `python -m tests.extensions.questions.rivals` it prints how often another
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 from ballplate.results.fits import Fit
+from ballplate.results.fitting import fit
 from ballplate.simulator.estimation.linearisation import linearise
 from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.loading import load
@@ -300,3 +302,63 @@ def outcome(case: Campaign, found: Fit) -> str:
         return "nothing"
     have = [any(name in words for words in one for name in case.names) for one in named]
     return "right" if all(have) else "wrong"
+
+
+@dataclass(frozen=True)
+class Refit:
+    """What a fit leaves of a file that states a cause, and its number of further parameters."""
+
+    sum_of_squares: float
+    parameters: int
+
+
+def _offset(probe: str, factors: tuple[float, ...] = (1.0, 1.0, 1.0), by: str = "") -> list[str]:
+    """Its stated offset, or one that differs by what a sentence says."""
+    units = {"nm": 1e-6, "µm": 1e-3, "mm": 1.0, "m": 1e3}
+    change = dict.fromkeys("xyz", 0.0)
+    for value, unit, axis in re.findall(r"(-?[\d.e-]+) (nm|µm|mm|m) along (\w)", by):
+        change[axis] = float(value) * units[unit]
+    moved = zip(factors, TIPS[probe], change.values(), strict=True)
+    return [f"{factor * value + more:.9g} mm" for factor, value, more in moved]
+
+
+def refit_of(given: Experiment, case: Campaign, words: str) -> Refit | None:
+    """The fit of a file that states a cause, made by the public interface; None of causes that
+    no key states.
+    """
+    changes: dict[str, object] = {}
+    readings, x, parameters = case.observed.design.readings, case.observed.x, 3
+    design = lay_out(given)
+    if match := re.search(r"offset (\w) of probe (\w+) has the wrong sign", words):
+        factors = tuple(-1.0 if axis == match[1] else 1.0 for axis in "xyz")
+        changes[f"probes.{match[2]}"], parameters = _offset(match[2], factors), 1
+    elif match := re.search(r"offsets of probes (\w+) and (\w+) are exchanged", words):
+        changes = {
+            f"probes.{one}": _offset(other) for one, other in (match.groups(), match.groups()[::-1])
+        }
+        parameters = 1
+    elif match := re.search(r"offset (?:\w )?of probe (\w+)", words):
+        changes[f"probes.{match[1]}"] = {"offset": _offset(match[1], by=words), "unknown": True}
+        held = next(name for name in design.probes.names if name != match[1])
+        if match[1] == design.probes.names[0]:
+            changes[f"probes.{held}"] = {"offset": _offset(held), "reference": True}
+    elif match := re.match(r"the arrangement of the axes is (\w+)", words):
+        changes["error_model.arrangement"], parameters = match[1], 1
+    elif match := re.match(r"(size of|scales of the machine, not) \w+,? in position (\w+)", words):
+        by_axis = match[1] != "size of"
+        scale = {"kind": "position scale", "positions": [match[2]], "by_axis": by_axis}
+        changes["influences"], parameters = [scale], 3 if by_axis else 1
+    elif match := re.match(r"ball (\S+) in position (\w+) with (\w+), \w$", words):
+        chosen = [
+            (design.ball_label(ball), design.positions.names[position], design.probes.names[probe])
+            != match.groups()
+            for ball, position, probe in zip(
+                readings.ball, readings.position, readings.probe, strict=True
+            )
+        ]
+        readings, x = readings.select(np.flatnonzero(chosen)), x[chosen]
+    else:
+        return None
+    stated = given.with_(changes)
+    found = fit(stated, observe(lay_out(stated), readings, x))
+    return Refit(found.sum_of_squares, parameters) if found.converged else None
