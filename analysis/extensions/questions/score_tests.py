@@ -16,7 +16,7 @@ from ballplate.extensions.reliability.cause_search import (
 )
 from ballplate.extensions.reliability.power import noncentrality
 from ballplate.extensions.reliability.remainders import HIDDEN, Leftover
-from ballplate.extensions.reliability.rivals import clear_odds, standing, variance
+from ballplate.extensions.reliability.rivals import clear_odds, log_p, standing, variance
 from ballplate.extensions.reliability.smooth import rows_of
 from ballplate.simulator.design import (
     Design,
@@ -151,21 +151,28 @@ def contradictions(
         given = left.sum_of_squares, left.freedom, limit, search.estimated
         stand = [
             (k, count, search.log_p(left.sum_of_squares - remaining, count, left))
-            for remaining, count, k in standing(_fits(search, left, every, some, beyond), *given)
+            for remaining, count, k in standing(
+                _fits(search, left, every, some, beyond, limit), *given
+            )
         ]
         if not stand:
             break
         # Further terms of the error model are an explanation where no other does as well.
-        best, count, log_p = min(stand, key=lambda one: (every[one[0]].is_of_model, one[2]))
+        best, count, chance = min(stand, key=lambda one: (every[one[0]].is_of_model, one[2]))
         widest = max(count, stand[0][1])
         others = dict.fromkeys(k for k, count, _ in stand if k != best and count <= widest)
-        found.append(Contradiction(every[best], log_p, tuple(every[k] for k in others)))
+        found.append(Contradiction(every[best], chance, tuple(every[k] for k in others)))
         left = left.without(every[best].basis)
     return found, left
 
 
 def _fits(
-    search: Search, left: Leftover, every: list[Tested], some: list[int], beyond: dict[int, float]
+    search: Search,
+    left: Leftover,
+    every: list[Tested],
+    some: list[int],
+    beyond: dict[int, float],
+    limit: float,
 ) -> list[tuple[float, int, tuple[float, int, int]]]:
     """Return the sums of squares that fits with some causes leave, with each cause's number of
     parameters, and both again with the cause. A wider one is also tried by each parameter alone.
@@ -191,25 +198,30 @@ def _fits(
         if remaining + unit * count > least + clear_odds(*given):
             break
         if k not in beyond:
-            beyond[k] = _beyond_first_order(search, every[k])
+            beyond[k] = _beyond_first_order(search, left, every[k], count, limit)
         left_by_fit = remaining + beyond[k]
         fits.append((left_by_fit, count, (left_by_fit, count, k)))
         least = min(least, left_by_fit + unit * count)
     return fits
 
 
-def _beyond_first_order(search: Search, tested: Tested) -> float:
-    """Return by how much the sum of squares of a fit with a cause exceeds that to first order.
+def _beyond_first_order(
+    search: Search, left: Leftover, tested: Tested, count: int, limit: float
+) -> float:
+    """Return by how much the sum of squares of a fit with a cause exceeds that to first order;
+    infinite if this fit is not significantly better than the file's, by what is `left` of it.
 
     To first order a chain's errors, for one, are added to those of the stated one that it replaces.
     """
     if tested.cause.design is None:
         return 0.0
     solution = estimate(tested.cause.design, search.x)
-    if solution.status != "converged":
+    gained = search.start.sum_of_squares - solution.factor.sum_of_squares
+    total, freedom = left.sum_of_squares + max(gained, 0.0), left.freedom + count
+    log_p_of_fit = log_p(max(gained, 0.0), count, total, freedom, search.estimated)
+    if solution.status != "converged" or log_p_of_fit >= limit:
         return math.inf
-    square, _ = explained_by(search.start, tested.basis)
-    return float(solution.factor.sum_of_squares) - search.start.sum_of_squares + square
+    return explained_by(search.start, tested.basis)[0] - gained
 
 
 def noticeable(search: Search, left: Leftover, tests: int) -> float:
