@@ -421,11 +421,9 @@ class Search:
 
 def _expected(design: Design, state: State) -> Array:
     """Return the scale readings (m, d) that a state lets expect, with its machine errors."""
-    x, offsets = (
-        expected_readings(design, state, design.readings),
-        state.probes[design.readings.probe],
-    )
-    return x - design.model.error(x, state.a, offsets)
+    offsets = state.probes[design.readings.probe]
+    x = expected_readings(design, state, design.readings)
+    return x + offsets - design.model.error(x, state.a, offsets)
 
 
 def basis_of(remainder: Leftover, columns: Array, most: int | None = None) -> Array:
