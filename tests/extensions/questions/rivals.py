@@ -7,9 +7,11 @@ Run as `python -m tests.extensions.questions.rivals` it prints how often another
 from __future__ import annotations
 
 import re
+from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import numpy as np
 from ballplate.results.fits import Fit
@@ -362,3 +364,18 @@ def refit_of(given: Experiment, case: Campaign, words: str) -> Refit | None:
     stated = given.with_(changes)
     found = fit(stated, observe(lay_out(stated), readings, x))
     return Refit(found.sum_of_squares, parameters) if found.converged else None
+
+
+def main() -> None:
+    """Print how often each error is named rightly, wrongly or not at all."""
+    with TemporaryDirectory() as folder:
+        for error in ERRORS:
+            for name, text in DESIGNS.items():
+                given = loaded(Path(folder), text)
+                cases = (campaign(given, error, 7000 + number) for number in range(8))
+                found = Counter(outcome(case, fit(given, case.observed)) for case in cases)
+                print(f"{error}, {name}: {dict(found)}", flush=True)
+
+
+if __name__ == "__main__":
+    main()

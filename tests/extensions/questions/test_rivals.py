@@ -63,12 +63,23 @@ def check(given: Experiment, error: str, seed: int) -> int:
     return len(refits)
 
 
-@pytest.mark.parametrize("error", ERRORS)
-@pytest.mark.parametrize("name", DESIGNS)
+@pytest.mark.parametrize(
+    ("name", "error"),
+    list(zip(DESIGNS, ("tip", "tip 8 µm in z", "reading", "chain", "wave"), strict=True)),
+)
 def test_what_is_named_beats_the_file_and_its_rivals(name: str, error: str, tmp_path: Path) -> None:
     check(loaded(tmp_path, DESIGNS[name]), error, 3)
 
 
+@pytest.mark.long
+@pytest.mark.parametrize("error", ERRORS)
+@pytest.mark.parametrize("name", DESIGNS)
+def test_each_error_in_each_design(name: str, error: str, tmp_path: Path) -> None:
+    for seed in range(4):
+        check(loaded(tmp_path, DESIGNS[name]), error, seed)
+
+
+@pytest.mark.long
 @pytest.mark.parametrize("number", range(4))
 def test_what_is_named_in_random_designs(number: int, tmp_path: Path) -> None:
     ((_, given),) = random_designs(tmp_path, 1, 100 * number)
