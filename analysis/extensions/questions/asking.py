@@ -13,14 +13,15 @@ from ballplate.extensions.reliability.remainders import Leftover, too_many_entri
 from ballplate.extensions.reliability.scatter import Scatter, scatters, with_scatter
 from ballplate.extensions.reliability.scatter import log_chances as scatter_chances
 from ballplate.extensions.reliability.suspects import Diagnosis, Suspect
+from ballplate.presentation import number
 from ballplate.results import Fit, ParameterEstimate
 from ballplate.simulator.computing import single_threaded
 from ballplate.simulator.estimation import Linearisation, estimate, linearise, linearised_fit
-from ballplate.simulator.machines import Array, Integers
+from ballplate.simulator.machines import Array
 from ballplate.uncertainty import uncertainties
 
 from .answered import Answers, AssumptionAnswer, Contradicted
-from .possible_causes import MODEL, PossibleCause
+from .possible_causes import GROSS, MODEL, PossibleCause
 from .score_tests import (
     LEVEL,
     Contradiction,
@@ -28,11 +29,16 @@ from .score_tests import (
     contradictions,
     log_chances,
     noticeable,
+    reduced,
     tested,
 )
 
 # Kinds of suspects that are causes themselves; all others are errors of single observations.
 ASKED = ("probe", "scale", "expansion")
+
+# Share of the largest motion along undetermined directions from which on a parameter takes part in
+# it. Terms of a combination below this are not printed.
+OPEN, SMALLEST_TERM = 1e-6, 0.01
 
 
 @single_threaded
@@ -81,20 +87,26 @@ def _without_gross_errors(
     """Return residuals without the suspected errors of single observations, except those that a
     cause explains.
     """
-    gross = [
-        search.patterns.matrix[:, suspect.columns].toarray()
-        for suspect in suspects
-        if suspect.patterns.kind[suspect.pattern] not in ASKED
-        and len(suspect.patterns) == len(search.patterns)
-    ]
+    gross = []
+    for suspect in suspects:
+        if suspect.patterns.kind[suspect.pattern] not in ASKED and len(suspect.patterns) == len(
+            search.patterns
+        ):
+            columns = search.patterns.matrix[:, suspect.columns].toarray()
+            cause = PossibleCause(GROSS, "", "")
+            gross.append(Tested(cause, basis_of(search.start, columns), columns))
     left = search.start
     if not gross:
         return left
-    found, without = contradictions(search, left, seen, limit)
-    for columns in gross:
-        basis = basis_of(without, columns)
-        if not found or search.log_p(*explained_by(without, basis), without) < search.limit:
-            left = left.without(columns)
+    found, without = contradictions(search, left, [*seen, *gross], limit)
+    named = [each.best for each in found]
+    for each in gross:
+        basis = basis_of(without, each.sensitivity)
+        if (
+            any(each is one for one in named)
+            or search.log_p(*explained_by(without, basis), without) < search.limit
+        ):
+            left = left.without(each.sensitivity)
     return left
 
 
@@ -118,15 +130,13 @@ def _contradicted(x: Array, sigma_is_estimated: bool, found: Contradiction) -> C
     at = linearised_fit(cause.design, solution)
     times = math.sqrt(at.factor.sum_of_squares / max(at.degrees_of_freedom, 1))
     sigma = times if sigma_is_estimated else 1.0
-    values, columns = _parameters(cause, at)
-    u = sigma * at.of_shared(np.eye(len(at.layout))[columns])
+    names, values, rows = _parameters(cause, at)
+    u = sigma * at.of_shared(rows)
     sizes = tuple(
         ParameterEstimate(
             name, value, uncertainty, cause.unit, "offset" if cause.probe >= 0 else "influence"
         )
-        for name, value, uncertainty in zip(
-            cause.parameters, values.tolist(), u.tolist(), strict=True
-        )
+        for name, value, uncertainty in zip(names, values.tolist(), u.tolist(), strict=True)
         if np.isfinite(uncertainty)
     )
     lengths = uncertainties(at, sigma, symbols=("U6",)).get("U6")
@@ -134,13 +144,43 @@ def _contradicted(x: Array, sigma_is_estimated: bool, found: Contradiction) -> C
     return replace(plain, sizes=sizes, times=times, lengths=of_lengths)
 
 
-def _parameters(cause: PossibleCause, at: Linearisation) -> tuple[Array, Integers]:
-    """Return estimates (k,) of a cause's parameters, and their columns among the shared ones."""
+def _parameters(cause: PossibleCause, at: Linearisation) -> tuple[tuple[str, ...], Array, Array]:
+    """Return the names (k,) of a cause's parameters, or of combinations of them that are determined
+    where single ones are not, with estimates (k,) and rows (k, s) of the shared parameters.
+    """
     if cause.probe >= 0:
         stated = at.design.probes.offsets[cause.probe]
-        return at.state.probes[cause.probe] - stated, at.layout.offset_columns[cause.probe]
-    first = len(at.state.influences) - len(cause.parameters)
-    return at.state.influences[first:], np.arange(len(at.layout))[at.layout.influences][first:]
+        values = at.state.probes[cause.probe] - stated
+        columns = at.layout.offset_columns[cause.probe]
+    else:
+        first = len(at.state.influences) - len(cause.parameters)
+        values = at.state.influences[first:]
+        columns = np.arange(len(at.layout))[at.layout.influences][first:]
+    combined = np.eye(len(columns))
+    rows = np.eye(len(at.layout))[columns]
+    if len(columns) <= at.design.dimension and np.isnan(at.of_shared(rows)).any():
+        scale = at.as_drawn.spectrum.scale[columns]
+        moves = at.shared_null[columns] / scale[:, None]
+        directions, sizes, _ = np.linalg.svd(moves, full_matrices=True)
+        open_directions = int((sizes > OPEN * sizes.max(initial=0.0)).sum())
+        combined = reduced(directions[:, open_directions:].T / scale)
+    names = tuple(combination(row, cause.parameters) for row in combined)
+    return names, combined @ values, combined @ rows
+
+
+def combination(row: Array, names: Sequence[str]) -> str:
+    """Return a combination of named parameters, such as "x - 0.5 y", without its smallest terms."""
+    terms = ""
+    for factor, name in zip(row.tolist(), names, strict=True):
+        if abs(factor) >= SMALLEST_TERM:
+            sign = ("-" if factor < 0.0 else "+") if terms or factor < 0.0 else ""
+            terms += f" {sign} " if terms else sign
+            terms += (
+                name
+                if abs(abs(factor) - 1.0) < SMALLEST_TERM
+                else f"{number(abs(factor), 2)} {name}"
+            )
+    return terms
 
 
 def _answers(
@@ -156,9 +196,9 @@ def _answers(
         for k in seen:
             cause = every[k].cause
             if 0 < len(cause.parameters) <= search.design.dimension:
-                u = every[k].uncertainties(left)
-                noticed += (least * u[np.isfinite(u)]).tolist()
-                names = np.array(cause.parameters)[~np.isfinite(u)]
+                noticed += (least * every[k].combinations(left)[1]).tolist()
+                _, _, hidden = every[k].combinations(search.start)
+                names = [combination(row, cause.parameters) for row in hidden]
                 not_seen += [f"{cause.words}, {name}" for name in names]
         yield AssumptionAnswer(
             assumed,

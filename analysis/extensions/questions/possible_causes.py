@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
+from ballplate.extensions.reliability.refits import other_chains
 from ballplate.simulator.design import (
     Clock,
     Design,
@@ -25,16 +26,7 @@ from ballplate.simulator.design import (
     nominal_state,
 )
 from ballplate.simulator.geometry import AXIS_NAMES
-from ballplate.simulator.machines import (
-    ARRANGEMENTS,
-    Arrangement,
-    Array,
-    ErrorModel,
-    Integers,
-    KinematicModel,
-    PlaneModel,
-    Unit,
-)
+from ballplate.simulator.machines import Array, ErrorModel, Integers, Unit
 
 # Balls of a position that extend by less than this, in metres, tell nothing of a scale there.
 LEAST_EXTENT = 1e-3
@@ -42,8 +34,8 @@ LEAST_EXTENT = 1e-3
 # What is assumed of the order of axes.
 CHAIN = "chain of axes"
 
-# What is assumed of further terms.
-MODEL = "error model"
+# What is assumed of further terms, and of single observations.
+MODEL, GROSS = "error model", "gross errors"
 
 
 @dataclass(frozen=True)
@@ -243,27 +235,15 @@ def _displacements(design: Design) -> Iterator[PossibleCause]:
 
 
 def _chains(design: Design) -> Iterator[PossibleCause]:
-    model = design.model
-    chain = model.spatial if isinstance(model, PlaneModel) else model
-    if not isinstance(chain, KinematicModel):
-        return
-    names: dict[Arrangement, list[str]] = {}
-    for name, arrangement in ARRANGEMENTS.items():
-        if arrangement != chain.arrangement:
-            names.setdefault(arrangement, []).append(name)
-    zeros = np.zeros(len(model.parameters))
-    for arrangement, of_it in names.items():
-        changed = replace(chain, arrangement=arrangement)
-        other: ErrorModel = changed
-        if isinstance(model, PlaneModel):
-            other = replace(model, spatial=changed)
+    model, zeros = design.model, np.zeros(len(design.model.parameters))
+    for words, changed in other_chains(design):
 
-        def displaced(at: Disturbed, other: ErrorModel = other) -> Array:
+        def displaced(at: Disturbed, other: ErrorModel = changed.model) -> Array:
             changes = other.jacobian(at.x, zeros, at.offsets) - model.jacobian(
                 at.x, zeros, at.offsets
             )
             return np.asarray(changes[:, :, np.abs(changes).max(axis=(0, 1)) > 0.0])
 
-        words = f"the arrangement of the axes is {' or '.join(of_it)}"
-        cure = "correct arrangement under error_model"
-        yield PossibleCause(CHAIN, words, cure, displaced, replace(design, model=other))
+        yield PossibleCause(
+            CHAIN, words, "correct arrangement under error_model", displaced, changed
+        )

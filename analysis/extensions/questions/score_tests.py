@@ -13,10 +13,10 @@ from ballplate.extensions.reliability.cause_search import (
     basis_of,
     explained_by,
     further_basis,
-    unbeaten,
 )
 from ballplate.extensions.reliability.power import noncentrality
 from ballplate.extensions.reliability.remainders import HIDDEN, Leftover
+from ballplate.extensions.reliability.rivals import clear_odds, log_p, standing, variance
 from ballplate.extensions.reliability.smooth import rows_of
 from ballplate.simulator.design import (
     Design,
@@ -28,16 +28,13 @@ from ballplate.simulator.design import (
 from ballplate.simulator.estimation import estimate
 from ballplate.simulator.machines import Array
 
-from .possible_causes import CHAIN, MODEL, PossibleCause, possible_causes
+from .possible_causes import CHAIN, GROSS, MODEL, PossibleCause, possible_causes
 
 # Chance that any of the assumptions of a right experiment is contradicted.
 LEVEL = 0.01
 
 # Power of the test of what can be noticed.
 POWER = 0.8
-
-# Share of a parameter that is not in what residuals show, from which on they do not show it.
-SEPARATE = 1e-6
 
 # Largest number of contradictions.
 MOST = 5
@@ -60,20 +57,32 @@ class Tested:
     @property
     def is_of_model(self) -> bool:
         """True of further terms of a model of errors or drifts."""
-        return self.cause.displaced is None
+        return self.cause.displaced is None and self.cause.assumed != GROSS
 
-    def uncertainties(self, left: Leftover) -> Array:
-        """Return standard uncertainties (k,) of the parameters in units of sigma, infinite of those
-        that residuals do not show by themselves.
+    def combinations(self, left: Leftover) -> tuple[Array, Array, Array]:
+        """Return combinations (r, k) of the parameters that residuals show, with standard
+        uncertainties (r,) in units of sigma, and those (k - r, k) that they do not show.
         """
         size = np.linalg.norm(self.sensitivity, axis=0)
-        size[size == 0.0] = np.inf
+        size[size == 0.0] = 1.0
         remaining = left.of(self.sensitivity / size)
         _, values, vectors = np.linalg.svd(remaining, full_matrices=False)
-        shown = np.flatnonzero(values**2 > HIDDEN)[: self.dimensions]
-        root = np.linalg.norm(vectors[shown].T / values[shown], axis=1)
-        is_shown = (vectors[shown] ** 2).sum(axis=0) > 1.0 - SEPARATE
-        return np.where(is_shown, root / size, np.inf)
+        shown = min(int((values**2 > HIDDEN).sum()), self.dimensions)
+        rows, hidden = reduced(vectors[:shown] * size), reduced(vectors[shown:] * size)
+        root = (rows / size) @ vectors[:shown].T / values[:shown]
+        return rows, np.linalg.norm(root, axis=1), hidden
+
+
+def reduced(rows: Array) -> Array:
+    """Return rows (r, k) that span the same, each with 1 in a column in which the others have 0."""
+    rows, columns = rows.copy(), np.zeros(len(rows), np.int64)
+    for k in range(len(rows)):
+        row, columns[k] = np.unravel_index(np.abs(rows[k:]).argmax(), rows[k:].shape)
+        rows[[k, k + row]] = rows[[k + row, k]]
+        rows[k] /= rows[k, columns[k]]
+        others = np.arange(len(rows)) != k
+        rows[others] -= np.outer(rows[others, columns[k]], rows[k])
+    return rows[np.argsort(columns)]
 
 
 def tested(search: Search) -> Iterator[Tested]:
@@ -130,47 +139,89 @@ def contradictions(
     search: Search, left: Leftover, every: list[Tested], limit: float
 ) -> tuple[list[Contradiction], Leftover]:
     """Return the causes that residuals confirm beyond a `limit`, one after the other, and what
-    remains without them. Others are as good if the best explains nothing beyond them at that limit.
+    remains without them. Those whose fits stand against the file and all others are named together.
     """
     found: list[Contradiction] = []
+    beyond: dict[int, float] = {}
     while len(found) < MOST and left.freedom >= 3:
         chances = log_chances(search, left, every)
-        first = int(chances.argmin())
-        if chances[first] >= limit:
-            break
-        same = [
-            k
-            for k in np.flatnonzero(chances < limit).tolist()
-            if k == first
-            or _log_p(search, left.without(every[k].basis), every[first].basis) >= limit
+        # Most of what another chain changes to first order is not in its own fit, which decides.
+        chains = np.array([each.cause.assumed == CHAIN for each in every])
+        some = np.flatnonzero((chances < limit) | (chains & (chances.min() < limit))).tolist()
+        given = left.sum_of_squares, left.freedom, limit, search.estimated
+        stand = [
+            (k, count, search.log_p(left.sum_of_squares - remaining, count, left))
+            for remaining, count, k in standing(
+                _fits(search, left, every, some, beyond, limit), *given
+            )
         ]
+        if not stand:
+            break
         # Further terms of the error model are an explanation where no other does as well.
-        best = min(same, key=lambda k: (every[k].is_of_model, chances[k]))
-        widest = max(every[best].dimensions, every[first].dimensions)
-        others = [k for k in same if k != best and every[k].dimensions <= widest]
-        if every[best].cause.assumed == CHAIN:
-            other_causes = [k for k in others if every[k].cause.assumed != CHAIN]
-            best, *others = _chains(search, every, np.flatnonzero(chances < limit).tolist())
-            others += other_causes
-        of_others = tuple(every[k] for k in others)
-        found.append(Contradiction(every[best], float(chances[best]), of_others))
+        best, count, chance = min(stand, key=lambda one: (every[one[0]].is_of_model, one[2]))
+        widest = max(count, stand[0][1])
+        others = dict.fromkeys(k for k, count, _ in stand if k != best and count <= widest)
+        found.append(Contradiction(every[best], chance, tuple(every[k] for k in others)))
         left = left.without(every[best].basis)
     return found, left
 
 
-def _chains(search: Search, every: list[Tested], candidates: list[int]) -> list[int]:
-    """Return the chains of axes among some causes that fit best, by fits with each.
+def _fits(
+    search: Search,
+    left: Leftover,
+    every: list[Tested],
+    some: list[int],
+    beyond: dict[int, float],
+    limit: float,
+) -> list[tuple[float, int, tuple[float, int, int]]]:
+    """Return the sums of squares that fits with some causes leave, with each cause's number of
+    parameters, and both again with the cause. A wider one is also tried by each parameter alone.
 
-    A score test adds a chain's errors to those of the stated one, which it replaces.
+    `beyond` gets what the fits of designs leave beyond the first order, which without earlier
+    causes is about the same. Causes that the first order leaves far behind are not fitted.
     """
-    fits = []
-    for k in candidates:
-        cause = every[k].cause
-        if cause.assumed == CHAIN and cause.design is not None:
-            solution = estimate(cause.design, search.x)
-            is_good = solution.status == "converged"
-            fits.append((solution.factor.sum_of_squares if is_good else math.inf, k))
-    return unbeaten(fits, search.freedom, search.estimated)
+    to_first_order = []
+    for k in some:
+        each = every[k]
+        bases = [each.basis]
+        if each.dimensions > 1 and each.cause.assumed != CHAIN:
+            bases += [basis_of(left, column) for column in each.sensitivity.T[:, :, None]]
+        for basis in bases:
+            square, dimensions = explained_by(left, further_basis(left, basis, search.width))
+            # Another chain has no further parameters, but is one of several.
+            count = int(dimensions) if each.cause.assumed != CHAIN else 1
+            if count:
+                to_first_order.append((left.sum_of_squares - square, count, k))
+    given = min((one[0] for one in to_first_order), default=0.0), left.freedom, search.estimated
+    least, unit, fits = math.inf, 2.0 * variance(*given), []
+    for remaining, count, k in sorted(to_first_order, key=lambda one: one[0] + unit * one[1]):
+        if remaining + unit * count > least + clear_odds(*given):
+            break
+        if k not in beyond:
+            beyond[k] = _beyond_first_order(search, left, every[k], count, limit)
+        left_by_fit = remaining + beyond[k]
+        fits.append((left_by_fit, count, (left_by_fit, count, k)))
+        least = min(least, left_by_fit + unit * count)
+    return fits
+
+
+def _beyond_first_order(
+    search: Search, left: Leftover, tested: Tested, count: int, limit: float
+) -> float:
+    """Return by how much the sum of squares of a fit with a cause exceeds that to first order;
+    infinite if this fit is not significantly better than the file's, by what is `left` of it.
+
+    To first order a chain's errors, for one, are added to those of the stated one that it replaces.
+    """
+    if tested.cause.design is None:
+        return 0.0
+    solution = estimate(tested.cause.design, search.x)
+    gained = search.start.sum_of_squares - solution.factor.sum_of_squares
+    total, freedom = left.sum_of_squares + max(gained, 0.0), left.freedom + count
+    log_p_of_fit = log_p(max(gained, 0.0), count, total, freedom, search.estimated)
+    if solution.status != "converged" or log_p_of_fit >= limit:
+        return math.inf
+    return explained_by(search.start, tested.basis)[0] - gained
 
 
 def noticeable(search: Search, left: Leftover, tests: int) -> float:

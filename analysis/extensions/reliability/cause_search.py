@@ -5,22 +5,21 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from typing import TypeVar
 
 import numpy as np
 from ballplate.simulator.computing import single_threaded
+from ballplate.simulator.design import Design, State, expected_readings
 from ballplate.simulator.estimation import Linearisation, linearise
 from ballplate.simulator.machines import Array, Integers
 
 from .bias_patterns import patterns
 from .events import SLIP, Cause, all_directions, cause, event_groups
 from .remainders import HIDDEN, Columns, Leftover, leftover, orthonormal
+from .rivals import BELIEVED, LOG_ODDS_LIMIT, log_p
 from .scatter import Scatter, log_chances, ratio, scatters, with_scatter
 from .smooth import Smooth, smooth_errors
 from .suspects import Diagnosis, MoreScatter, Suspect, Unexplained
 from .tails import log_chance, normal_equivalent
-
-Explanation = TypeVar("Explanation")
 
 # Significance level of the whole search: half for gross errors, half for everything else.
 FAMILY = 0.01
@@ -34,9 +33,6 @@ ROUNDING = 1e-6
 # A direction with at most this remaining share equals one that was removed.
 SAME = 1e-3
 
-# Odds by which a gross error must be less probable by chance than any other explanation.
-LOG_ODDS_LIMIT = math.log(1000.0)
-
 # p-values below which a position is one of several that expand together, and a direction one of a
 # cause's several.
 TOGETHER, DIRECTIONS = math.log(1e-4), math.log(1e-2)
@@ -44,12 +40,12 @@ TOGETHER, DIRECTIONS = math.log(1e-4), math.log(1e-2)
 # p-value below which a smooth error explains more than a gross error that it contains.
 CONTAINED = math.log(1e-2)
 
-# Stated uncertainties are accepted if the residuals without a suspect have at least this p-value.
-BELIEVED = math.log(1e-2)
-
 # Residuals below this share of the stated uncertainties are not attributed to the model, a drift or
 # noise.
 HARMLESS = 0.1
+
+# Standard uncertainties from which on a machine error is not one of the noise only.
+CLEAR_ERRORS = 10.0
 
 # Squared standard deviations that bound the possible starts of a slip.
 RANGE = 9.0
@@ -106,11 +102,20 @@ class Search:
         self.nominal = nominal = leftover(self.drawn, None, freedom)
         events = patterns(at.design, self.drawn.state, None, every_start=True)
         self.of_drawn = Columns(events.matrix, event_groups(events), nominal)
+        start = leftover(at, x, freedom)
+        # Rotations of a milliradian move readings by millimetres: smooth errors then show in
+        # directions that the nominal design hides, which noise itself does not determine.
+        variance = start.sum_of_squares / freedom if sigma_is_estimated else 1.0
+        u = at.of_shared(np.eye(len(at.layout))[at.layout.model])
+        is_clear = at.state.a**2 > CLEAR_ERRORS**2 * variance * u**2
+        machine = replace(self.drawn.state, a=np.where(is_clear, at.state.a, 0.0))
+        expected = _expected(at.design, machine)
+        linearised = linearise(at.design, machine, expected, self.drawn.spectrum)
+        shown = leftover(linearised, expected, freedom)
         self.dimensions = [
-            basis_of(nominal, smooth.columns).shape[1]
+            basis_of(shown, smooth.columns).shape[1]
             for smooth in smooth_errors(at.design, self.drawn.state)
         ]
-        start = leftover(at, x, freedom)
         self.sum_of_squares, self.freedom = start.sum_of_squares, freedom
         self._begin(start)
 
@@ -123,8 +128,9 @@ class Search:
         self.tests = max(self.columns.tests(), 1)
         # Residuals are independent of the estimate, but not of the readings. Therefore directions
         # are those at the readings that the estimate expects.
-        linearised = linearise(self.design, self.state, None, self.drawn.spectrum)
-        self.expected = leftover(linearised, None, start.freedom)
+        expected = _expected(self.design, self.state)
+        linearised = linearise(self.design, self.state, expected, self.drawn.spectrum)
+        self.expected = leftover(linearised, expected, start.freedom)
         smooths = smooth_errors(self.design, self.state)
         reduced = [
             replace(smooth, columns=self.visible(smooth.columns, most))
@@ -206,9 +212,7 @@ class Search:
         `remainder`.
         """
         total, freedom = remainder.sum_of_squares, remainder.freedom
-        log_p_of_rest = log_chance(total - square, total, freedom - dimensions, freedom, True)
-        by_size = not self.estimated and float(log_p_of_rest) > BELIEVED
-        return float(log_chance(square, total, dimensions, freedom, by_size))
+        return log_p(square, dimensions, total, freedom, self.estimated)
 
     def _best_event(self) -> _Event:
         """Return the event with the smallest p-value; of equal ones, the first."""
@@ -222,11 +226,11 @@ class Search:
             best_index = int(
                 np.flatnonzero(log_chances_of_group <= log_chances_of_group.min() * (1.0 - 1e-9))[0]
             )
-            log_p = self.log_p(
+            found = self.log_p(
                 explained.square[best_index], explained.dimensions[best_index], self.left
             )
-            if log_p < best.log_p * (1.0 + 1e-9):
-                best = _Event(log_p, group[best_index])
+            if found < best.log_p * (1.0 + 1e-9):
+                best = _Event(found, group[best_index])
         return best
 
     def _smooth_chances(self, event: _Event) -> Array:
@@ -415,26 +419,11 @@ class Search:
         return tuple(alternatives.values())
 
 
-def variance(least: float, freedom: int, sigma_is_estimated: bool) -> float:
-    """Return the variance of residuals of which `least` remains, relative to the stated one."""
-    return max(least / freedom, 1.0) if sigma_is_estimated else 1.0
-
-
-def clear_odds(least: float, freedom: int, sigma_is_estimated: bool) -> float:
-    """Return the difference of sums of squares that makes one explanation clearly better."""
-    return 2.0 * LOG_ODDS_LIMIT * variance(least, freedom, sigma_is_estimated)
-
-
-def unbeaten(
-    fits: list[tuple[float, Explanation]], freedom: int, sigma_is_estimated: bool
-) -> list[Explanation]:
-    """Return the explanations, given with remaining sums of squares, that the best does not clearly
-    beat.
-    """
-    fits = sorted(fits, key=lambda fit: fit[0])
-    least = min((remaining for remaining, _ in fits), default=0.0)
-    most = least + clear_odds(least, freedom, sigma_is_estimated)
-    return [explanation for remaining, explanation in fits if remaining <= most]
+def _expected(design: Design, state: State) -> Array:
+    """Return the scale readings (m, d) that a state lets expect, with its machine errors."""
+    offsets = state.probes[design.readings.probe]
+    x = expected_readings(design, state, design.readings)
+    return x + offsets - design.model.error(x, state.a, offsets)
 
 
 def basis_of(remainder: Leftover, columns: Array, most: int | None = None) -> Array:

@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from itertools import chain
 
 import numpy as np
 from ballplate.extensions.laboratory.wrong_offsets import (
@@ -21,6 +22,7 @@ from ballplate.extensions.laboratory.wrong_offsets import (
 from ballplate.simulator.design import Design, Flags, Priors
 from ballplate.simulator.estimation import (
     Linearisation,
+    Solution,
     as_drawn,
     estimate,
     linearise,
@@ -28,14 +30,23 @@ from ballplate.simulator.estimation import (
 )
 from ballplate.simulator.geometry import AXIS_NAMES
 from ballplate.simulator.inputs import format_length, listing
-from ballplate.simulator.machines import Array, Integers
+from ballplate.simulator.machines import (
+    ARRANGEMENTS,
+    Arrangement,
+    Array,
+    ErrorModel,
+    Integers,
+    KinematicModel,
+    PlaneModel,
+)
 
 from .bias_patterns import patterns
-from .cause_search import FAMILY, clear_odds, diagnosis, unbeaten, variance
+from .cause_search import FAMILY, diagnosis
 from .exact_values import diagnosis_of_all
 from .remainders import leftover
+from .rivals import clear_odds, log_p, standing, variance
 from .suspects import Diagnosis, Refit
-from .tails import log_chance, normal_equivalent
+from .tails import normal_equivalent
 
 # Significance level of a sum of squares that needs refits, and of the excess of an error's sum of
 # squares over that with all offsets free.
@@ -69,6 +80,13 @@ def diagnosis_with_refits(
     return search.offsets() or first_order
 
 
+# The words of an error, a fit without it, its design, and the error, None of another arrangement.
+_Fit = tuple[str, Solution, Design, WrongOffsets | None]
+
+# Ratio of sizes from which on the smaller one of two errors that explain alike is meant.
+FAR_LARGER = 100.0
+
+
 @dataclass(frozen=True)
 class _Refits:
     """A fit, and its diagnosis to first order."""
@@ -87,59 +105,45 @@ class _Refits:
         free = _free_offsets(design, self.x)
         if free is None:
             return None
-        kinds = [
-            [(free.remaining(mistake), mistake) for mistake in mistakes]
-            for mistakes in (discrete_mistakes(design), free.single())
-        ]
-        least = min([free.least, *(remaining for remaining, _ in kinds[0])])
+        discrete = [(free.remaining(one), 1, one) for one in discrete_mistakes(design)]
+        single = [(free.remaining(one), design.dimension, one) for one in free.single()]
+        least = min([free.least, *(remaining for remaining, _, _ in discrete)])
         given = least, self.freedom, self.estimated
         most = min(least + variance(*given) * free.tolerance, self.total - clear_odds(*given))
-        limit = math.log(0.5 * FAMILY / max(sum(map(len, kinds)), 1))
-        for mistakes, dimensions in zip(kinds, (1, design.dimension), strict=True):
-            possible = [
-                (remaining, mistake)
-                for remaining, mistake in mistakes
-                if remaining <= most and self._log_p(remaining, dimensions) < limit
-            ]
-            near = unbeaten(possible, self.freedom, self.estimated)
-            named = self._offset_diagnosis(near, limit) if near else None
-            if named:
-                return named
-        return None
-
-    def _offset_diagnosis(self, mistakes: list[WrongOffsets], limit: float) -> Diagnosis | None:
-        """Return the diagnosis with the first of some errors."""
-        design, first = self.at.design, mistakes[0]
-        if first.is_off:
-            right = _exact(design, stated_offsets(design) + first.change, np.array(first.probes))
-            cure = "qualify the probe again"
-        else:
-            right = with_offsets(design, first.change)
-            cure = "correct the offsets under probes, or the names of probes in the readings"
-        words = tuple(_words(design, mistake) for mistake in mistakes)
-        return self._named(words, cure, right, limit)
-
-    @property
-    def total(self) -> float:
-        return self.at.factor.sum_of_squares
-
-    def _log_p(self, remaining: float, dimensions: int) -> float:
-        """Return the logarithm of the p-value of a remaining sum of squares."""
-        square = max(self.total - remaining, 0.0)
-        return float(log_chance(square, self.total, dimensions, self.freedom, False))
+        limit = math.log(0.5 * FAMILY / max(len(discrete) + len(single), 1))
+        return self._named([one for one in discrete + single if one[0] <= most], limit)
 
     def _named(
-        self, words: tuple[str, ...], cure: str, design: Design, limit: float
+        self, expected: list[tuple[float, int, WrongOffsets]], limit: float
     ) -> Diagnosis | None:
-        """Return the diagnosis with an error in the file, and the causes that remain with a
-        corrected design; None if residuals remain unexplained.
+        """Return the diagnosis with the errors in offsets whose fits stand against the file and all
+        rivals, and the causes that remain with the best one corrected; None if another arrangement
+        of axes is better, or if residuals remain unexplained.
         """
-        solution = estimate(design, self.x)
-        if solution.status != "converged":
+        design, given = self.at.design, (self.total, self.freedom, limit, self.estimated)
+        near = standing(expected, *given)
+        if not near:
             return None
-        refitted = linearised_fit(design, solution)
-        remaining, freedom = solution.factor.sum_of_squares, refitted.degrees_of_freedom
-        remainder = diagnosis(refitted, self.x, freedom, self.estimated)
+        corrected = (
+            (_words(design, mistake), _corrected(design, mistake), mistake) for mistake in near
+        )
+        chains = ((words, other, None) for words, other in other_chains(design))
+        fits = [
+            (
+                solution.factor.sum_of_squares,
+                design.dimension if mistake and mistake.is_off else 1,
+                (words, solution, other, mistake),
+            )
+            for words, other, mistake in chain(corrected, chains)
+            if (solution := estimate(other, self.x)).status == "converged"
+        ]
+        best = _plausible(standing(fits, *given))
+        if not best or best[0][3] is None:
+            return None
+        words, (_, solution, right, first) = tuple(each[0] for each in best), best[0]
+        refitted = linearised_fit(right, solution)
+        remaining = solution.factor.sum_of_squares
+        remainder = diagnosis(refitted, self.x, refitted.degrees_of_freedom, self.estimated)
         is_clear = remainder.unexplained is None and (
             self.first_order.unexplained or not remainder.suspects
         )
@@ -147,7 +151,55 @@ class _Refits:
             return None
         before, times = (math.sqrt(square / self.freedom) for square in (self.total, remaining))
         statistics = normal_equivalent(self._log_p(remaining, 1)), normal_equivalent(limit)
+        cure = "correct the offsets under probes, or the names of probes in the readings"
+        if first.is_off:
+            cure = "qualify the probe again"
         return replace(remainder, refit=Refit(words, cure, before, times, *statistics))
+
+    @property
+    def total(self) -> float:
+        return self.at.factor.sum_of_squares
+
+    def _log_p(self, remaining: float, dimensions: int) -> float:
+        """Return the logarithm of the p-value of a remaining sum of squares."""
+        return log_p(max(self.total - remaining, 0.0), dimensions, self.total, self.freedom, True)
+
+
+def _plausible(fits: list[_Fit]) -> list[_Fit]:
+    """Return fits without those of single offsets whose errors are far larger than that of another
+    single one, or as large as the wrong sign or exchange that is best.
+    """
+    size = [0.0 if mistake is None else float(np.abs(mistake.change).max()) for *_, mistake in fits]
+    is_off = [mistake is not None and mistake.is_off for *_, mistake in fits]
+    most = FAR_LARGER * min((s for s, off in zip(size, is_off, strict=True) if off), default=0.0)
+    if fits and not is_off[0] and size[0]:
+        most = min(most, size[0] / FAR_LARGER)
+    kept = zip(fits, size, is_off, strict=True)
+    return [each for each, s, off in kept if not off or s <= most]
+
+
+def _corrected(design: Design, mistake: WrongOffsets) -> Design:
+    """Return the design without an error in its offsets."""
+    if mistake.is_off:
+        return _exact(design, stated_offsets(design) + mistake.change, np.array(mistake.probes))
+    return with_offsets(design, mistake.change)
+
+
+def other_chains(design: Design) -> Iterator[tuple[str, Design]]:
+    """Return the design with each other arrangement of the axes, and the words that name it."""
+    model = design.model
+    spatial = model.spatial if isinstance(model, PlaneModel) else model
+    if not isinstance(spatial, KinematicModel):
+        return
+    names: dict[Arrangement, list[str]] = {}
+    for name, arrangement in ARRANGEMENTS.items():
+        if arrangement != spatial.arrangement:
+            names.setdefault(arrangement, []).append(name)
+    for arrangement, of_it in names.items():
+        other: ErrorModel = replace(spatial, arrangement=arrangement)
+        if isinstance(model, PlaneModel):
+            other = replace(model, spatial=other)
+        yield f"the arrangement of the axes is {' or '.join(of_it)}", replace(design, model=other)
 
 
 def _words(design: Design, mistake: WrongOffsets) -> str:

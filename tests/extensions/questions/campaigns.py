@@ -173,8 +173,12 @@ class Rates:
 def outcome(given: Experiment, campaign: Campaign) -> tuple[str, list[str]]:
     """Right if every cause that the fit names may be the true one, wrong if one may not."""
     found = fit(given, campaign.observed)
-    assert found.assumptions is not None
-    said = list(found.assumptions.verdict)
+    if found.assumptions is not None:
+        said = list(found.assumptions.verdict)
+    else:
+        # A fit with other offsets has been named already, which may be one of several.
+        assert found.diagnosis and found.diagnosis.refit
+        said = [", or ".join(found.diagnosis.refit.causes)]
     if not said:
         return "nothing", said
     name = campaign.name or "no cause"
