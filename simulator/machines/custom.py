@@ -15,6 +15,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
+from ..inputs.module_finder import own_modules
 from ..inputs.own_code import error_text, own_array, own_frame, own_result, running_own_code
 from ..inputs.quantities import with_quantities
 from ..inputs.settings import hint, listing
@@ -148,11 +149,7 @@ def named_object(
 def _imported(name: str, folder: Path | None) -> Any:
     beside = None if folder is None else module_file(folder.resolve(), name)
     if beside is not None:
-        # For other processes too, which are given this process's path; last, so that nothing else
-        # is hidden.
-        search_path = str(folder.resolve()) if folder is not None else ""
-        if search_path not in sys.path:
-            sys.path.append(search_path)
+        own_modules().add(str(folder.resolve()) if folder is not None else "", name)
         # A file may be newer than what was listed of the folder.
         importlib.invalidate_caches()
     try:
