@@ -18,6 +18,7 @@ from ballplate.extensions.reliability.cause_search import (
 from ballplate.extensions.reliability.power import noncentrality
 from ballplate.extensions.reliability.remainders import HIDDEN, Leftover
 from ballplate.extensions.reliability.smooth import rows_of
+from ballplate.simulator.computing import svd
 from ballplate.simulator.design import (
     Design,
     Disturbed,
@@ -69,7 +70,7 @@ class Tested:
         size = np.linalg.norm(self.sensitivity, axis=0)
         size[size == 0.0] = np.inf
         remaining = left.of(self.sensitivity / size)
-        _, values, vectors = np.linalg.svd(remaining, full_matrices=False)
+        _, values, vectors = svd(remaining, full_matrices=False)
         shown = np.flatnonzero(values**2 > HIDDEN)[: self.dimensions]
         root = np.linalg.norm(vectors[shown].T / values[shown], axis=1)
         is_shown = (vectors[shown] ** 2).sum(axis=0) > 1.0 - SEPARATE

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ...computing.decompositions import eigh
 from ...machines.protocol import Array, Integers
 
 
@@ -153,7 +154,7 @@ def covariance_root(covariance: Array, rounding: Array | float = 0.0) -> Covaria
     if inner.any():
         scale = np.outer(variances[inner], variances[inner])
         correlation = covariance[np.ix_(inner, inner)] / scale
-        values, eigenvectors = np.linalg.eigh((correlation + correlation.T) / 2.0)
+        values, eigenvectors = eigh((correlation + correlation.T) / 2.0)
         share = np.broadcast_to(rounding, covariance.shape)[np.ix_(inner, inner)] / scale
         floor = max(SINGULAR, float(np.sqrt((share**2).sum())))
         if values[0] < -floor * len(values):
