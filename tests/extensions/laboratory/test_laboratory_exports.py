@@ -184,7 +184,7 @@ def test_ranges_over_a_sheet_are_refused_before_cells_are_made(
         assert tracemalloc.get_traced_memory()[1] < 300_000_000
     finally:
         tracemalloc.stop()
-    assert "cells are merged or linked" in told
+    assert wording.IS_DAMAGED_OR_NO_WORKBOOK in told
 
 
 def test_cells_of_all_sheets_are_counted_together(
