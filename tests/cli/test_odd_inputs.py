@@ -95,3 +95,12 @@ def test_no_printed_line_is_a_command_of_a_workflow(
             main([*command.split(), name])
             told = "".join(capsys.readouterr())
             assert not re.search(r"(?m)^\s*::", told), told
+
+
+def test_a_data_frame_where_a_name_is_wanted() -> None:
+    import pandas
+
+    frame = pandas.DataFrame({"a": [1.0]})
+    quickstart = bp.quickstart()
+    with pytest.raises(ValueError, match="sigma: .* is unknown"):
+        bp.fit(quickstart, bp.simulate(quickstart), sigma=frame)  # type: ignore[arg-type]
