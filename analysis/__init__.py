@@ -4,7 +4,18 @@
 extensions build, and the functions of extensions, each loaded when it is first used.
 """
 
-from __future__ import annotations
+import os
+import sys
+
+# Python puts the current folder first on the path of `python -m ballplate`. Files there with names
+# of modules are not meant for it, so nothing else is imported before, not even `__future__`.
+if (
+    sys.argv[:1] == ["-m"]
+    and sys.orig_argv[-len(sys.argv)].endswith("ballplate")
+    and not sys.flags.safe_path
+    and sys.path[0] != os.path.dirname(__path__[0])
+):
+    del sys.path[0]
 
 from typing import TYPE_CHECKING, Any
 

@@ -10,7 +10,7 @@ import os
 import signal
 import sys
 
-from ballplate.simulator.computing.signals import ANSWERS
+from ballplate.simulator.computing.signals import ANSWERS, SAFE_PATH
 
 # Objects made between two searches for garbage. What a command loads stays, some hundred thousand
 # objects, and to search all of it again and again takes a tenth of a short command's time.
@@ -25,6 +25,8 @@ def _leave(number: int, _: object) -> None:
 
 def main() -> int:
     """Run the command and return its exit status."""
+    # For every process that the command or a library starts, by whatever method.
+    os.environ[SAFE_PATH] = "1"
     gc.set_threshold(OBJECTS_BETWEEN_SEARCHES)
     for name in ANSWERS:
         number = getattr(signal, name, None)

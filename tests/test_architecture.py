@@ -25,10 +25,10 @@ EXTENSIONS = Path("analysis/extensions")
 # From the ground up: a room imports only those before it.
 ROOMS = (
     "simulator/inputs",
+    "simulator/computing",
     "simulator/geometry",
     "simulator/splines",
     "simulator/machines",
-    "simulator/computing",
     "simulator/design",
     "simulator/maps",
     "simulator/experiment",

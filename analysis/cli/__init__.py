@@ -293,6 +293,9 @@ def _run(options: argparse.Namespace) -> int:
         if shortage is not None:
             print(shortage, file=sys.stderr)
             return BAD_FILE
+        if isinstance(error, RuntimeError) and "Symlink loop" in str(error):
+            print(f"{in_one_line(str(error))}; name a file", file=sys.stderr)
+            return BAD_FILE
         if isinstance(error, OSError):
             print(in_one_line(_told(error, options)), file=sys.stderr)
             return BAD_FILE

@@ -8,6 +8,7 @@ from typing import Literal
 
 import numpy as np
 from ballplate.presentation.formatting import Data
+from ballplate.simulator.computing.decompositions import svd
 from ballplate.simulator.design.arrays import Design
 from ballplate.simulator.design.observations.lengths import Lengths
 from ballplate.simulator.design.observations.priors import Priors
@@ -260,7 +261,7 @@ def _spheres(design: Design, x: Array) -> Iterator[tuple[str, float]]:
     for k in design.gauge_positions:
         rows = design.readings.position == k
         points = x[rows] + design.probes.offsets[design.readings.probe[rows]]
-        extent = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)
+        extent = svd(points - points.mean(axis=0), compute_uv=False)
         if len(points) > design.dimension and extent[-1] > FLAT * extent[0]:
             yield design.positions.names[k], fit_sphere(points, design.positions.origins[k])[1]
 

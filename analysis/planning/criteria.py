@@ -15,6 +15,7 @@ from itertools import chain, compress
 from typing import Protocol
 
 import numpy as np
+from ballplate.simulator.computing.decompositions import svd
 from ballplate.simulator.estimation.functions import (
     BallPlaces,
     Distances,
@@ -139,7 +140,7 @@ class Criterion:
             if self.largest:
                 return max(float(some.max(initial=0.0)) for some in uncertainties)
             return sum(float(some.sum()) for some in uncertainties) / self.functions.count
-        sizes = np.linalg.svd(self.scaled @ root, compute_uv=False)
+        sizes = svd(self.scaled @ root, compute_uv=False)
         if self.name == "A":
             return float(np.sqrt((sizes**2).mean()))
         if self.name == "D":
@@ -165,7 +166,7 @@ class Criterion:
                 if self.largest
                 else _mean_tangent(self.functions, root)
             )
-        left_vectors, sizes, _ = np.linalg.svd(self.scaled @ root, full_matrices=False)
+        left_vectors, sizes, _ = svd(self.scaled @ root, full_matrices=False)
         n, value = len(sizes), self.value(root)
         if self.name == "A":
             return value, value, self.scaled.T @ self.scaled / (2 * n * value)

@@ -16,6 +16,7 @@ from functools import cached_property
 from itertools import chain
 
 import numpy as np
+from ballplate.simulator.computing.decompositions import svd
 from ballplate.simulator.computing.steps import Report, counted, unreported
 from ballplate.simulator.computing.threads import scipy_linalg, single_threaded
 from ballplate.simulator.design.arrays import Design
@@ -125,7 +126,7 @@ class Information:
         design, open_ = self.drawn.design, self.basis.balls @ self.basis.ball_open
         motions = _motions(design).reshape(design.balls.places.size, -1)
         open_ = open_.reshape(len(motions), -1)
-        singular_values = np.linalg.svd(open_ - motions @ (motions.T @ open_), compute_uv=False)
+        singular_values = svd(open_ - motions @ (motions.T @ open_), compute_uv=False)
         return int((singular_values > SAME).sum())
 
     @cached_property
@@ -182,7 +183,7 @@ class Frames:
         if not self.fixed:
             return np.zeros((self.rows.shape[1],) * 2)
         rows = np.concatenate([self.base, *(self.fixed[k] for k in members if k in self.fixed)])
-        _, values, directions = np.linalg.svd(np.concatenate([rows, np.zeros((1, rows.shape[1]))]))
+        _, values, directions = svd(np.concatenate([rows, np.zeros((1, rows.shape[1]))]))
         rank = int((values > 1e-9 * values.max(initial=0.0)).sum())
         directions_left = directions[rank:] @ self.rows
         size = np.linalg.norm(directions_left, axis=1)
@@ -355,7 +356,7 @@ def _range(columns: Array) -> Array:
     """Return an orthonormal basis of the span of columns."""
     size = np.linalg.norm(columns, axis=0)
     used = columns[:, size > 0] / size[size > 0]
-    vectors, values, _ = np.linalg.svd(used, full_matrices=False)
+    vectors, values, _ = svd(used, full_matrices=False)
     return vectors[:, values > ROUNDING * values.max(initial=0.0)]
 
 
@@ -458,7 +459,7 @@ class _Span:
         columns = columns[:, size > ROUNDING * self._largest]
         if not columns.shape[1]:
             return
-        vectors, values, _ = np.linalg.svd(columns, full_matrices=False)
+        vectors, values, _ = svd(columns, full_matrices=False)
         new_vectors = self._new(vectors[:, values > ROUNDING * self._largest])
         if new_vectors.shape[1]:
             self.vectors = np.concatenate([self.vectors, np.linalg.qr(new_vectors)[0]], axis=1)
@@ -482,11 +483,11 @@ def _basis(
     for some in _batches(every if even is None else even, 4 * (y + shared)):
         triangle = np.asarray(np.linalg.qr(np.concatenate([triangle, *some]), mode="r"))
     triangle = np.concatenate([triangle, np.zeros((y + shared, y + shared))])[: y + shared]
-    left_vectors, of_balls, by_balls = np.linalg.svd(triangle[:y, :y])
+    left_vectors, of_balls, by_balls = svd(triangle[:y, :y])
     is_read = of_balls > EXACT * of_balls.max(initial=0.0)
     # What balls leave of the rows above belongs to shared columns.
     below = np.concatenate([left_vectors[:, ~is_read].T @ triangle[:y, y:], triangle[y:, y:]])
-    _, values, right = np.linalg.svd(below, full_matrices=True)
+    _, values, right = svd(below, full_matrices=True)
     values = np.concatenate([values, np.zeros(shared - len(values))])
     # Where balls take up all of them, the largest that is left is rounding, too.
     is_known = values > EXACT * np.linalg.norm(triangle[:, y:])

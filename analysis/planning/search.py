@@ -14,6 +14,7 @@ from functools import cached_property
 from itertools import combinations
 
 import numpy as np
+from ballplate.simulator.computing.decompositions import eigh, eigvalsh
 from ballplate.simulator.computing.rounding import comparable
 from ballplate.simulator.computing.threads import scipy_linalg, single_threaded
 from ballplate.simulator.machines.protocol import Array, Integers
@@ -81,7 +82,7 @@ class SelectionProblem:
         of the counted z, H H', as its second part.
         """
         smooth, value, weight = self.criterion.tangent(root[self.counted, self.counted], *power)
-        scale, directions = np.linalg.eigh(weight)
+        scale, directions = eigh(weight)
         return smooth, value, directions * np.sqrt(np.maximum(scale, 0.0))
 
 
@@ -195,7 +196,7 @@ def _in_place(information: Array) -> float:
     """
     scale = _scale(information)
     root = np.sqrt(scale)
-    sizes = np.linalg.eigvalsh(information / (root[:, None] * root))
+    sizes = eigvalsh(information / (root[:, None] * root))
     # What is undetermined is rounding.
     logarithms = np.log(np.where(sizes < UNDETERMINED, RIDGE, sizes)) + np.log(scale)
     return float(LARGE * (1.0 + logarithms.mean() / np.log(RIDGE)))

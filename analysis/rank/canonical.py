@@ -9,6 +9,7 @@ parameters: those with most freedom first, equal ones in the order of names.
 from __future__ import annotations
 
 import numpy as np
+from ballplate.simulator.computing.decompositions import svd
 from ballplate.simulator.computing.rounding import comparable
 from ballplate.simulator.machines.protocol import Array, Integers
 
@@ -45,7 +46,7 @@ def principal_directions(
     root, size = root.copy(), np.sqrt((effect**2).sum(axis=0))
     for group in _equal(values):
         if len(group) > 1:
-            _, lengths, turned = np.linalg.svd(np.linalg.qr(effect[:, group], mode="r"))
+            _, lengths, turned = svd(np.linalg.qr(effect[:, group], mode="r"))
             size[group] = np.concatenate([lengths, np.zeros(len(group) - len(lengths))])[::-1]
             root[:, group] = root[:, group] @ turned[::-1].T
             for equal in _equal(size[group]):

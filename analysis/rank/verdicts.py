@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from ballplate.rank.canonical import elementary_mixture, principal_directions
+from ballplate.simulator.computing.decompositions import lstsq
 from ballplate.simulator.computing.rounding import above, comparable, printable
 from ballplate.simulator.design.arrays import Design
 from ballplate.simulator.design.parameters import SharedLayout
@@ -440,7 +441,7 @@ def shape(t: Array, values: Array) -> str:
     size = float(np.abs(values).max())
     for degree in range(1, HIGHEST + 1):
         part = basis[:, : degree + 1]
-        residual = values - part @ np.linalg.lstsq(part, values, rcond=None)[0]
+        residual = values - part @ lstsq(part, values, rcond=None)[0]
         if np.abs(residual).max() <= 1e-3 * size:
             return SHAPES.get(degree, f"of degree {degree}")
     return "irregular"
@@ -460,7 +461,7 @@ def deformation(places: Array, displacement: Array) -> str:
     if total <= 1e-12 * float((displacement**2).sum()):
         return "moves as a whole"
     centred = places - places.mean(axis=0)
-    linear = np.linalg.lstsq(centred, moved, rcond=1e-9)[0].T
+    linear = lstsq(centred, moved, rcond=1e-9)[0].T
     remainder = moved - centred @ linear.T
     extent = np.ptp(places, axis=0)
     words = []

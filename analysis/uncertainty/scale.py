@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 from itertools import product
 
 import numpy as np
+from ballplate.simulator.computing.decompositions import lstsq
 from ballplate.simulator.design.arrays import Design, State
 from ballplate.simulator.design.objects import Volume
 from ballplate.simulator.estimation.corrections import correction_rows
@@ -209,7 +210,7 @@ def _stretches(model: ErrorModel, points: Array, a: Array, offset: Array) -> boo
     columns = columns[:, size > 0] / size[size > 0]
     if not columns.shape[1]:
         return False
-    residual = centred.ravel() - columns @ np.linalg.lstsq(columns, centred.ravel(), rcond=1e-12)[0]
+    residual = centred.ravel() - columns @ lstsq(columns, centred.ravel(), rcond=1e-12)[0]
     return bool(np.abs(residual).max() <= FOLLOWED * np.abs(centred).max())
 
 

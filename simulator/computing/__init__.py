@@ -8,9 +8,10 @@ from ballplate.simulator.inputs.faces import lazily
 
 # Public names of this package: extensions import these alone, and its modules are private.
 if TYPE_CHECKING:
+    from .decompositions import eigh, lstsq, pinv, svd
     from .library_versions import versions
     from .memory import want_of_memory
-    from .processes import begin_worker, in_processes, interruptions_blocked, processors
+    from .processes import begin_worker, in_processes, interruptions_blocked, processors, safe_path
     from .rounding import above, blank, comparable, first_largest_of_columns
     from .spreading import evenly_spread
     from .steps import EnoughError, ProgressStep, Report, counted, unreported

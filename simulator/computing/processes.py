@@ -10,7 +10,12 @@ import time
 import warnings
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, suppress
+from copy import deepcopy
 from typing import Any, TypeVar
+
+from ballplate.simulator.inputs.module_finder import OwnModules, own_modules
+
+from .signals import SAFE_PATH
 
 Result = TypeVar("Result")
 
@@ -41,33 +46,48 @@ def in_processes(
         for argument in arguments:
             yield function(*argument)
         return
-    from joblib import Parallel, delayed
+    with safe_path():
+        from joblib import Parallel, delayed
 
-    kind = "generator" if ordered else "generator_unordered"
-    parallel = Parallel(
-        n_jobs=workers,
-        return_as=kind,
-        pre_dispatch="2*n_jobs",
-        batch_size=batch_size,
-        initializer=begin_worker,
-        initargs=(os.getpid(),),
-    )
-    results = None
-    finished = False
+        kind = "generator" if ordered else "generator_unordered"
+        parallel = Parallel(
+            n_jobs=workers,
+            return_as=kind,
+            pre_dispatch="2*n_jobs",
+            batch_size=batch_size,
+            initializer=begin_worker,
+            initargs=(os.getpid(), deepcopy(own_modules())),
+        )
+        results = None
+        finished = False
+        try:
+            with _signals_held():
+                results = parallel(delayed(function)(*argument) for argument in arguments)
+            # Not `yield from`, which would end the workers before the warning below is silenced.
+            for result in results:  # noqa: UP028
+                yield result
+            finished = True
+        finally:
+            if not finished and results is not None:
+                # Nobody waits for what is under way; a run that has ended early ends at once, and
+                # says so itself.
+                with warnings.catch_warnings(), _managers_silenced():
+                    warnings.simplefilter("ignore", UserWarning)
+                    results.close()
+
+
+@contextmanager
+def safe_path() -> Iterator[None]:
+    """Let no Python process that starts meanwhile look for modules in the current folder first:
+    files there with names of modules are not meant for it.
+    """
+    before = os.environ.get(SAFE_PATH, "")
+    os.environ[SAFE_PATH] = "1"
     try:
-        with _signals_held():
-            results = parallel(delayed(function)(*argument) for argument in arguments)
-        # Not `yield from`, which would end the workers before the warning below is silenced.
-        for result in results:  # noqa: UP028
-            yield result
-        finished = True
+        yield
     finally:
-        if not finished and results is not None:
-            # Nobody waits for what is under way; a run that has ended early ends at once, and says
-            # so itself.
-            with warnings.catch_warnings(), _managers_silenced():
-                warnings.simplefilter("ignore", UserWarning)
-                results.close()
+        # An empty one is none.
+        os.environ[SAFE_PATH] = before
 
 
 @contextmanager
@@ -93,12 +113,14 @@ def _managers_silenced() -> Iterator[None]:
         threading.excepthook = before
 
 
-def begin_worker(parent: int) -> None:
+def begin_worker(parent: int, modules: OwnModules | None = None) -> None:
     """Prepare a process that works for another: it ends with that one, which alone answers
-    interruptions.
+    interruptions, and finds its `modules`.
 
     An interruption from the keyboard reaches every process of the terminal.
     """
+    if modules is not None:
+        sys.meta_path.append(modules)
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     threading.Thread(target=_end_with, args=(parent,), daemon=True).start()
 

@@ -10,8 +10,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..inputs.number_arrays import Flags, Integers
-from ..machines.protocol import Array
+from ..inputs.number_arrays import Array, Flags, Integers
 
 # Binary digits in which numbers have to agree, about six decimal ones.
 DIGITS = 20

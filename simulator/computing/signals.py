@@ -1,4 +1,6 @@
-"""Signals that end a command; the first module to be loaded."""
+"""Signals that end a command, and where its processes look for modules; the first module to be
+loaded.
+"""
 
 from __future__ import annotations
 
@@ -8,3 +10,6 @@ ANSWERS = {
     "SIGBREAK": (130, "interrupted"),
     "SIGTERM": (143, "terminated"),
 }
+
+# The variable with which Python does not look for modules in the current folder first.
+SAFE_PATH = "PYTHONSAFEPATH"

@@ -34,6 +34,7 @@ from typing import Literal
 
 import numpy as np
 
+from ..computing.decompositions import svd
 from ..computing.threads import single_threaded
 from ..design.arrays import Design, nominal_state, reading_uncertainties
 from ..design.observations.distances import CalibratedDistances
@@ -148,7 +149,7 @@ def alternative_estimate(
         triangle = np.asarray(
             np.linalg.qr(np.column_stack([derivative * scale, residual]), mode="r")
         )
-        u, values, vh = np.linalg.svd(triangle[: len(a), :-1])
+        u, values, vh = svd(triangle[: len(a), :-1])
         rank = int((values > EXACT * values.max(initial=0.0)).sum())
         null = scale[:, None] * vh[rank:].T
         if status == "converged" or len(record) > settings.iterations:

@@ -11,6 +11,7 @@ from functools import cached_property
 
 import numpy as np
 
+from ..computing.decompositions import svd
 from ..computing.threads import scipy_linalg, single_threaded
 from ..design.arrays import Design
 from ..design.parameters import SharedLayout
@@ -66,7 +67,7 @@ class Spectrum:
         if self.triangle is None:
             assert self.known is not None
             return self.known
-        return self.scale[:, None] * np.linalg.svd(self.triangle)[2].T
+        return self.scale[:, None] * svd(self.triangle)[2].T
 
     @property
     def principal_root(self) -> Array:
@@ -98,7 +99,7 @@ def spectrum(factor: Factor, drawn: Spectrum | None = None) -> Spectrum:
     if drawn is None:
         judged = factor if factor.alike is None else factor.alike
         scaled = judged.root * scale
-        values = np.asarray(np.linalg.svd(scaled, compute_uv=False), float)
+        values = np.asarray(svd(scaled, compute_uv=False), float)
         # Where nothing shared is determined, all values are rounding, of what the balls' rows have
         # carried away.
         largest = max(
@@ -115,7 +116,7 @@ def spectrum(factor: Factor, drawn: Spectrum | None = None) -> Spectrum:
             gap = float(values[rank - 1]) / max(float(values[rank]), float(np.finfo(float).tiny))
         if judged is factor and deficiency == 0:
             return Spectrum(values, scale, 0, gap, triangle=scaled)
-        right = np.linalg.svd(scaled)[2]
+        right = svd(scaled)[2]
         if judged is factor:
             return Spectrum(values, scale, deficiency, gap, known=scale[:, None] * right.T)
         null = right[rank:].T
@@ -139,7 +140,7 @@ def _determined(factor: Factor, scale: Array, spanned: Array) -> tuple[Array, Ar
     spans.
     """
     if factor.orders is None:
-        _, values, right = np.linalg.svd((factor.root * scale) @ spanned, full_matrices=False)
+        _, values, right = svd((factor.root * scale) @ spanned, full_matrices=False)
         return values, spanned @ right.T
     # The heaviest rows would take all digits of the smallest singular values, but the inverse has
     # these first.
@@ -147,9 +148,7 @@ def _determined(factor: Factor, scale: Array, spanned: Array) -> tuple[Array, Ar
     inverse = scipy_linalg().solve_triangular(
         determined.root, np.eye(len(determined.root)), check_finite=False
     )
-    directions, values, _ = np.linalg.svd(
-        spanned[:, determined.order] @ inverse, full_matrices=False
-    )
+    directions, values, _ = svd(spanned[:, determined.order] @ inverse, full_matrices=False)
     return 1.0 / values[::-1], directions[:, ::-1]
 
 

@@ -11,6 +11,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from ..computing.decompositions import lstsq, svd
 from ..computing.rounding import comparable
 from ..design.arrays import Design, State, nominal_state
 from ..design.objects import Flags
@@ -153,7 +154,7 @@ def _strength(points: Array, d: int) -> float:
     """Return the extent of points (n, d) across their main line, 0 if they do not fix a pose."""
     if len(points) < 2:
         return 0.0
-    extent = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)
+    extent = svd(points - points.mean(axis=0), compute_uv=False)
     needed = extent[d - 2]
     return float(needed) if needed > FLAT * extent[0] else 0.0
 
@@ -239,7 +240,7 @@ def _with_held(
         moves = moves[:, [0, 1, 2, 4, 5, 3]] if d == 3 else moves
         rows = np.concatenate([moves, by_pose[is_held]])
         residuals = np.concatenate([(target[members] - places)[is_certified], -off[is_held]])
-        motion = np.linalg.lstsq(rows, residuals, rcond=1e-9)[0]
+        motion = lstsq(rows, residuals, rcond=1e-9)[0]
         step = rotation_from_vector(motion[None, d:])[0]
         turn, shift = step @ turn, step @ shift + motion[:d]
     return turn, shift

@@ -29,6 +29,7 @@ from typing import Literal
 
 import numpy as np
 
+from ..computing.decompositions import svd
 from ..computing.threads import single_threaded
 from ..design.arrays import Design
 from ..design.observations.joint_lengths import equation_root
@@ -287,9 +288,7 @@ def _open_directions(equations: _Equations, unknowns: _Unknowns) -> Array:
     _, length = _differences(equations, unknowns)
     exact = equations.direction * length[:, None]
     rows = equations.reduced(_derivative(equations, unknowns, exact, exact, length)) * MICROMETRE
-    _, values, vh = np.linalg.svd(
-        np.linalg.qr(rows, mode="r") if len(rows) > rows.shape[1] else rows
-    )
+    _, values, vh = svd(np.linalg.qr(rows, mode="r") if len(rows) > rows.shape[1] else rows)
     return vh[int((values > EXACT * values.max(initial=0.0)).sum()) :].T
 
 
@@ -308,7 +307,7 @@ def _solved(
         used = rows[:, columns] * MICROMETRE
         if held_directions is not None:
             used = used - (used @ held_directions) @ held_directions.T
-        u, values, vh = np.linalg.svd(used, full_matrices=False)
+        u, values, vh = svd(used, full_matrices=False)
         rank = int((values > EXACT * values.max(initial=0.0)).sum())
         root = np.zeros((len(unknowns.values), rank))
         root[columns] = MICROMETRE * vh[:rank].T / values[:rank]

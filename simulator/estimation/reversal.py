@@ -18,6 +18,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..computing.decompositions import lstsq, pinv, svd
 from ..computing.threads import single_threaded
 from ..geometry.motions import fit_motion
 from ..machines.metric import MetricModel, Scale
@@ -119,7 +120,7 @@ def reverse(first: Array, second: Array, scale: Scale, offsets: bool = True) -> 
         terms (n, 2).
         """
         aim = wanted - neglected.T.ravel()
-        solution = np.linalg.lstsq(rows / weights, aim, rcond=None)[0] / weights
+        solution = lstsq(rows / weights, aim, rcond=None)[0] / weights
         remainder = aim - rows @ solution
         sigma = float(np.sqrt(remainder @ remainder / freedom)) if freedom > 0 else float("nan")
         return solution, solution[3:] if offsets else np.zeros(2), remainder.reshape(2, -1).T, sigma
@@ -134,7 +135,7 @@ def reverse(first: Array, second: Array, scale: Scale, offsets: bool = True) -> 
             break
     neglected = arms @ left_out.T
     # Each row of the inverse is how a parameter follows the readings.
-    lengths = np.sqrt((np.linalg.pinv(rows / weights) ** 2).sum(axis=1)) / weights
+    lengths = np.sqrt((pinv(rows / weights) ** 2).sum(axis=1)) / weights
     alpha, beta, gamma = (float(value) for value in solution[:3])
     return Reversal(
         alpha,
@@ -178,7 +179,7 @@ def _spread(arms: Array) -> float:
     """Extent of points (n, 2) across their main line through the origin, as a fraction of that
     along it.
     """
-    extent = np.linalg.svd(arms, compute_uv=False)
+    extent = svd(arms, compute_uv=False)
     return float(extent[1] / extent[0]) if len(extent) == 2 and extent[0] > 0.0 else 0.0
 
 

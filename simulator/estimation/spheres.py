@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..computing.decompositions import lstsq, svd
 from ..machines.protocol import Array
 
 # Directions of the centre that points show by less than this fraction of what they show best are
@@ -28,7 +29,7 @@ def fit_sphere(points: Array, near: Array) -> tuple[Array, float]:
     local = points - middle
     half = 0.5 * ((local**2).sum(axis=1) - (local**2).sum(axis=1).mean())
     start = near - middle
-    move = np.linalg.lstsq(local, half - local @ start, rcond=FLAT)[0]
+    move = lstsq(local, half - local @ start, rcond=FLAT)[0]
     centre = start + move
     return middle + centre, float(np.sqrt(((local - centre) ** 2).sum(axis=1).mean()))
 
@@ -62,7 +63,7 @@ def closest_sphere(points: Array) -> SphereFit | None:
     if len(points) < FEWEST_POINTS:
         return None
     middle = points.mean(axis=0)
-    spread = np.linalg.svd(points - middle, compute_uv=False)
+    spread = svd(points - middle, compute_uv=False)
     if not spread[2] > FLAT * spread[0]:
         return None
     centre, radius = fit_sphere(points, middle)
@@ -72,7 +73,7 @@ def closest_sphere(points: Array) -> SphereFit | None:
         if not distances.all():
             return None
         rows = np.column_stack([-towards / distances[:, None], -np.ones(len(points))])
-        step = np.linalg.lstsq(rows, radius - distances)[0]
+        step = lstsq(rows, radius - distances)[0]
         centre, radius = centre + step[:3], radius + float(step[3])
     residuals = np.linalg.norm(points - centre, axis=1) - radius
     inverse = np.linalg.inv(np.linalg.qr(rows)[1])

@@ -8,6 +8,7 @@ from functools import cached_property
 
 import numpy as np
 
+from ..computing.decompositions import svd
 from ..computing.rounding import comparable
 from ..design.lookup import References
 from ..design.observations.balls import BallObservations
@@ -146,7 +147,7 @@ def _doubtfulness(misfit: Array, rows: Array) -> Array:
     """Return the misfit per value (m,): misfits divided by the roots of their redundancies
     [Baarda].
     """
-    u, values, _ = np.linalg.svd(rows, full_matrices=False)
+    u, values, _ = svd(rows, full_matrices=False)
     unexplained = 1.0 - (u[:, values > KNOWN * values.max(initial=0.0)] ** 2).sum(axis=1)
     return np.abs(misfit) / np.sqrt(np.maximum(unexplained, SHARE))
 

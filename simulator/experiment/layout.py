@@ -8,6 +8,7 @@ from collections.abc import Collection
 
 import numpy as np
 
+from ..computing.decompositions import svd
 from ..computing.rounding import comparable
 from ..design.arrays import Design, Observations, Readings
 from ..design.objects import (
@@ -363,7 +364,7 @@ def _null_space(rows: Array) -> Array:
     # What the triangular factor leaves free, the rows do; their own decomposition grows with their
     # number squared.
     triangle = np.linalg.qr(rows, mode="r") if len(rows) > rows.shape[1] else rows
-    _, values, directions = np.linalg.svd(triangle)
+    _, values, directions = svd(triangle)
     rank = int((values > FLAT * values[0]).sum())
     return directions[rank:].T
 

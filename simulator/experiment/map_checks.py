@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from ..computing.decompositions import eigvalsh
 from ..design.objects import Probes, Volume
 from ..inputs.messages import ExperimentError
 from ..inputs.problems import Problems
@@ -294,7 +295,7 @@ def _check_covariance(
         return
     spread = np.sqrt(np.abs(np.diagonal(covariance)))
     spread = np.where(spread > 0.0, spread, 1.0)
-    least = float(np.linalg.eigvalsh(covariance / np.outer(spread, spread)).min())
+    least = float(eigvalsh(covariance / np.outer(spread, spread)).min())
     if (covariance != covariance.T).any() or least < -NEGATIVE * size:
         text = (
             "is not that of any values: it is not symmetric, or some combination of them would have"

@@ -57,7 +57,10 @@ class MapParameterSettings(Settings):
 
     name: Text = Field(description="as the error model names it")
     unit: Unit = Field(description="m, rad or 1")
-    value: float = Field(description="the estimate, in that unit")
+    # Beyond it are no errors of machines, and squares that are not finite.
+    value: Annotated[float, Field(ge=-1000, le=1000)] = Field(
+        description="the estimate, in that unit"
+    )
 
 
 class LeftOutSettings(Settings):

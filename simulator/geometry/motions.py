@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..computing.decompositions import svd
 from ..inputs.number_arrays import Array
 
 AXIS_NAMES = ("x", "y", "z")
@@ -86,7 +87,7 @@ def fit_motion(source: Array, target: Array) -> tuple[Array, Array]:
     undetermined; one such rotation is returned.
     """
     centre_source, centre_target = source.mean(axis=0), target.mean(axis=0)
-    u, _, vh = np.linalg.svd((target - centre_target).T @ (source - centre_source))
+    u, _, vh = svd((target - centre_target).T @ (source - centre_source))
     # The last sign makes the rotation proper, also if all points lie in a plane.
     sign = np.ones(source.shape[1])
     sign[-1] = np.sign(np.linalg.det(u @ vh))
@@ -103,7 +104,7 @@ def fixes_pose(points: Array) -> bool:
     n, d = points.shape
     if n < d:
         return False
-    extent = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)
+    extent = svd(points - points.mean(axis=0), compute_uv=False)
     return bool(extent[d - 2] > ACROSS * extent[0])
 
 
@@ -129,7 +130,7 @@ def without_rigid_motion(points: Array, errors: Array) -> Array:
     # A rigid motion changes no distance to first order. The remainder is small if distances are
     # well determined, so that differences formed from it keep their digits.
     motions = rigid_motions(points)
-    basis, sizes, _ = np.linalg.svd(motions.reshape(n * d, -1), full_matrices=False)
+    basis, sizes, _ = svd(motions.reshape(n * d, -1), full_matrices=False)
     basis = basis[:, sizes > 1e-12 * sizes.max()]
     flat = errors.reshape(n * d, -1)
     # The second pass subtracts what rounding left of a large motion in the first.

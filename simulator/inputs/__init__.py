@@ -38,6 +38,7 @@ if TYPE_CHECKING:
         in_one_line,
         refused,
     )
+    from .module_finder import own_modules
     from .problems import Problems
     from .quantities import (
         ANGLE_UNITS,

@@ -6,7 +6,7 @@ import os
 from collections.abc import Sequence
 
 import numpy as np
-from ballplate.simulator.inputs.settings import hint
+from ballplate.simulator.inputs.settings import hint, shorten
 
 
 def ensure_whole(least: int, most: int | None = None, **arguments: object) -> None:
@@ -57,8 +57,9 @@ def ensure_one_of(choices: Sequence[str], **arguments: object) -> None:
     :raises ValueError: an unknown name.
     """
     for name, value in arguments.items():
-        if value is not None and value not in choices:
-            raise ValueError(f'{name}: "{value}" is unknown; {hint(str(value), choices)}')
+        if value is not None and (not isinstance(value, str) or value not in choices):
+            text = shorten(str(value))
+            raise ValueError(f'{name}: "{text}" is unknown; {hint(text, choices)}')
 
 
 def ensure_type(class_: type, expected: str, **arguments: object) -> None:

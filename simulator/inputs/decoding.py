@@ -47,9 +47,7 @@ def decoded(content: bytes, file: object, encoding: str | None = None) -> tuple[
 
 def text_and_encoding(content: bytes, file: object, encoding: str | None = None) -> tuple[str, str]:
     """Return the text as `decoded`, with lines of any length and a trailing `END_OF_FILE`."""
-    if content.startswith(BINARY_FILES):
-        text = "is a workbook, an archive or a document, and no text; save its table as CSV"
-        raise refused(file, text)
+    refuse_binary(content, file)
     if encoding is not None:
         marked = next((name for mark, name, _ in MARKS if content.startswith(mark)), "")
         # The codec of the mark removes it.
@@ -70,6 +68,16 @@ def text_and_encoding(content: bytes, file: object, encoding: str | None = None)
     raise refused(
         file, "is no text in any encoding known; take a whole copy of it, or save it as UTF-8"
     )
+
+
+def refuse_binary(content: bytes, file: object) -> None:
+    """Refuse the content of a workbook and the like.
+
+    :raises ExperimentError: it is one.
+    """
+    if content.startswith(BINARY_FILES):
+        text = "is a workbook, an archive or a document, and no text; save its table as CSV"
+        raise refused(file, text)
 
 
 def refuse_long_lines(text: str, file: object) -> None:

@@ -14,6 +14,8 @@ MOST_MESSAGES = 1000
 MORE_ERRORS = f"more than {MOST_MESSAGES} errors; mend these first"
 
 # Characters that would break a line or reach the terminal as a command.
+# Beginning of a line that a workflow of GitHub takes as a command.
+COMMAND = re.compile(r"^(\s*)::")
 UNPRINTABLE = re.compile(
     "[\x00-\x1f\x7f-\x9f\u2028\u2029\u200e\u200f\u202a-\u202e\u2066-\u2069\ud800-\udfff]"
 )
@@ -66,12 +68,12 @@ def _by_number(character: re.Match[str]) -> str:
 
 
 def in_one_line(text: str) -> str:
-    r"""Escape characters that would break or corrupt a line.
+    r"""Escape characters that would break or corrupt a line, or make it a command of GitHub.
 
-    >>> in_one_line("a\nb")
-    'a\\x0ab'
+    >>> in_one_line("a\nb"), in_one_line(" ::error::c")
+    ('a\\x0ab', ' \\x3a:error::c')
     """
-    return UNPRINTABLE.sub(_by_number, text)
+    return COMMAND.sub(r"\1\\x3a:", UNPRINTABLE.sub(_by_number, text))
 
 
 def in_lines(text: str) -> str:

@@ -23,8 +23,6 @@ LIBRARIES = frozenset(
     ("distributed", "filelock", "joblib", "matplotlib", "numpy", "pandas", "pyarrow")
     + ("pydantic", "pydantic_core", "scipy", "threadpoolctl", "tqdm", "yaml", "dask", "tornado")
 )
-# The real exit, restored after user code has run.
-EXIT = os._exit
 # Folders of the standard library.
 STANDARD = (Path(traceback.__file__).parent, Path(sysconfig.get_path("platstdlib")))
 
@@ -67,11 +65,11 @@ class OwnCodeError(UnusableError):
 def running_own_code() -> Iterator[None]:
     """Keep user code from printing among the results and from ending the process."""
     with np.errstate(all="ignore"), redirect_stdout(sys.stderr):
-        os._exit = _refused_exit
+        before, os._exit = os._exit, _refused_exit
         try:
             yield
         finally:
-            os._exit = EXIT
+            os._exit = before
 
 
 def _refused_exit(status: int = 0) -> NoReturn:

@@ -17,7 +17,7 @@ from typing import Any
 
 import yaml
 
-from .decoding import refuse_long_lines
+from .decoding import refuse_binary, refuse_long_lines
 from .messages import MORE_ERRORS, MOST_MESSAGES, ExperimentError, Message, Step, Steps, refused
 from .settings import listing, shorten
 
@@ -178,6 +178,7 @@ def utf8_text(content: bytes, file: str) -> str:
 
     :raises ExperimentError: it is not UTF-8, or has too long a line.
     """
+    refuse_binary(content, file)
     try:
         text = content.decode("utf-8-sig")
     except UnicodeDecodeError as error:

@@ -10,15 +10,18 @@ import importlib
 import sys
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
 from typing import Any, TypeVar
 
 import numpy as np
 
+from ..inputs.module_finder import own_modules
 from ..inputs.own_code import error_text, own_array, own_frame, own_result, running_own_code
 from ..inputs.quantities import with_quantities
 from ..inputs.settings import hint, listing
 from ..inputs.trust import Trust
+from ..inputs.unusable import UnusableError
 from .protocol import Array, ErrorModel, Line, Parameter, Reported
 
 GROUP = "ballplate.error_models"
@@ -40,7 +43,7 @@ DERIVATIVE = 1e-4
 Result = TypeVar("Result")
 
 
-class CustomModelError(ValueError):
+class CustomModelError(UnusableError, ValueError):
     """A user's error model is unusable; `key` is the key at fault, "object" or "options"."""
 
     def __init__(self, text: str, key: str = "object") -> None:
@@ -63,14 +66,31 @@ def custom_model(
 
     :raises CustomModelError: no such object, or its result is no error model.
     """
-    build = named_object(name, folder, trust)
+    return _built(named_object(name, folder, trust), name, _Options(options), lower, upper)
+
+
+class _Options(dict[str, Any]):
+    """Options of a model by which it is found again."""
+
+    def __hash__(self) -> int:  # type: ignore[override]
+        return hash(repr(self))
+
+
+# Once, so that what is used is what was checked, where a fault becomes a message of its file.
+@lru_cache(16)
+def _built(
+    build: Callable[..., Any],
+    name: str,
+    options: _Options,
+    lower: tuple[float, ...],
+    upper: tuple[float, ...],
+) -> ErrorModel:
     key = "options" if options else "object"
     model = attempt(
         f"{name} has failed", lambda: build(lower, upper, **with_quantities(options)), key
     )
-    _check(name, model, np.asarray(lower, float), np.asarray(upper, float))
-    kind = GuardedModelWithLines if hasattr(model, "lines") else GuardedModel
-    return kind(model, tuple(model.parameters))
+    corners = np.asarray(lower, float), np.asarray(upper, float)
+    return attempt(f"what {name} returns has failed", lambda: _checked(name, model, *corners))
 
 
 @dataclass(frozen=True)
@@ -78,11 +98,9 @@ class GuardedModel:
     """A user's error `model`; every array it returns is checked."""
 
     model: ErrorModel
+    dimension: int
     parameters: tuple[Parameter, ...]
-
-    @property
-    def dimension(self) -> int:
-        return self.model.dimension
+    as_reported: Reported
 
     def error(self, x: Array, a: Array, p: Array) -> Array:
         return own_array(self.model.error, x.shape, x, a, p, is_plausible=self._is_plausible(a))
@@ -98,8 +116,7 @@ class GuardedModel:
         return all(length <= IMPLAUSIBLE for length in moved)
 
     def reported(self) -> Reported:
-        reported: Reported = own_result(self.model.reported)
-        return reported
+        return self.as_reported
 
 
 class GuardedModelWithLines(GuardedModel):
@@ -148,11 +165,7 @@ def named_object(
 def _imported(name: str, folder: Path | None) -> Any:
     beside = None if folder is None else module_file(folder.resolve(), name)
     if beside is not None:
-        # For other processes too, which are given this process's path; last, so that nothing else
-        # is hidden.
-        search_path = str(folder.resolve()) if folder is not None else ""
-        if search_path not in sys.path:
-            sys.path.append(search_path)
+        own_modules().add(str(folder.resolve()) if folder is not None else "", name)
         # A file may be newer than what was listed of the folder.
         importlib.invalidate_caches()
     try:
@@ -229,6 +242,8 @@ def attempt(failure: str, call: Callable[[], Result], key: str = "object") -> Re
     try:
         with running_own_code():
             return call()
+    except CustomModelError:
+        raise
     except (Exception, SystemExit) as error:
         # Without a frame in the user's code, the call itself is at fault.
         text = error_text(error, own_frame(error))
@@ -236,8 +251,8 @@ def attempt(failure: str, call: Callable[[], Result], key: str = "object") -> Re
 
 
 # In one piece: each check relies on the checks before it.
-def _check(name: str, model: Any, lower: Array, upper: Array) -> None:
-    """Raise the first fault of a model."""
+def _checked(name: str, model: Any, lower: Array, upper: Array) -> ErrorModel:
+    """Return a model, guarded, or raise its first fault."""
     missing = [
         member
         for member in MEMBERS
@@ -315,6 +330,8 @@ def _check(name: str, model: Any, lower: Array, upper: Array) -> None:
         raise CustomModelError(
             f"{name}: reported() has a matrix of shape {shape}; one row for each name is needed"
         )
+    kind = GuardedModelWithLines if hasattr(model, "lines") else GuardedModel
+    return kind(model, d, parameters, reported)
 
 
 def _check_parameters(name: str, parameters: tuple[Any, ...]) -> None:

@@ -13,6 +13,7 @@ from functools import cached_property
 
 import numpy as np
 
+from ..computing.decompositions import lstsq
 from ..geometry.motions import cross_matrices
 from .protocol import Array, ErrorModel, Parameter, Reported, TrueMachine, Unit
 
@@ -103,5 +104,5 @@ def in_frame_of(
     by_model = fitted.jacobian(x, np.zeros(len(fitted.parameters)), p)
     by_frame = framed.jacobian(x, a, p)[:, :, count:]
     columns = np.concatenate([by_frame, by_model], axis=2).reshape(wanted.size, -1)
-    a[count:] = -np.linalg.lstsq(columns, wanted.ravel(), rcond=None)[0][: len(a) - count]
+    a[count:] = -lstsq(columns, wanted.ravel(), rcond=None)[0][: len(a) - count]
     return TrueMachine(framed, a)

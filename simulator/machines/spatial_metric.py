@@ -14,6 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..computing.decompositions import eigvalsh
 from .protocol import Array, Parameter, Reported
 
 AXES = ("x", "y", "z")
@@ -110,7 +111,7 @@ def parameters_of_metric(metric: Array) -> Array:
     >>> np.abs(parameters_of_metric(model.axes(a).T @ model.axes(a)) - a).max() < 1e-15
     np.True_
     """
-    if not (np.linalg.eigvalsh(metric) > 0.0).all():
+    if not (eigvalsh(metric) > 0.0).all():
         raise ValueError("the equations give some differences of readings no length")
     size = np.sqrt(np.diag(metric))
     cosine = metric / np.outer(size, size)

@@ -8,6 +8,7 @@ from collections.abc import Collection
 
 import numpy as np
 
+from ..computing.decompositions import lstsq
 from ..inputs.quantities import QuantityError, parse_angle, parse_length, parse_ratio
 from ..inputs.settings import Settings, hint
 from .error_names import AXIS_ERRORS, SQUARENESS_ERRORS, AxisError
@@ -126,7 +127,7 @@ def _parameters_of_values(values: dict[str, str], model: ErrorModel) -> Array:
     if given_quoted:
         targets_quoted = np.zeros(len(reported.names))
         targets_quoted[list(given_quoted)] = [value for _, value in given_quoted.values()]
-        solution = np.linalg.lstsq(reported.matrix, targets_quoted, rcond=None)[0]
+        solution = lstsq(reported.matrix, targets_quoted, rcond=None)[0]
         residual = reported.matrix @ solution - targets_quoted
         for row, (name, value) in given_quoted.items():
             if abs(residual[row]) > 1e-9 * max(abs(value), np.abs(targets_quoted).max()):

@@ -9,6 +9,7 @@ from typing import Any, Literal
 
 import numpy as np
 
+from ..computing.decompositions import eigh, svd
 from ..computing.rounding import TOUCHED, blank
 from ..design.objects import Probes, Volume
 from ..geometry.motions import AXIS_NAMES
@@ -167,7 +168,7 @@ class FittedMap:
         """A square root (m, r) of the covariance."""
         spread = np.sqrt(np.diagonal(self.covariance))
         size = np.where(spread > 0.0, spread, 1.0)
-        values, vectors = np.linalg.eigh(self.covariance / np.outer(size, size))
+        values, vectors = eigh(self.covariance / np.outer(size, size))
         is_positive = (
             values > ROUNDING * max(float(values[-1]), 0.0) if len(values) else values > 0.0
         )
@@ -219,7 +220,7 @@ def determined_only(null: Array, scale: Array) -> Array:
     >>> determined_only(np.array([[2.0, 0.0], [0.0, 0.0]]), np.array([2.0, 1.0])).tolist()
     [[2.0], [0.0]]
     """
-    left_vectors, sizes, _ = np.linalg.svd(null / scale[:, None], full_matrices=False)
+    left_vectors, sizes, _ = svd(null / scale[:, None], full_matrices=False)
     directions = scale[:, None] * left_vectors[:, sizes > TOUCHED]
     signs = np.sign(
         directions[

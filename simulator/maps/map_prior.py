@@ -9,6 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..computing.decompositions import eigh
 from ..machines.protocol import Array, Integers
 from .fitted_map import LEAST_SIGMA, FittedMap, determined_only
 
@@ -96,7 +97,7 @@ def determined_combinations(marginal: MapMarginal) -> tuple[Array, Array, Array]
     null = marginal.undetermined / marginal.scale[:, None]
     m, k = null.shape
     across = np.linalg.qr(null, mode="complete")[0][:, k:] if k else np.eye(m)
-    variances, vectors = np.linalg.eigh(across.T @ spread @ across)
+    variances, vectors = eigh(across.T @ spread @ across)
     rows = (across @ vectors).T / marginal.scale
     least = (LEAST**2) * float(variances.max(initial=0.0))
     return rows, rows @ marginal.estimates, np.sqrt(np.maximum(variances, least))

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from ..computing.decompositions import lstsq
 from ..design.arrays import (
     Design,
     Readings,
@@ -137,7 +138,7 @@ def true_artefacts(design: Design, generator: np.random.Generator) -> Array:
         tied = np.concatenate(together)
         used = np.flatnonzero(tied.any(axis=0))
         move = np.zeros(tied.shape[1])
-        move[used] = np.linalg.lstsq(tied[:, used], np.concatenate(sides), rcond=None)[0]
+        move[used] = lstsq(tied[:, used], np.concatenate(sides), rcond=None)[0]
         balls[ends] += move.reshape(-1, d)
     lengths = design.of(Lengths)
     lengths = lengths.select(lengths.is_known)
@@ -181,9 +182,7 @@ def _moved_by_lengths(balls: Array, pairs: Integers, wanted: Array, uncertainty:
         rows = np.zeros((len(wanted), len(ends), balls.shape[1]))
         rows[np.arange(len(wanted)), index[0]] = between / (length * uncertainty)[:, None]
         rows[np.arange(len(wanted)), index[1]] = -rows[np.arange(len(wanted)), index[0]]
-        step = np.linalg.lstsq(
-            rows.reshape(len(wanted), -1), (wanted - length) / uncertainty, rcond=FLAT
-        )[0]
+        step = lstsq(rows.reshape(len(wanted), -1), (wanted - length) / uncertainty, rcond=FLAT)[0]
         moved[ends] += step.reshape(len(ends), -1)
     return moved
 

@@ -13,6 +13,7 @@ from functools import cached_property
 
 import numpy as np
 
+from ..computing.decompositions import svd
 from ..inputs.number_arrays import Array
 from ..inputs.settings import number_of
 from .constraints import Constraint, rows
@@ -163,7 +164,7 @@ def _refuse_undetermined(space: SplineSpace, x: Array, design: Array, null: Arra
     """
     if null.shape[1] == 0:
         return
-    _, values, directions = np.linalg.svd(np.linalg.qr(design, mode="r"), full_matrices=True)
+    _, values, directions = svd(np.linalg.qr(design, mode="r"), full_matrices=True)
     rank_known = int(
         (values > UNDETERMINED * max(float(values.max(initial=0.0)), UNDETERMINED)).sum()
     )
@@ -177,7 +178,7 @@ def _refuse_undetermined(space: SplineSpace, x: Array, design: Array, null: Arra
         lower, upper = float(space.breaks[first]), float(space.breaks[last + 1])
         inside = int(((x >= lower) & (x <= upper)).sum())
         within = open_ * (np.abs(space.pieces[first : last + 1]).max(axis=(0, 1)) > 0)[:, None]
-        missing = np.linalg.matrix_rank(within, tol=1e-6)
+        missing = int((svd(within, compute_uv=False) > 1e-6).sum())
         lacks = number_of(missing, "point")
         where = f"between {{0}} and {{1}}, where it has {inside}"
         text = f"the curve lacks {lacks} {where}; leave out knots or prescribe more"

@@ -237,7 +237,7 @@ def test_a_jacobian_is_compared_with_differences_of_full_rotations() -> None:
     from ballplate.simulator.machines.kinematic import kinematic_model
 
     model = kinematic_model(ARRANGEMENTS["CX1"], 5, 5, (0, 0, 0), (1, 1, 1), True)
-    custom._check("own", model, np.zeros(3), np.ones(3))
+    custom._checked("own", model, np.zeros(3), np.ones(3))
 
 
 def test_priors_about_a_model_of_ones_own(tmp_path: Path) -> None:

@@ -168,6 +168,95 @@ def test_every_command_tells_the_place(
     assert_located(way, told, module)
 
 
+# A model of which one call, counted from its making, goes wrong.
+LATER = (
+    GOOD
+    + """
+calls = builds = 0
+
+
+def counted(function):
+    def call(*given):
+        global calls
+        calls += 1
+        count = calls
+        right = function(*given)
+        if count != AT:
+            return right
+        WAY
+
+    return call
+
+
+for name in ("error", "jacobian", "reported"):
+    setattr(Straight, name, counted(getattr(Straight, name)))
+made = build
+
+
+def build(*given):
+    global builds
+    builds += 1
+    return made(*given)
+"""
+)
+AT_ONCE = {
+    "raises": ("raise ValueError('later')", "ValueError: later"),
+    "returns NaN": ("return right * np.nan", ""),
+    "returns nothing": ("return None", ""),
+    "returns another shape": ("return right[:0]", ""),
+    "ends the program": ("import sys; sys.exit(0)", "SystemExit: 0"),
+}
+
+
+@pytest.mark.parametrize("way", AT_ONCE)
+@pytest.mark.parametrize("at", [1, 10, 21, 30, 40, 50, 61, 75, 100])
+def test_a_call_that_goes_wrong_later_is_told(
+    at: int,
+    way: str,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    source = LATER.replace("AT:", f"{at}:").replace("WAY", AT_ONCE[way][0])
+    monkeypatch.chdir(tmp_path)
+    for command in ("check e.yaml", "run e.yaml"):
+        module = f"later_{next(number)}"
+        (tmp_path / f"{module}.py").write_text(source)
+        (tmp_path / "e.yaml").write_text(EXPERIMENT.replace("MODEL", f"{module}:build"))
+        status = main(command.split())
+        told = capsys.readouterr().err
+        loaded = sys.modules[module]
+        assert loaded.builds == 1
+        # It ends at the wrong call, or needs fewer.
+        assert status == (3 if loaded.calls >= at else 0), told
+        assert status == 0 and loaded.calls < at or re.search(rf"{module}(\.py|:build)", told)
+        assert status == 0 or AT_ONCE[way][1] in told, told
+
+
+def test_a_map_of_an_own_model_can_be_the_true_machine_of_a_sweep(
+    good: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    folder = json.dumps(str(good))
+    for model in (
+        f"{{kind: python, object: 'right_model:build', folder: {folder}}}",
+        "{kind: metric}",
+    ):
+        text = re.sub("error_model: .*", lambda _, model=model: f"error_model: {model}", EXPERIMENT)
+        text = re.sub(
+            "true_machine: .*",
+            lambda _: f"true_machine: {{kind: map, file: {json.dumps(str(good / 'map.yaml'))}}}",
+            text,
+        )
+        (tmp_path / "e.yaml").write_text(text)
+        (tmp_path / "s.yaml").write_text(
+            "title: s\nbase: e.yaml\ntrials: 2\n"
+            "axes: {r: {path: machine.repeatability, values: [0.1 um, 0.2 um]}}\n"
+        )
+        store = ["--store", f"{len(text)}.sqlite", "--folder", str(good)]
+        assert main(["sweep", "s.yaml", "--workers", "1", *store]) == 0
+
+
 def test_what_a_model_prints_is_no_result(tmp_path: Path) -> None:
     source = FAILING.replace("WAY", "print('hello')\n        return right")
     (tmp_path / "chatty.py").write_text("print('loaded')\n" + source)

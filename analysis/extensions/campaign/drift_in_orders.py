@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from ballplate.planning import OrderName, RunSheet, in_time, without_drift
-from ballplate.simulator.computing import evenly_spread, single_threaded
+from ballplate.simulator.computing import evenly_spread, lstsq, single_threaded
 from ballplate.simulator.design import (
     Design,
     DriftSettings,
@@ -170,7 +170,5 @@ def effects_on_distances(design: Design, p: int) -> tuple[Array, Array, Array]:
     covariance = linearisation.covariance(drifts, drifts)
     # With drifts e as parameters of any prior, cov(f, e) cov(e, e)^-1 is the change of functions
     # f per unit of drift that is fixed at a wrong value.
-    bias = np.linalg.lstsq(covariance, linearisation.covariance(drifts, functions), rcond=1e-12)[
-        0
-    ].T
+    bias = lstsq(covariance, linearisation.covariance(drifts, functions), rcond=1e-12)[0].T
     return linearisation.uncertainty(functions), np.asarray(bias, float), covariance

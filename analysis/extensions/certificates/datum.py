@@ -11,6 +11,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from ballplate.simulator.computing import lstsq
 from ballplate.simulator.design import Flags
 from ballplate.simulator.geometry import (
     BallLayout,
@@ -179,7 +180,7 @@ def relative_to(datum: Datum, coordinates: Array, displacements: Array) -> Array
     flat = displacements.reshape(n * d, r)
     rows = _conditions(datum, d)
     # Of balls in line the turn about it moves none, and is left alone.
-    moved = np.linalg.lstsq(motions[rows], flat[rows], rcond=1e-10)[0]
+    moved = lstsq(motions[rows], flat[rows], rcond=1e-10)[0]
     result = flat - motions @ moved
     result[rows] = 0.0
     return result.reshape(n, d, r)

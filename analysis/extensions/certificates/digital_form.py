@@ -10,6 +10,7 @@ from importlib.metadata import version
 from xml.sax.saxutils import escape
 
 import numpy as np
+from ballplate.simulator.computing import lstsq
 from ballplate.simulator.inputs import in_one_line
 
 from .certificate_csv import coordinate_names, scaled
@@ -186,7 +187,7 @@ def _ellipsoid_factor(certificate: CertifiedBalls) -> str:
     """
     from scipy.special import chdtri, fdtri
 
-    rank = int(np.linalg.matrix_rank(certificate.covariance, hermitian=True))
+    rank = int(lstsq(certificate.covariance, certificate.covariance)[2])
     freedom = certificate.degrees_of_freedom
     square = chdtri(rank, 0.05) if np.isinf(freedom) else rank * fdtri(rank, freedom, 0.95)
     return f"{max(float(np.sqrt(square)), 1.0):.6g}"

@@ -6,6 +6,7 @@ NPL Report CISE 15/98, section 2.3: every kinematic model is a special case of s
 from __future__ import annotations
 
 import numpy as np
+from ballplate.simulator.computing import lstsq
 from ballplate.simulator.machines import (
     USUAL_OFFSET,
     Array,
@@ -42,7 +43,7 @@ def linear_map(inner: ErrorModel, outer: ErrorModel) -> Array:
     jacobian = outer.jacobian(x, np.zeros(count), p).reshape(-1, count)
     wanted = inner.jacobian(x, np.zeros(len(inner.parameters)), p).reshape(len(jacobian), -1)
     scale = np.linalg.norm(jacobian, axis=0)
-    matrix = np.linalg.lstsq(jacobian / scale, wanted, rcond=1e-13)[0] / scale[:, None]
+    matrix = lstsq(jacobian / scale, wanted, rcond=1e-13)[0] / scale[:, None]
     misfits = np.abs(jacobian @ matrix - wanted).max(axis=0) / np.abs(wanted).max(axis=0)
     missing = tuple(
         p.name for p, part in zip(inner.parameters, misfits, strict=True) if part > CONTAINED

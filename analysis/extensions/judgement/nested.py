@@ -11,7 +11,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from ballplate.simulator.computing import single_threaded
+from ballplate.simulator.computing import single_threaded, svd
 from ballplate.simulator.design import Flags
 from ballplate.simulator.estimation import Linearisation, in_order
 from ballplate.simulator.machines import Array, Integers
@@ -56,7 +56,7 @@ def span(columns: Array, size: float) -> Array:
     """Orthonormal directions of columns, of a given size before anything was taken out."""
     if not columns.shape[1]:
         return np.zeros((len(columns), 0))
-    u, values, _ = np.linalg.svd(columns, full_matrices=False)
+    u, values, _ = svd(columns, full_matrices=False)
     return u[:, values > NOTHING * max(size, float(values[0]))]
 
 

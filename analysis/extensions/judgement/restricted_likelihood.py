@@ -18,7 +18,7 @@ from functools import cached_property
 
 import numpy as np
 from ballplate.extensions.reliability.remainders import Leftover
-from ballplate.simulator.computing import scipy_linalg
+from ballplate.simulator.computing import eigh, lstsq, scipy_linalg
 from ballplate.simulator.machines import Array, Integers
 
 from .observation_groups import ObservationGroup
@@ -120,7 +120,7 @@ def estimated_ratios(sums: GroupSums, free: Integers) -> Array:
         moving = free[inside]
         if not len(moving):
             break
-        step = np.linalg.lstsq(now.information[np.ix_(moving, moving)], slope[inside])[0]
+        step = lstsq(now.information[np.ix_(moving, moving)], slope[inside])[0]
         step *= min(1.0, LONGEST_STEP / max(float(np.abs(step).max()), LAST_STEP))
         for _ in range(30):
             tried = ratios.copy()
@@ -143,7 +143,7 @@ def degrees_of_freedom(information: Array) -> Array:
     Their relative variance is 2 over these, as that of the estimates is to first order
     (Satterthwaite, Biometrics 2, 1946).
     """
-    values, vectors = np.linalg.eigh(information)
+    values, vectors = eigh(information)
     is_positive = values > 1e-10 * max(float(values.max(initial=0.0)), 1e-300)
     unknown = (vectors[:, ~is_positive] ** 2).sum(axis=1) > 1e-12
     variance = (vectors[:, is_positive] ** 2 / values[is_positive]).sum(axis=1)
@@ -197,7 +197,7 @@ class RatioTest:
         slope = squares - redundancies
         other_groups = np.delete(np.arange(len(weight)), self.group)
         mixed = information[self.group, other_groups]
-        share = np.linalg.lstsq(information[np.ix_(other_groups, other_groups)], mixed)[0]
+        share = lstsq(information[np.ix_(other_groups, other_groups)], mixed)[0]
         freedom = float(information[self.group, self.group] - share @ mixed)
         score = float(slope[self.group] - share @ slope[other_groups])
         redundancy = float(redundancies[self.group])
@@ -249,7 +249,7 @@ class Whitened:
     def test_of(self, place: int) -> RatioTest:
         """Tests of the ratio of the free group at a place among these."""
         sums, ratios, free = self.sums, self.ratios, self.free
-        values, vectors = np.linalg.eigh(self.absorbed[place])
+        values, vectors = eigh(self.absorbed[place])
         basis = scipy_linalg().solve_triangular(self.root, vectors, lower=True, trans="T")
         fixed = np.setdiff1d(np.arange(len(ratios)), free)
         return RatioTest(

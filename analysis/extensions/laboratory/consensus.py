@@ -6,7 +6,7 @@ from functools import lru_cache
 from itertools import combinations
 
 import numpy as np
-from ballplate.simulator.computing import comparable
+from ballplate.simulator.computing import comparable, svd
 from ballplate.simulator.design import Flags
 from ballplate.simulator.geometry import fit_motion
 from ballplate.simulator.machines import Array, Integers
@@ -69,7 +69,7 @@ def _widest(content: bytes, d: int) -> Integers:
     else:
         drawn = np.random.default_rng(0).integers(0, m, (4 * SUBSETS, size))
     points = source[drawn] - source[drawn].mean(axis=1, keepdims=True)
-    extent = np.linalg.svd(points, compute_uv=False)
+    extent = svd(points, compute_uv=False)
     # Across its main line where it has one, so that three points of a row are drawn last.
     spread = extent[:, max(d - 2, 0)] + 1e-3 * extent[:, 0]
     return drawn[np.argsort(-spread, kind="stable")[:SUBSETS]]
@@ -83,7 +83,7 @@ def _motions(source: Array, target: Array) -> tuple[Array, Array]:
     spread = (target - centre_target[:, None]).transpose(0, 2, 1) @ (
         source - centre_source[:, None]
     )
-    u, _, vh = np.linalg.svd(spread)
+    u, _, vh = svd(spread)
     u[:, :, -1] *= np.sign(np.linalg.det(u @ vh))[:, None]
     rotations = u @ vh
     return rotations, centre_target - np.einsum("cij,cj->ci", rotations, centre_source)

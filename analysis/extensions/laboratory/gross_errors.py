@@ -20,6 +20,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
+from ballplate.simulator.computing import svd
 from ballplate.simulator.design import (
     Design,
     Flags,
@@ -167,7 +168,7 @@ def _against_drawing(
 
 def _in_line(places: Array) -> bool:
     """True if points (m, d) lie on one line in space, about which any turn fits."""
-    extent = np.linalg.svd(places - places.mean(axis=0), compute_uv=False)
+    extent = svd(places - places.mean(axis=0), compute_uv=False)
     return places.shape[1] == 3 and bool(extent[1] < FLAT * extent[0])
 
 

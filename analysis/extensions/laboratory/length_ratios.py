@@ -9,6 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from ballplate.simulator.computing import svd
 from ballplate.simulator.design import Design, Lengths
 from ballplate.simulator.estimation import FLAT, fit_sphere
 from ballplate.simulator.machines import Array
@@ -93,7 +94,7 @@ def _of_radii(design: Design, places: Array, rows: np.ndarray) -> Array:
         centre, radius = fit_sphere(points, design.positions.origins[k])
         away = points - centre
         size = np.sqrt((away**2).sum(axis=1))
-        _, values, vh = np.linalg.svd(
+        _, values, vh = svd(
             np.column_stack([away / size[:, None], np.ones(len(size))]), full_matrices=False
         )
         if (

@@ -3,9 +3,13 @@
 from __future__ import annotations
 
 import warnings
+from collections.abc import Iterator
+from contextlib import suppress
 from io import BytesIO
+from itertools import chain
 from pathlib import Path
 from typing import Any
+from xml.etree.ElementTree import ParseError, iterparse
 from zipfile import ZipFile
 
 from ballplate.simulator.inputs import GivenText, read_bytes, refused, shorten
@@ -13,9 +17,11 @@ from ballplate.simulator.readings import SourceText
 
 from .heading_words import AXIS_WORDS, heading, quoted
 
-# Bytes of the sheets as XML, and cells up to the last row and column of a sheet.
+# Bytes of the sheets as XML, and of their tables; cells up to the last rows and columns of the
+# sheets; and cells in ranges, for each of which openpyxl makes an object.
 MOST_BYTES = 30_000_000
 MOST_CELLS = 2_000_000
+MOST_IN_RANGES = 200_000
 # Rows in which headings are looked for.
 MOST_ABOVE = 200
 
@@ -39,9 +45,13 @@ def workbook_tables(source: Path, sheet: str | None) -> list[SourceText]:
         with ZipFile(BytesIO(content)) as archive, warnings.catch_warnings():
             if sum(entry.file_size for entry in archive.infolist()) > MOST_BYTES:
                 raise ValueError(f"more than {MOST_BYTES} bytes")
+            if sum(_cells_in_ranges(archive)) > MOST_IN_RANGES:
+                raise ValueError(f"more than {MOST_IN_RANGES} cells are merged or linked")
             # Styles and macros that are not read.
             warnings.simplefilter("ignore")
             book = load_workbook(BytesIO(content), data_only=True)
+        if sum(one.max_row * one.max_column for one in book.worksheets) > MOST_CELLS:
+            raise ValueError(f"more than {MOST_CELLS} cells")
         sheets = {one.title: _rows(one) for one in book.worksheets}
     except Exception as error:
         # Damaged archives and XML raise errors of many kinds.
@@ -68,13 +78,27 @@ def workbook_tables(source: Path, sheet: str | None) -> list[SourceText]:
 
 
 def _rows(sheet: Any) -> list[list[str]]:
-    if sheet.max_row * sheet.max_column > MOST_CELLS:
-        raise ValueError(f"more than {MOST_CELLS} cells")
     rows = [[_text(value) for value in row] for row in sheet.iter_rows(values_only=True)]
     for merged in sheet.merged_cells.ranges:
         for row in rows[merged.min_row : merged.max_row]:
             row[merged.min_col - 1] = rows[merged.min_row - 1][merged.min_col - 1]
+    if sum(map(len, chain(*rows))) > MOST_BYTES:
+        raise ValueError(f"more than {MOST_BYTES} bytes")
     return rows
+
+
+def _cells_in_ranges(archive: ZipFile) -> Iterator[int]:
+    """Numbers of cells of the merged and the linked ranges of all sheets."""
+    from openpyxl.utils import range_boundaries
+
+    for entry in archive.infolist():
+        # Pictures are no XML.
+        with suppress(ParseError), archive.open(entry) as content:
+            for _, element in iterparse(content):
+                if element.tag.rpartition("}")[2] in ("mergeCell", "hyperlink"):
+                    left, top, right, bottom = range_boundaries(element.get("ref", "A1"))
+                    yield (right - left + 1) * (bottom - top + 1)
+                element.clear()
 
 
 def _text(value: object) -> str:

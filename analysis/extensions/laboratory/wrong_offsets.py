@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 from itertools import chain, combinations
 
 import numpy as np
+from ballplate.simulator.computing import lstsq
 from ballplate.simulator.design import (
     Design,
     Flags,
@@ -140,7 +141,7 @@ class OffsetDifferences:
         by_probe = self._centred((self.probe[:, None] == np.arange(probes)).astype(float))
         plain = self.left(shifts_found)
         for axis, is_axis_read in enumerate(self.is_read.T):
-            shifts_found[:, axis] = -np.linalg.lstsq(
+            shifts_found[:, axis] = -lstsq(
                 by_probe[is_axis_read], plain[is_axis_read, axis], rcond=1e-9
             )[0]
         return shifts_found

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from ballplate.presentation import Data, Result, number, records, table_lines
 from ballplate.results import ARCSECOND, coverage_factor, few_degrees_of_freedom
-from ballplate.simulator.computing import single_threaded
+from ballplate.simulator.computing import lstsq, single_threaded
 from ballplate.simulator.geometry import AXIS_NAMES, rigid_motions
 from ballplate.simulator.inputs import number_of
 from ballplate.simulator.machines import Array, Unit
@@ -163,7 +163,7 @@ def _followed(fitted: FittedMap, values: Array, change: MachineChange) -> Array:
         residual = wanted.ravel() - have
         jacobian = fitted.model.jacobian(points, state, offsets).reshape(points.size, -1)
         columns = np.concatenate([jacobian * scale, motions], axis=1)
-        step = np.linalg.lstsq(columns, residual, rcond=1e-12)[0]
+        step = lstsq(columns, residual, rcond=1e-12)[0]
         state, motion = state + scale * step[: len(values)], motion + step[len(values) :]
         residual = residual - columns @ step
     largest = abs(change.amount) * float((upper - lower).max())

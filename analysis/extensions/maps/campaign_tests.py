@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
-from ballplate.simulator.computing import scipy_linalg, single_threaded
+from ballplate.simulator.computing import eigh, scipy_linalg, single_threaded
 from ballplate.simulator.machines import Array
 
 # Differences that are so small by no larger chance than this are doubted.
@@ -110,14 +110,14 @@ def joint_difference(
         return linalg.solve_triangular(triangle, basis.T @ some, trans="T")
 
     difference, first, second = map(whitened, (values[is_uncertain] / size, *parts))
-    spread, directions = np.linalg.eigh(first @ first.T + second @ second.T)
+    spread, directions = eigh(first @ first.T + second @ second.T)
     is_fixed = spread <= FIXED**2
     fixed = directions[:, is_fixed]
     fixed_differences = size * (basis @ (triangle.T @ (fixed @ (fixed.T @ difference))))
     to_unit = (directions[:, ~is_fixed] / np.sqrt(spread[~is_fixed])).T
     if not len(to_unit):
         return None
-    shares, directions = np.linalg.eigh(to_unit @ first @ (to_unit @ first).T)
+    shares, directions = eigh(to_unit @ first @ (to_unit @ first).T)
     shares, squares = np.clip(shares, 0.0, 1.0), (directions.T @ to_unit @ difference) ** 2
     return JointDifference(
         float(squares.sum()),

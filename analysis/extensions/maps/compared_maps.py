@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from ballplate.results import Fit, data_of
+from ballplate.simulator.computing import svd
 from ballplate.simulator.design import Volume
 from ballplate.simulator.geometry import cross_matrices, pose_size
 from ballplate.simulator.inputs import LengthFunction, number_of
@@ -161,7 +162,7 @@ def without_shared(root: Array, absorbed: Array | None) -> tuple[Array, Array]:
     """
     if absorbed is None:
         return root, np.zeros((len(root), 0))
-    _, sizes, axes = np.linalg.svd(absorbed, full_matrices=False)
+    _, sizes, axes = svd(absorbed, full_matrices=False)
     remaining = np.sqrt(np.maximum(1.0 - sizes**2, 0.0))
     return root - (root @ axes.T * (1.0 - remaining)) @ axes, root @ absorbed.T
 

@@ -8,7 +8,7 @@ from itertools import combinations
 from typing import Any
 
 import numpy as np
-from ballplate.simulator.computing import single_threaded
+from ballplate.simulator.computing import pinv, single_threaded
 from ballplate.simulator.design import Volume
 from ballplate.simulator.geometry import AXIS_NAMES, even_grid
 from ballplate.simulator.machines import Array, ErrorModel, HasLines, Integers
@@ -118,7 +118,7 @@ def compared(
     difference, offset = difference_at(points, offsets[probe]), offsets[probe]
     middle = points.mean(axis=0)
     moving = motions(points - middle).reshape(points.size, -1)
-    motion = difference.by(np.asarray(np.linalg.pinv(moving)))
+    motion = difference.by(np.asarray(pinv(moving)))
     remainder = difference.without(orthonormal(moving))
     names = tuple(
         f"{axis} at {place}" for place in map(_place, points) for axis in AXIS_NAMES[: len(middle)]

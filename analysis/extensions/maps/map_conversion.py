@@ -8,7 +8,7 @@ from itertools import product
 from typing import Any
 
 import numpy as np
-from ballplate.simulator.computing import single_threaded
+from ballplate.simulator.computing import pinv, single_threaded
 from ballplate.simulator.design import rotation_sensitivity
 from ballplate.simulator.machines import USUAL_OFFSET, Array, ErrorModel
 from ballplate.simulator.maps import FittedMap, determined_only
@@ -65,7 +65,7 @@ def converted(
     wanted = (fitted.model.error(x, fitted.values, p) - p).ravel()
     by_old = fitted.model.jacobian(x, fitted.values, p).reshape(x.size, -1)
     size = np.array([1.0 / parameter.effect for parameter in model.parameters])
-    inverse = np.linalg.pinv(own_columns * size, rcond=NOTHING)
+    inverse = pinv(own_columns * size, rcond=NOTHING)
     arm = x + p - (x + p).mean(axis=0)
     shifts = np.broadcast_to(np.eye(d), (len(x), d, d))
     motions = np.concatenate([shifts, rotation_sensitivity(arm)], axis=2).reshape(x.size, -1)
@@ -76,7 +76,7 @@ def converted(
     # What the model can move by itself is no motion between frames.
     beyond = residual(motions)
     used = np.linalg.norm(beyond, axis=0) > OWN_MOTION * np.linalg.norm(motions, axis=0)
-    moving = np.linalg.pinv(beyond[:, used], rcond=OWN_MOTION)
+    moving = pinv(beyond[:, used], rcond=OWN_MOTION)
     sides = np.column_stack([wanted, by_old])
     moved = moving @ residual(sides)
     by_both = size[:, None] * (inverse @ (sides - motions[:, used] @ moved))

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from ballplate.presentation import Data, as_data
+from ballplate.simulator.computing import eigh
 from ballplate.simulator.machines import Array
 
 # Realisations that are drawn at most, and co-ordinates of all of them, of eight bytes each.
@@ -61,5 +62,5 @@ def symmetric_root(covariance: Array, scale: Array) -> Array:
     >>> (root @ root.T).round(12).tolist()
     [[4.0, 2.0], [2.0, 3.0]]
     """
-    values, vectors = np.linalg.eigh(covariance / np.outer(scale, scale))
+    values, vectors = eigh(covariance / np.outer(scale, scale))
     return scale[:, None] * (vectors * np.sqrt(np.maximum(values, 0.0))) @ vectors.T

@@ -8,6 +8,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 from ballplate.presentation import MOST_BALLS, box_edges, hull, names_fit, projection, round_number
+from ballplate.simulator.computing import eigh, svd
 from ballplate.simulator.design import Design, locations, nominal_state
 from ballplate.simulator.estimation import Linearisation, correction_rows
 from ballplate.simulator.machines import Array, Integers
@@ -214,7 +215,7 @@ def _ellipsoids(
     with a name, a label and a title.
     """
     name, label, title = names
-    variances, axes = np.linalg.eigh(spread @ spread.transpose(0, 2, 1))
+    variances, axes = eigh(spread @ spread.transpose(0, 2, 1))
     half = np.sqrt(np.maximum(variances, 0.0))
     longest = float(half.max(initial=0.0))
     times = round_number(LONGEST_AXIS * size / longest) if longest > 0.0 else 1.0
@@ -319,7 +320,7 @@ def _moving_readings(design: Design, most: int) -> Integers:
 def _outline(points: Array) -> Array:
     """Corners (k, d) of points' convex hull in the plane that they are closest to."""
     centre = points.mean(axis=0)
-    _, _, axes = np.linalg.svd(points - centre, full_matrices=False)
+    _, _, axes = svd(points - centre, full_matrices=False)
     plane = axes[:2]
     corners = (
         hull(np.round((points - centre) @ plane.T, 9))

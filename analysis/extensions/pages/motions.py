@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from ballplate.rank import null_changes, weak_changes
-from ballplate.simulator.computing import single_threaded
+from ballplate.simulator.computing import lstsq, single_threaded
 from ballplate.simulator.design import Readings
 from ballplate.simulator.estimation import Linearisation, correction_rows
 from ballplate.simulator.geometry import cross_matrices
@@ -38,7 +38,7 @@ def weak_motions(linearisation: Linearisation, target: Target | None) -> tuple[M
     motions = []
     for shared in weak_changes(linearisation, target):
         # By the same standard normal variables that make this of the shared parameters.
-        made, *_ = np.linalg.lstsq(linearisation.shared, shared, rcond=None)
+        made, *_ = lstsq(linearisation.shared, shared, rcond=None)
         motions.append(
             Motion(shared, linearisation.balls.common[:, :, : linearisation.rank] @ made)
         )

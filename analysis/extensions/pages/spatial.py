@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 from ballplate.presentation import RISE, TURN, projection
+from ballplate.simulator.computing import svd
 from ballplate.simulator.machines import Array
 
 from .document import shipped
@@ -190,7 +191,7 @@ def _drawn(layer: Layer, number: int, eye: _Eye) -> Html:
 
 def _ellipse(centre: Sequence[float], root: Array) -> str:
     """Outline of an ellipsoid on the paper, whose root there is (2, d)."""
-    axes, sizes, _ = np.linalg.svd(root, full_matrices=False)
+    axes, sizes, _ = svd(root, full_matrices=False)
     x, y = (axes[:, 0] * sizes[0] * [1.0, -1.0]).tolist()
     angle = np.degrees(np.arctan2(y, x))
     arc = f"a{sizes[0]:.1f} {sizes[1]:.1f} {angle:.0f} 1 0"

@@ -18,6 +18,7 @@ from ballplate.extensions.reliability.power import noncentrality
 from ballplate.extensions.reliability.remainders import HIDDEN, Leftover
 from ballplate.extensions.reliability.rivals import clear_odds, log_p, standing, variance
 from ballplate.extensions.reliability.smooth import rows_of
+from ballplate.simulator.computing import svd
 from ballplate.simulator.design import (
     Design,
     Disturbed,
@@ -66,7 +67,7 @@ class Tested:
         size = np.linalg.norm(self.sensitivity, axis=0)
         size[size == 0.0] = 1.0
         remaining = left.of(self.sensitivity / size)
-        _, values, vectors = np.linalg.svd(remaining, full_matrices=False)
+        _, values, vectors = svd(remaining, full_matrices=False)
         shown = min(int((values**2 > HIDDEN).sum()), self.dimensions)
         rows, hidden = reduced(vectors[:shown] * size), reduced(vectors[shown:] * size)
         root = (rows / size) @ vectors[:shown].T / values[:shown]

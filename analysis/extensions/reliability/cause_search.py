@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
-from ballplate.simulator.computing import single_threaded
+from ballplate.simulator.computing import pinv, single_threaded
 from ballplate.simulator.design import Design, State, expected_readings
 from ballplate.simulator.estimation import Linearisation, linearise
 from ballplate.simulator.machines import Array, Integers
@@ -370,7 +370,7 @@ class Search:
         sigma = math.sqrt(self.left.sum_of_squares / self.left.freedom) if self.estimated else 1.0
         matrix = self._dense(np.concatenate([cause_found.columns for cause_found in chosen]))
         size = np.linalg.norm(matrix, axis=0)
-        inverse = np.linalg.pinv(self.start.of(matrix / size), rcond=HIDDEN)
+        inverse = pinv(self.start.of(matrix / size), rcond=HIDDEN)
         values = inverse @ self.start.residual / size
         uncertainties = sigma * np.linalg.norm(inverse, axis=1) / size
         first_row = 0

@@ -19,6 +19,7 @@ from ballplate.extensions.laboratory.wrong_offsets import (
     stated_offsets,
     with_offsets,
 )
+from ballplate.simulator.computing import lstsq
 from ballplate.simulator.design import Design, Flags, Priors
 from ballplate.simulator.estimation import (
     Linearisation,
@@ -273,7 +274,7 @@ class _Offsets:
         side = np.concatenate([side, weight * (change - stated)])
         root = np.concatenate([self.root, np.diag(weight)])[:, moving]
         size = np.maximum(self.size[moving], weight[moving])
-        step = np.linalg.lstsq(root / size, -side, rcond=SHOWN)[0]
+        step = lstsq(root / size, -side, rcond=SHOWN)[0]
         change[moving] += step / size
         residual = side + root @ (step / size)
         return float(residual @ residual), change

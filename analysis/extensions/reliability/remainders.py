@@ -8,6 +8,7 @@ from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
+from ballplate.simulator.computing import eigh, svd
 from ballplate.simulator.design import Design, shared_layout
 from ballplate.simulator.estimation import Linearisation
 from ballplate.simulator.machines import Array, Integers
@@ -103,7 +104,7 @@ def orthonormal(remainder: Array, size: Array, most: int | None = None) -> Array
     With `most`, it has only that number of the most visible directions.
     """
     use = size > 0.0
-    u, values, _ = np.linalg.svd(remainder[:, use] / size[use], full_matrices=False)
+    u, values, _ = svd(remainder[:, use] / size[use], full_matrices=False)
     return u[:, values**2 > HIDDEN][:, :most]
 
 
@@ -223,7 +224,7 @@ class Columns:
                 self.statistics()[single] ** 2, (self.information[single] > 0.0).astype(float)
             )
         further = self.further[index] / self.size[index][:, :, None]
-        values, vectors = np.linalg.eigh(gram - further @ further.transpose(0, 2, 1))
+        values, vectors = eigh(gram - further @ further.transpose(0, 2, 1))
         along = np.einsum("gij,gi->gj", vectors, self.product[index] / self.size[index])
         q = index.shape[1]
         is_visible = (values > HIDDEN) & (np.arange(q) >= q - self.most[number][:, None])

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
-from ballplate.simulator.computing import comparable
+from ballplate.simulator.computing import comparable, svd
 from ballplate.simulator.machines import Array
 
 from .changes import Change
@@ -29,7 +29,7 @@ def covering_set(
     k = stack.shape[2]
     unseen, built = np.eye(k), list[Change]()
     while unseen.shape[1]:
-        values = np.linalg.svd(stack @ unseen, compute_uv=False)
+        values = svd(stack @ unseen, compute_uv=False)
         gains = (values > SEEN).sum(axis=1)
         weakest = comparable(np.where(values > SEEN, values, np.inf).min(axis=1))
         possible = [
@@ -51,5 +51,5 @@ def covering_set(
 
 def _null_space(rows: Array) -> Array:
     """Return orthonormal columns (k, open) of the null space of rows (m, k)."""
-    _, values, directions = np.linalg.svd(rows)
+    _, values, directions = svd(rows)
     return directions[int((values > SEEN).sum()) :].T

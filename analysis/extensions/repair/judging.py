@@ -8,7 +8,7 @@ from functools import cached_property
 
 import numpy as np
 from ballplate.rank import effects, weak_limit
-from ballplate.simulator.computing import above, comparable
+from ballplate.simulator.computing import above, comparable, lstsq
 from ballplate.simulator.estimation import Linearisation, linearise
 from ballplate.simulator.experiment import Experiment, lay_out, placed_only
 from ballplate.simulator.inputs import ExperimentError
@@ -102,7 +102,7 @@ def removed(before: Array, after: Array) -> tuple[int, ...]:
     """
     if not after.shape[1]:
         return tuple(range(before.shape[1]))
-    parts, _, rank, _ = np.linalg.lstsq(before, after, rcond=1e-9)
+    parts, _, rank, _ = lstsq(before, after, rcond=1e-9)
     if rank < before.shape[1]:
         return ()
     return tuple(

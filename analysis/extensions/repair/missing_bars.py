@@ -13,7 +13,7 @@ from itertools import combinations_with_replacement
 
 import numpy as np
 from ballplate.rank import relative_changes
-from ballplate.simulator.computing import comparable
+from ballplate.simulator.computing import comparable, svd
 from ballplate.simulator.design import Design, Lengths, SharedLayout
 from ballplate.simulator.geometry import without_rigid_motion
 from ballplate.simulator.machines import Array
@@ -67,11 +67,11 @@ def _open_strains(design: Design, layout: SharedLayout, open_: Array) -> Array:
     flat = flat[:, (flat**2).sum(axis=0) > 0.0]
     if not flat.shape[1]:
         return np.zeros((_size(design.dimension), 0))
-    u, values, _ = np.linalg.svd(flat / np.linalg.norm(flat, axis=0), full_matrices=False)
+    u, values, _ = svd(flat / np.linalg.norm(flat, axis=0), full_matrices=False)
     spanned = u[:, values > MISSING * values[0]]
     strain = wanted.reshape(len(flat), -1)
     unspanned = strain - spanned @ (spanned.T @ strain)
-    return _null_space(unspanned, float(np.linalg.norm(strain, 2)))
+    return _null_space(unspanned, float(svd(strain, compute_uv=False).max(initial=0.0)))
 
 
 def _what_is_missing(design: Design, strains: Array) -> str:
@@ -99,7 +99,7 @@ def _what_is_missing(design: Design, strains: Array) -> str:
         lies = "lies in a plane parallel to" if only_gauges else "lies parallel to"
         return f"{subject} {lies} {_plane(normals[:, 0])}"
     if d - normals.shape[1] == 1 and not few:
-        return f"{subject} lies along {_axis(np.linalg.svd(directions)[2][0])}"
+        return f"{subject} lies along {_axis(svd(directions)[2][0])}"
     if with_plates:
         return ""
     who = "locations of the ball" if only_gauges else "bars' directions"
@@ -152,6 +152,6 @@ def _is_among(strain: Array, span: Array) -> bool:
 def _null_space(rows: Array, size: float | None = None) -> Array:
     """Return orthonormal columns that the rows map almost to zero."""
     triangle = np.linalg.qr(rows, mode="r") if len(rows) > rows.shape[1] else rows
-    _, values, directions = np.linalg.svd(triangle)
+    _, values, directions = svd(triangle)
     largest = values.max(initial=0.0) if size is None else size
     return directions[int((values > MISSING * largest).sum()) :].T

@@ -7,6 +7,7 @@ from functools import partial
 from itertools import product
 
 import numpy as np
+from ballplate.simulator.computing import svd
 from ballplate.simulator.experiment import Experiment, Position, Probe
 from ballplate.simulator.geometry import AXIS_INDEX, QUARTER_TURNS
 from ballplate.simulator.inputs import format_length
@@ -112,7 +113,7 @@ def new_tips(experiment: Experiment) -> dict[str, Probe]:
     if experiment.dimension == 2 or any(probe.is_estimated for probe in probes):
         return {}
     offsets = np.array([probe.offset for probe in probes])
-    values = np.linalg.svd(offsets - offsets.mean(axis=0), compute_uv=False)
+    values = svd(offsets - offsets.mean(axis=0), compute_uv=False)
     if len(values) > 1 and values[1] > 1e-6:
         return {}
     size = float(np.linalg.norm(offsets, axis=1).max(initial=0.0)) or TIP

@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
+from ballplate.simulator.computing import svd
 from ballplate.simulator.design import (
     Design,
     DistanceCalibration,
@@ -124,7 +125,7 @@ def _without(rows: Array, by_pose: Array) -> Array:
     """Return rows (m, d, k) after elimination of their own pose, with derivatives (m, d, pose
     size).
     """
-    u, sizes, _ = np.linalg.svd(by_pose.reshape(-1, by_pose.shape[2]), full_matrices=False)
+    u, sizes, _ = svd(by_pose.reshape(-1, by_pose.shape[2]), full_matrices=False)
     u = u[:, sizes > 1e-10 * sizes[0]]
     flat = rows.reshape(len(u), -1)
     return (flat - u @ (u.T @ flat)).reshape(rows.shape)
@@ -141,4 +142,4 @@ def rank_of(triangles: Sequence[Array]) -> int:
     """Return the number of directions that the triangles remove together."""
     if not triangles:
         return 0
-    return int((np.linalg.svd(np.concatenate(list(triangles)), compute_uv=False) > SEEN).sum())
+    return int((svd(np.concatenate(list(triangles)), compute_uv=False) > SEEN).sum())

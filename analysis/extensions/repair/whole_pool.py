@@ -10,7 +10,7 @@ from ballplate.planning import Information
 from ballplate.presentation import Data
 from ballplate.rank import Verdict, changed_names
 from ballplate.results import check
-from ballplate.simulator.computing import comparable
+from ballplate.simulator.computing import comparable, eigh
 from ballplate.simulator.experiment import Candidate, Experiment, Position, with_chosen
 from ballplate.simulator.inputs import ExperimentError, listing
 
@@ -119,7 +119,7 @@ def spanning(information: Information, candidates: Sequence[Candidate]) -> tuple
         _take(unread, [best])
     flat = information.matrices[:count].reshape(count, -1)
     while True:
-        values, directions = np.linalg.eigh(information.of(few))
+        values, directions = eigh(information.of(few))
         smallest_value, shared_places = values.min(initial=1.0), places.intersection(few)
         is_even = smallest_value > EVEN * len(few) / count
         if is_even or shared_places == places or len(shared_places) >= MOST_SPANNING:

@@ -13,6 +13,8 @@ from .document import DesignDocument, opened
 from .recovery import kept_in, name_of_kept
 
 ENDINGS = (".yaml", ".yml")
+# Bytes of the name of a file, of which systems allow 255.
+MOST_IN_NAME = 200
 
 
 class RefusedError(Exception):
@@ -52,6 +54,8 @@ class DesignFolder:
         folder = self._first.parent
         path = folder / name
         is_plain = name == Path(name).name and name.isprintable() and _is_design(name)
+        # What is kept of unsaved changes has a longer one.
+        is_plain = is_plain and len(name.encode()) <= MOST_IN_NAME
         if not is_plain or path.resolve().parent != folder:
             raise RefusedError(f'"{name}" is not the name of a design in the folder {folder.name}')
         return path

@@ -20,6 +20,7 @@ from ballplate.simulator.computing import (
     Report,
     begin_worker,
     interruptions_blocked,
+    safe_path,
 )
 from ballplate.simulator.inputs import ExperimentError, refused
 
@@ -101,7 +102,7 @@ class Worker:
         self._connection, child_end = context.Pipe()
         arguments = (child_end, self._folder)
         self._process = process = context.Process(target=_serve, args=arguments, daemon=True)
-        with interruptions_blocked():
+        with interruptions_blocked(), safe_path():
             process.start()
         child_end.close()
 

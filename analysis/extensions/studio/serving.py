@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import asyncio
+import logging
 import secrets
 import socket
 from collections.abc import Callable, Iterator
@@ -25,6 +27,11 @@ class _Server(uvicorn.Server):
     def capture_signals(self) -> Iterator[None]:
         with nullcontext():
             yield
+
+
+def _is_error(record: logging.LogRecord) -> bool:
+    error = record.exc_info[1] if record.exc_info else None
+    return not isinstance(error, asyncio.CancelledError | KeyboardInterrupt)
 
 
 def serve(session: Session, port: int, tell: Callable[[str], None]) -> None:
@@ -51,6 +58,8 @@ def serve(session: Session, port: int, tell: Callable[[str], None]) -> None:
             lifespan="off",
             timeout_graceful_shutdown=LAST_ANSWERS,
         )
+        # An answer that the end of the studio interrupts is no error.
+        logging.getLogger("uvicorn.error").addFilter(_is_error)
         tell(f"http://{ADDRESS}:{number}/?token={token}")
         try:
             _Server(config).run(sockets=[listener])

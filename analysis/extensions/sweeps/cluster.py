@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Any
 
 import ballplate.simulator
-from ballplate.simulator.inputs import OPENED, UnusableError
+from ballplate.simulator.inputs import OPENED, UnusableError, own_modules
 
 from .bundle import Bundle, unpack
 from .execute import Runner
@@ -271,5 +271,6 @@ def _unpacked(bundle: Bundle) -> tuple[tempfile.TemporaryDirectory[str], Path]:
     for name, module in list(sys.modules.items()):
         if PREFIX in (getattr(module, "__file__", None) or ""):
             del sys.modules[name]
-    sys.path[:] = [path for path in sys.path if PREFIX not in path]
+    folders = own_modules().folders
+    folders[:] = [path for path in folders if PREFIX not in path]
     return folder, unpack(bundle, Path(folder.name))

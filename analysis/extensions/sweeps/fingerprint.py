@@ -58,6 +58,8 @@ LEFT_OUT_OF = {
     "Position": ("enabled",),
     "Prior": ("data",),
     "PythonCalibration": ("functions",),
+    "GuardedModel": ("model",),
+    "GuardedModelWithLines": ("model",),
 }
 
 # Names of fields in the fingerprints that stores hold, where the field has another name today.

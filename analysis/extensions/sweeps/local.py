@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
 
-from ballplate.simulator.computing import begin_worker, in_processes
+from ballplate.simulator.computing import begin_worker, in_processes, safe_path
 from ballplate.simulator.inputs import ExperimentError, Trust
 
 from .bundle import Bundle, bundle_of, files_of
@@ -90,9 +90,12 @@ def _alone(source: _Source, digest: str, task: CellTask) -> CellResult | None:
     """Return the row of a task in a process of its own; None if the process dies each time."""
     context = multiprocessing.get_context("spawn")
     for _ in range(TRIES):
-        with ProcessPoolExecutor(
-            1, context, initializer=begin_worker, initargs=(os.getpid(),)
-        ) as pool:
+        with (
+            safe_path(),
+            ProcessPoolExecutor(
+                1, context, initializer=begin_worker, initargs=(os.getpid(),)
+            ) as pool,
+        ):
             try:
                 return pool.submit(compute_unchanged, source, digest, task).result()
             except BrokenProcessPool:

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ...computing.decompositions import svd
 from ...inputs.number_arrays import Flags
 from ...machines.protocol import Array, Integers
 from .whitening import Whitening, whitening
@@ -312,7 +313,7 @@ def joint_whitening(
     )
     by_error = -np.concatenate(errors)
     by_known = by_error @ directions
-    left_vectors, values, _ = np.linalg.svd(by_error - by_known @ directions.T, full_matrices=False)
+    left_vectors, values, _ = svd(by_error - by_known @ directions.T, full_matrices=False)
     gain = 1.0 - 1.0 / np.sqrt(1.0 + values**2)
     return JointWhitening(
         tuple(together), tuple(consistencies), known_directions, by_known, left_vectors, gain
@@ -362,7 +363,7 @@ def _directions(lengths: LengthArrays, noise: Array, rows: Integers) -> tuple[Ar
 
 def _range(along: Array) -> Array:
     """Orthonormal basis (m, r) of the changes of lengths that displacements (m, k) make."""
-    vectors, values, _ = np.linalg.svd(along, full_matrices=False)
+    vectors, values, _ = svd(along, full_matrices=False)
     return vectors[:, values > FLAT * values[0]]
 
 
@@ -388,7 +389,7 @@ def _independent(equations: Array, told_once: bool) -> tuple[Array, Array]:
         return np.zeros((0, 0)), np.zeros((equations.shape[1], 0))
     if told_once:
         return np.eye(len(equations)), equations.T
-    left_vectors, values, right = np.linalg.svd(equations, full_matrices=False)
+    left_vectors, values, right = svd(equations, full_matrices=False)
     is_independent = values > TOLD_TWICE * values[0]
     return left_vectors[:, is_independent].T / values[is_independent, None], (
         right[is_independent].T

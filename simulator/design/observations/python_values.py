@@ -243,8 +243,7 @@ def ball_functions(
     functions = attempt(
         f"{name} has failed", lambda: build(names, drawn.copy(), **with_quantities(options)), key
     )
-    _check(name, functions, drawn)
-    return GuardedFunctions(functions, tuple(functions.names), functions.unit)
+    return attempt(f"what {name} returns has failed", lambda: _checked(name, functions, drawn))
 
 
 @dataclass(frozen=True)
@@ -344,8 +343,8 @@ def _parsed(texts: tuple[str, ...], unit: Unit, steps: Steps, references: Refere
 
 
 # In one piece: each check relies on those before it.
-def _check(name: str, functions: Any, drawn: Array) -> None:
-    """Raise faults of functions of balls, the first thing that is."""
+def _checked(name: str, functions: Any, drawn: Array) -> BallFunctions:
+    """Return functions of balls, guarded, or raise their first fault."""
     members = ("names", "unit", "values", "derivatives")
     missing = [member for member in members if not hasattr(functions, member)]
     if missing:
@@ -358,8 +357,8 @@ def _check(name: str, functions: Any, drawn: Array) -> None:
     if not names or not is_named or len(set(names)) < len(names):
         text = "names must be pairs of texts, one pair for each value, no two the same"
         raise CustomModelError(f"{name}: {text}")
-    if functions.unit not in PARSERS:
-        raise CustomModelError(f'{name}: the unit is "{functions.unit}"; known: m, rad, 1')
+    if (unit := functions.unit) not in PARSERS:
+        raise CustomModelError(f'{name}: the unit is "{unit}"; known: m, rad, 1')
     m, (n, d) = len(names), drawn.shape
     extent = float(np.ptp(drawn, axis=0).max()) or 1.0
 
@@ -400,6 +399,7 @@ def _check(name: str, functions: Any, drawn: Array) -> None:
                     " distances and angles are possible, co-ordinates have kind: coordinates"
                 )
                 raise CustomModelError(f"{name}: {text}")
+    return GuardedFunctions(functions, names, unit)
 
 
 def _motions(balls: Array) -> list[Array]:

@@ -16,6 +16,7 @@ from typing import ClassVar
 
 import numpy as np
 
+from ...computing.decompositions import lstsq, svd
 from ...geometry.motions import AXIS_NAMES
 from ...machines.protocol import Array, ErrorModel, Integers
 from ..arrays import Design, Observations, Replicates, Rows, State
@@ -73,7 +74,7 @@ class Star:
         together = offsets.swapaxes(-1, -2) @ source
         if _in_line(self):
             together = together + LEAST_TURN * (source**2).sum() * np.eye(source.shape[1])
-        u, _, vh = np.linalg.svd(together)
+        u, _, vh = svd(together)
         sign = np.ones(together.shape[:-1])
         sign[..., -1] = np.sign(np.linalg.det(u @ vh))
         return (u * sign[..., None, :]) @ vh
@@ -94,7 +95,7 @@ def _moves(star: Star) -> Array:
 
 def _free(star: Star) -> Array:
     """Orthonormal directions (l d, k) in which its tips move as one body."""
-    left_vectors, sizes, _ = np.linalg.svd(_moves(star), full_matrices=False)
+    left_vectors, sizes, _ = svd(_moves(star), full_matrices=False)
     return left_vectors[:, sizes > IN_LINE * sizes.max(initial=0.0)]
 
 
@@ -119,7 +120,7 @@ def _shape(star: Star) -> tuple[Array, Integers]:
         direction = remainder[:, k] / np.sqrt(size[k])
         remainder = remainder - np.outer(direction, direction @ remainder)
     places = np.sort(np.array(chosen, np.int64))
-    u, _, vh = np.linalg.svd(across[:, places], full_matrices=False)
+    u, _, vh = svd(across[:, places], full_matrices=False)
     return u @ vh, places
 
 
@@ -238,9 +239,9 @@ def _turned(star: Star, probes: Integers, design: Design, x: Array) -> Array:
     times = counts.sum(axis=1)
     weights = np.diag(counts.sum(axis=0)) - counts.T @ (counts / times[:, None])
     sides = -(total.sum(axis=0) - counts.T @ (total.sum(axis=1) / times[:, None]))
-    if np.linalg.matrix_rank(weights, hermitian=True) < len(probes) - 1:
+    offsets, _, rank, _ = lstsq(weights, sides, rcond=1e-9)
+    if rank < len(probes) - 1:
         return drawn
-    offsets = np.linalg.lstsq(weights, sides, rcond=1e-9)[0]
     alone = replace(star, has_place=False)
     turn = alone.rotation(offsets)
     if star.has_place:

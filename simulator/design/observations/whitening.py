@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ...computing.decompositions import eigh
 from ...machines.protocol import Array, Integers
 
 
@@ -158,7 +159,7 @@ def covariance_root(covariance: Array, rounding: Array | float = 0.0) -> Covaria
     if inner.any():
         scale = np.outer(variances[inner], variances[inner])
         correlation = covariance[np.ix_(inner, inner)] / scale
-        values, eigenvectors = np.linalg.eigh((correlation + correlation.T) / 2.0)
+        values, eigenvectors = eigh((correlation + correlation.T) / 2.0)
         share = np.broadcast_to(rounding, covariance.shape)[np.ix_(inner, inner)] / scale
         least, size_of_rounding = float(values[0]), float(np.sqrt((share**2).sum()))
         if least < -size_of_rounding - SINGULAR * len(values):

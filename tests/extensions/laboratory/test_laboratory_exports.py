@@ -8,7 +8,9 @@ import csv
 import json
 import re
 import sys
+import tracemalloc
 from pathlib import Path
+from zipfile import ZIP_DEFLATED, ZipFile
 
 import ballplate as bp
 import pytest
@@ -149,6 +151,57 @@ def test_workbooks_that_cannot_be_read(
     for content in (whole[:-200], whole[:2000], b"PK\x03\x04", b"", PLAIN.read_bytes(), large):
         path.write_bytes(content)
         assert wording.IS_DAMAGED_OR_NO_WORKBOOK in fitted(capsys, str(path))[1]
+
+
+WHOLE = "A1:XFD1048576"
+RANGES = {
+    "merged": f'<mergeCells count="1"><mergeCell ref="{WHOLE}"/></mergeCells>',
+    "linked": f'<hyperlinks><hyperlink ref="{WHOLE}" location="A1"/></hyperlinks>',
+    "columns merged": '<mergeCells count="1"><mergeCell ref="A:Z"/></mergeCells>',
+    "many merged": "<mergeCells>"
+    + "".join(f'<mergeCell ref="A{k}:XFD{k}"/>' for k in range(20, 60))
+    + "</mergeCells>",
+}
+
+
+@pytest.mark.parametrize("ranges", RANGES)
+def test_ranges_over_a_sheet_are_refused_before_cells_are_made(
+    ranges: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = workbook(tmp_path, {"Readings": rows()})
+    with ZipFile(path) as archive:
+        parts = {name: archive.read(name) for name in archive.namelist()}
+    sheet = parts["xl/worksheets/sheet1.xml"].decode()
+    assert "</sheetData>" in sheet and "<mergeCell" not in sheet
+    sheet = sheet.replace("</sheetData>", f"</sheetData>{RANGES[ranges]}")
+    with ZipFile(path, "w", ZIP_DEFLATED) as archive:
+        for name, content in (parts | {"xl/worksheets/sheet1.xml": sheet.encode()}).items():
+            archive.writestr(name, content)
+    tracemalloc.start()
+    try:
+        told = fitted(capsys, str(path))[1]
+        # Reading a file reserves 200 MB.
+        assert tracemalloc.get_traced_memory()[1] < 300_000_000
+    finally:
+        tracemalloc.stop()
+    assert wording.IS_DAMAGED_OR_NO_WORKBOOK in told
+
+
+def test_cells_of_all_sheets_are_counted_together(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    book = Workbook()
+    for k in range(30):
+        book.create_sheet(f"{k}").cell(100_000, 10, "far away")
+    book.save(tmp_path / WORKBOOK)
+    tracemalloc.start()
+    try:
+        told = fitted(capsys, str(tmp_path / WORKBOOK))[1]
+        # Reading a file reserves 200 MB.
+        assert tracemalloc.get_traced_memory()[1] < 300_000_000
+    finally:
+        tracemalloc.stop()
+    assert wording.IS_DAMAGED_OR_NO_WORKBOOK in told
 
 
 def changed(folder: Path, name: str, *changes: tuple[str, str]) -> str:
