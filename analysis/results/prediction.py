@@ -9,7 +9,6 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
-import numpy as np
 from ballplate.presentation.formatting import Data
 from ballplate.simulator.design.arrays import Design
 from ballplate.simulator.inputs.extensions import optional_service, service
@@ -200,6 +199,7 @@ class Prediction(Result):
             "weakly determined": [len(self.verdict.weak)],
             "U6 average, µm": [self.lengths.average if self.lengths else math.nan],
             "U6 maximum, µm": [self.lengths.maximum if self.lengths else math.nan],
+            "U6 undetermined": [self.lengths.undetermined if self.lengths else 0],
             "unit": ["m"],
         }
         return columns, [self]
@@ -224,8 +224,10 @@ def rank_words(judged: Verdict) -> str:
 
 
 def length_headline(quantities: Mapping[str, Quantity]) -> list[str]:
-    """Return U6 as text; empty if it is undetermined or was not computed."""
+    """Return U6 as text; empty if it was not computed."""
     lengths = quantities.get("U6")
-    if lengths is None or np.isnan(lengths.average):
+    if lengths is None:
         return []
+    if lengths.undetermined:
+        return [f"U6 undetermined ({lengths.undetermined} of {lengths.count})"]
     return [f"U6 {1e6 * lengths.average:.3g} µm on average, {1e6 * lengths.maximum:.3g} µm at most"]

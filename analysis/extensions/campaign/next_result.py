@@ -116,12 +116,11 @@ class NextStep(Result):
         """Return the largest U6, unless the goal states it."""
         assert self.fit is not None
         lengths = self.fit.quantities["U6"]
-        if lengths.undetermined == lengths.count:
-            return [f"U6 undetermined of all {lengths.count} lengths"] if lengths.count else []
+        if lengths.undetermined:
+            part = "all" if lengths.undetermined == lengths.count else f"{lengths.undetermined} of"
+            return [f"U6 undetermined of {part} {lengths.count} lengths"]
         largest = lengths.maximum * self.sigma / self.fit.sigma
-        open_ = lengths.undetermined
-        some = f", {open_} of {lengths.count} undetermined" if open_ else ""
-        return [f"largest U6 {number(1e6 * largest)} µm{some}"]
+        return [f"largest U6 {number(1e6 * largest)} µm"]
 
     def _verdict(self) -> str:
         then = "" if self.next is None else f", then {self.next.then.words}"

@@ -12,13 +12,14 @@ from ballplate.simulator.machines import Array, Integers
 from .measures import Measure, uncertainty_measures
 from .results import ReportAxis, ReportedSweep, criterion, partly_open, ranked
 from .series import evenly
-from .tables import DIGITS, NOT_DONE, STAR
+from .tables import DIGITS, NOT_DONE
 
 # Limits: values of an axis, distinguishable shades, pairs of axes.
 MOST_VALUES, SHADES, MOST_PAIRS = 12, 8, 10
 
 # Instead of a shade: something is undetermined; no value.
 DEFICIENT, BLANK = -2, -1
+STAR = "*"
 
 
 @dataclass(frozen=True)

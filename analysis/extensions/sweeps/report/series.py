@@ -163,7 +163,7 @@ def _plot(results: ReportedSweep, k: int, picture: _Picture, measure: Measure) -
     axis = results.axes[k]
     x = np.array(axis.numbers)[results.chosen[:, k]]
     left_out = partly_open(results, measure.symbol)
-    values = np.where(left_out, np.nan, measure.factor * results.figure(measure.figure))
+    values = measure.factor * results.figure(measure.figure)
     actual, error = _actual(results, measure)
     lines = tuple(
         SeriesLine(label, x[rows], values[rows], actual[rows], error[rows])
