@@ -113,7 +113,7 @@ def _support(document: DesignDocument, arguments: Arguments, report: Report) -> 
     """Return the source of scale as `lines` of text, and `assumptions`, None without U6; the design
     is evaluated again for each row.
     """
-    prediction = predict(evaluable_of(document), with_scale=True)
+    prediction = predict(evaluable_of(document))
     scale, assumptions = prediction.scale, prediction.assumptions
     return {
         "lines": [*scale_lines(scale), *scale_warnings(scale)],

@@ -4,9 +4,11 @@ name.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from ballplate.simulator.machines import Array
 
 from .stored import StoredResults
 
@@ -21,8 +23,8 @@ def frame_of(results: StoredResults, defined: dict[str, Any]) -> pandas.DataFram
     """Return the cells of a sweep in their order, without unfinished and unreadable ones.
 
     Columns: `cell` from 0, one for each axis (in metres or radians, with the unit in its name, or
-    texts), `status`, `reason`, the results by name (NaN if a cell lacks one), `data_set_seed`,
-    `fingerprint`, `duration_s`, and the versions.
+    texts), `status`, `reason`, what figures take for granted (`given`), the results by name (NaN if
+    a cell lacks one), `data_set_seed`, `fingerprint`, `duration_s`, and the versions.
     """
     import pandas
 
@@ -35,7 +37,8 @@ def frame_of(results: StoredResults, defined: dict[str, Any]) -> pandas.DataFram
             values = values.astype(np.int64)
         columns[axis["column"]] = values[chosen[:, k]]
     columns |= {name: [getattr(row, name) for row in results.rows] for name in ("status", "reason")}
-    columns |= results.figures
+    columns["given"] = ["; ".join(row.details.get("given", ())) for row in results.rows]
+    columns |= _whole(results.figures)
     columns |= {
         "data_set_seed": np.array([row.seed for row in results.rows], np.int64),
         "fingerprint": results.keys,
@@ -44,3 +47,17 @@ def frame_of(results: StoredResults, defined: dict[str, Any]) -> pandas.DataFram
     for name in dict.fromkeys(name for row in results.rows for name in row.versions):
         columns[f"{name}_version"] = [row.versions.get(name, "") for row in results.rows]
     return pandas.DataFrame(columns)
+
+
+def _whole(figures: Mapping[str, Array]) -> dict[str, Array]:
+    """Return figures without maxima and averages over what is determined alone, as earlier versions
+    stored them.
+    """
+    whole = dict(figures)
+    for name, undetermined in figures.items():
+        symbol, _, is_count = name.rpartition("_undetermined")
+        for statistic in ("maximum", "average", "actual_maximum", "actual_average"):
+            for column in figures:
+                if symbol and not is_count and column.startswith(f"{symbol}_{statistic}_"):
+                    whole[column] = np.where(undetermined > 0, np.nan, figures[column])
+    return whole

@@ -108,7 +108,7 @@ def check_written(said: dict[str, Any], folder: Path) -> tuple[Repair, ...]:
         (line,) = [one for one in lines if one.startswith(f"repair {k}: ")]
         text = mended(path.read_text(encoding="utf-8"), path, variant, repair)
         (after,) = (one for one in load(path, text=text) if one.name == variant)
-        judged = check(after, with_scale=True)
+        judged = check(after)
         assert not judged.verdict.deficiency and len(judged.verdict.weak) == repair.weak
         assert f"average U6 {average(after)} µm" in line
         assert judged.scale is not None

@@ -113,8 +113,8 @@ def test_many_cells_are_rows_and_end_with_a_sentence(tmp_path: Path) -> None:
 
 
 def test_what_one_distance_stands_for_is_no_ordinary_value(tmp_path: Path) -> None:
-    """Of the cell in the middle 600 values are but one undetermined: it is neither shaded, drawn
-    nor told unmarked.
+    """Of the cell in the middle 600 values are but one undetermined: an average of an earlier
+    version's store is neither shown, shaded nor drawn.
     """
     axes = [
         axis("size", ["1 mm", "2 mm", "3 mm"], [1e-3, 2e-3, 3e-3], "m"),
@@ -127,15 +127,17 @@ def test_what_one_distance_stands_for_is_no_ordinary_value(tmp_path: Path) -> No
         some |= {"rank_deficiency": 3.0, "U4_undetermined": 599.0} if is_partial else {}
         rows.append(done(cell, some))
     results = read_results(made_up(tmp_path / "partial.sqlite", "partial", axes, rows), 1)
-    marked = {
+    unknown = {
         (entry.cell, entry.figure)
         for table in report_tables(results)
         for block in table.blocks
         for row in block.rows
         for entry in row.entries
-        if entry.text.endswith("*")
+        if entry.text == "-"
     }
-    assert marked == {(2, name) for name in ("U4_maximum_m", "U4_average_m", "U4_actual_average_m")}
+    assert unknown == {
+        (2, name) for name in ("U4_maximum_m", "U4_average_m", "U4_actual_average_m")
+    }
     (heat,) = heat_maps(results)
     assert [[entry.text.endswith("*") for entry in row] for row in heat.entries] == [
         [False, False], [True, False], [False, False]

@@ -15,7 +15,7 @@ from ballplate.simulator.machines import Array, Integers
 
 from .axis_worth import AxisWorth, axis_worths
 from .measures import column_unit
-from .results import ReportedSweep, best_first, criterion, partly_open
+from .results import ReportedSweep, best_first, criterion, given_sentences
 
 # Settings in the answer's table.
 LISTED = 8
@@ -44,10 +44,9 @@ def answer(results: ReportedSweep) -> SweepAnswer | None:
     done = np.flatnonzero(results.done)
     if judged is None or not len(done):
         return None
-    column, symbol = judged
+    column = judged[0]
     value, observations = results.figure(column)[done], results.figure("observations")[done]
-    # Stores of earlier versions have averages over what is determined.
-    partly = partly_open(results, symbol)[done] | ~np.isfinite(value)
+    partly = ~np.isfinite(value)
     share = results.figure(WITHIN)[done]
     meets = share == 1.0
     if np.isfinite(share).any():
@@ -58,6 +57,7 @@ def answer(results: ReportedSweep) -> SweepAnswer | None:
     else:
         sentences = _sentences_without_target(results, done, column, value, partly)
         order = best_first(partly, value)
+    sentences[1:1] = given_sentences(results)
     sentences += _sentences_on_others(results, done)
     return SweepAnswer(
         _symbol(column),
@@ -225,7 +225,8 @@ def _table(results: ReportedSweep, rows: Integers, column: str) -> Table:
         listed.append(Row(results.labels(row), tuple(entries)))
     headings = tuple(axis.name for axis in results.axes)
     names = tuple(name for name, _, _ in columns)
-    notes = ("Observations are readings and certified values; other costs are not included.",)
+    costs = "Observations are readings and certified values; other costs are not included."
+    notes = (*given_sentences(results), costs)
     caption = "The best cases"
     blocks = (Block("", tuple(listed)),)
     return Table("answer", caption, headings, names, blocks, notes=notes)

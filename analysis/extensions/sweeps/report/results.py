@@ -171,6 +171,19 @@ def partly_open(results: ReportedSweep, symbol: str) -> Flags:
     return results.figure(f"{symbol_column(symbol.rstrip(MORE))}_undetermined") > 0
 
 
+def given_sentences(results: ReportedSweep) -> list[str]:
+    """Return a sentence on each condition that figures of finished cells take for granted."""
+    cells_of: dict[str, list[int]] = {}
+    done = [results.cell(row) for row in np.flatnonzero(results.done).tolist()]
+    for cell in done:
+        for given in results.texts.get(cell, {}).get("given", ()):
+            cells_of.setdefault(str(given), []).append(cell)
+    return [
+        f"Given {given}: {'all cases' if len(cells) == len(done) else f'cases {cell_list(cells)}'}."
+        for given, cells in cells_of.items()
+    ]
+
+
 def criterion(results: ReportedSweep) -> tuple[str, str] | None:
     """Return the column of the average that cells are judged by, and its quantity; None without
     one.

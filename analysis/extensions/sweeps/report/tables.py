@@ -17,7 +17,7 @@ from .measures import (
     trial_measures,
     uncertainty_measures,
 )
-from .results import ReportedSweep
+from .results import ReportedSweep, given_sentences
 
 DIGITS = 3
 
@@ -31,9 +31,10 @@ UNREADABLE = "unreadable"
 def report_tables(results: ReportedSweep) -> tuple[Table, ...]:
     """Return all tables: uncertainties and, if there were trials, Monte Carlo."""
     in_columns = _fits_columns(results)
+    given = tuple(given_sentences(results))
     measures = [*rank_measures(results), *uncertainty_measures(results, in_columns)]
     tables = (
-        [_table(results, "uncertainties", "Standard uncertainties", measures, in_columns)]
+        [_table(results, "uncertainties", "Standard uncertainties", measures, in_columns, given)]
         if measures
         else []
     )
