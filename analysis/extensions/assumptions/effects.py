@@ -277,11 +277,11 @@ def _effect(
 
 
 def _with_choice(experiment: Experiment, changed: Experiment) -> Experiment:
-    """Return a changed experiment with the positions and the calibration that a plan chose."""
-    names = [[position.name for position in each.positions] for each in (experiment, changed)]
-    if names[0] == names[1] and changed.pool is None:
-        return changed
-    placed = placed_only(replace(changed, positions=experiment.positions))
+    """Return a changed experiment with the positions, the probes and the calibration that a plan
+    or a repair chose.
+    """
+    probes = {**experiment.probes, **changed.probes}
+    placed = placed_only(replace(changed, positions=experiment.positions, probes=probes))
     bought = experiment.calibration[len(placed.calibration) :]
     return replace(placed, calibration=(*placed.calibration, *bought))
 

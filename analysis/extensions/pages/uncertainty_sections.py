@@ -146,13 +146,6 @@ def scale_section(result: QuotedData) -> Html:
             "scale", "What carries scale", ["carried by", "u of scale without it, ppm"], carriers
         ),
     ]
-    if scale.data["rests_on_exact_offsets"]:
-        parts.append(
-            sentence(
-                "Warning: the scale rests on probe offsets that are held exact; calibrate a"
-                " distance, or state the standard uncertainty of the offsets."
-            )
-        )
     if scale.data["with_uncertain_offsets"] is not None:
         loose = scale.at("with_uncertain_offsets")
         parts.append(

@@ -15,7 +15,7 @@ from ballplate.extensions.repair.repair_search import Repair, repairs
 from ballplate.extensions.repair.repair_tables import caveat, changes_in_words
 from ballplate.extensions.repair.written import Edit, position_settings
 from ballplate.presentation import Data, picked
-from ballplate.results import planned_uncertainty
+from ballplate.results import given_words, planned_uncertainty, predict
 from ballplate.simulator.computing import Report, counted, unreported
 from ballplate.simulator.experiment import Experiment, Position
 from ballplate.simulator.inputs import ExperimentError
@@ -91,7 +91,7 @@ def next_positions(
     candidates.sort(key=lambda candidate: candidate[0])
     return [
         {
-            "words": change.words,
+            "words": change.words + given_words(predict(change.apply(experiment)).qualifications),
             "deficiency": order[0],
             **picked(lengths, "average", "maximum"),
             "place": place_data(experiment, change.adds),

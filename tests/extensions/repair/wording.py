@@ -26,7 +26,7 @@ REPAIR_IN_THE_FILE_POSITIONS = (
 REPAIR_TURN_POSITION_BY_ONE_QUARTER = (
     'repair 1: turn position "z low" by one quarter-turn; and calibrate the dist'
 )
-SCALE_RESTS_ON_PROBE_OFFSETS = "scale rests on probe offsets"
+SCALE_RESTS_ON_PROBE_OFFSETS = "exact probe offsets as scale"
 SMALLEST_SINGULAR_VALUE = "smallest singular value 0.0"
 THE_EXISTING_FILE_IS_UNCHANGED = "the existing file is unchanged"
 THE_FILE_EXPECTS = "the file expects that"
