@@ -86,6 +86,11 @@ class Assumptions(Result):
             if effect.ratio > LARGE
         )
 
+    def words_of(self, name: str) -> str:
+        """Return the line of an assumption by its name; empty if it has no result."""
+        found = (effect.words for effect in self.effects if effect.assumption.name == name)
+        return next(found, "")
+
     def summary(self) -> list[str]:
         """Return the first rows as lines of text."""
         more = len(self.effects) - SHOWN_ROWS
