@@ -94,7 +94,8 @@ class Prediction(Result):
     @cached_property
     def qualifications(self) -> tuple[Qualification, ...]:
         """What the figures and verdicts take for granted, as every output states it."""
-        return tuple(qualifications(self))
+        deficiency = self.verdict.deficiency
+        return tuple(qualifications(deficiency, self.scale, self.assumptions, self.experiment))
 
     @property
     def qualified(self) -> list[str]:

@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING, Literal
 
 from ballplate.presentation.formatting import Data, picked
 from ballplate.simulator.inputs.settings import number_of
+from ballplate.uncertainty.scale import Scale
 
+from .extension_results import PredictedAssumptions
 from .text_blocks import scale_warnings
 
 if TYPE_CHECKING:
-    from ballplate.simulator.experiment.model import Pool
-
-    from .prediction import Prediction
+    from ballplate.simulator.experiment.model import Experiment, Pool
 
 # Reasons for which a candidate is not offered that are those of probes, by their first words.
 OF_PROBES = ("out of reach", "outside the volume")
@@ -31,17 +31,21 @@ class Qualification:
     text: str
 
 
-def qualifications(prediction: Prediction) -> Iterator[Qualification]:
+def qualifications(
+    deficiency: int,
+    scale: Scale | None,
+    assumptions: PredictedAssumptions | None,
+    experiment: Experiment | None,
+) -> Iterator[Qualification]:
     """Yield the qualifications of a prediction: undetermined directions, scale that rests on exact
     offsets, assumptions that more than double U6, and lack of fit of the maps that it uses.
     """
-    deficiency, experiment = prediction.verdict.deficiency, prediction.experiment
     if deficiency:
         given = number_of(deficiency, "undetermined direction")
         yield Qualification("undetermined", given, f"warning: {given}")
-    for text in scale_warnings(prediction.scale):
+    for text in scale_warnings(scale):
         yield Qualification("scale", "exact probe offsets as scale", text)
-    for assumed, text in () if prediction.assumptions is None else prediction.assumptions.doubling:
+    for assumed, text in () if assumptions is None else assumptions.doubling:
         yield Qualification("assumption", assumed, text)
     for campaign in () if experiment is None else experiment.earlier_campaigns:
         if campaign.caution:

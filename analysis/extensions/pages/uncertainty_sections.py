@@ -146,19 +146,6 @@ def scale_section(result: QuotedData) -> Html:
             "scale", "What carries scale", ["carried by", "u of scale without it, ppm"], carriers
         ),
     ]
-    if scale.data["with_uncertain_offsets"] is not None:
-        loose = scale.at("with_uncertain_offsets")
-        parts.append(
-            sentence(
-                "With a standard uncertainty of ",
-                loose.micro("standard_uncertainty"),
-                " µm of each offset but one, U6 would be ",
-                loose.micro("U6_average"),
-                " µm on average and ",
-                loose.micro("U6_maximum"),
-                " µm at most.",
-            )
-        )
     return joined(parts)
 
 

@@ -43,10 +43,11 @@ def with_repairs(
             repairs_found = _suggestions(design).repairs
             repair = to_write(repairs_found, design.prediction.verdict, wanted.nothing_weak)
             name = f"{path}: {design.prediction.label}"
-            invented = next(filter(invents, repairs_found.complete if repairs_found else ()), None)
-            if invented is not None:
+            best = repairs_found.complete[0] if repairs_found and repairs_found.complete else None
+            is_bad = design.prediction.verdict.deficiency or wanted.nothing_weak
+            if is_bad and best is not None and best is not repair and invents(best):
                 words = "a certificate or a probe that the file does not state"
-                statuses.append(f"{name}: not written, {words}: {changes_in_words(invented)}")
+                statuses.append(f"{name}: not written, {words}: {changes_in_words(best)}")
             if repair is None:
                 if not design.prediction.verdict.deficiency:
                     statuses.append(f"{name}: nothing to repair")

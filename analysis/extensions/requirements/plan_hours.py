@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from bisect import bisect_left
 from functools import cache
 
 from ballplate.planning import HOUR, Budget, Campaign, Request, campaign
@@ -9,16 +10,15 @@ from ballplate.simulator.experiment import Experiment
 from ballplate.simulator.inputs import ExperimentError
 
 from .answers import Answer
-from .goals import Goal, Judgement, judge
+from .goals import Goal, judge
 from .unknowns import NotVariableError
 
-# Shortest and longest plans that are looked at, in quarters of an hour.
-LEAST, MOST = 1, 4 * 128
+QUARTER = HOUR / 4
 
 
 def hours_answer(experiment: Experiment, goal: Goal) -> Answer:
     """Return the fewest hours, to a quarter, of a plan from the experiment's pool that meets a
-    goal, found by doubling and bisection.
+    goal, found by doubling and bisection up to twice the time of all candidates.
 
     :raises NotVariableError: there is no pool.
     """
@@ -26,44 +26,23 @@ def hours_answer(experiment: Experiment, goal: Goal) -> Answer:
         raise NotVariableError("the file has no pool of positions to plan from; add one")
 
     @cache
-    def planned(quarters: int) -> Campaign | str:
+    def planned(quarters: int) -> Campaign | None:
         try:
-            return campaign(experiment, Request(budget=Budget(seconds=HOUR * quarters / 4)))
-        except ExperimentError as error:
-            return error.messages[0].text
-
-    def judged(quarters: int) -> Judgement | None:
-        plan = planned(quarters)
-        return None if isinstance(plan, str) else judge(goal, plan.prediction)
+            return campaign(experiment, Request(budget=Budget(QUARTER * quarters)))
+        except ExperimentError:
+            return None
 
     def is_met(quarters: int) -> bool:
-        found = judged(quarters)
-        return found is not None and found.is_met
+        plan = planned(quarters)
+        return plan is not None and judge(goal, plan.prediction).is_met
 
-    failed, met, before = LEAST - 1, LEAST, None
-    while not is_met(met):
-        plan = planned(met)
-        chosen = None if isinstance(plan, str) else len(plan.chosen)
-        assert experiment.pool is not None
-        if (
-            met >= MOST
-            or chosen == len(experiment.pool.candidates)
-            or (chosen and chosen == before)
-        ):
-            return _answer(planned(met), met, goal, "none")
-        failed, met, before = met, 2 * met, chosen
-    while met - failed > 1:
-        middle = (met + failed) // 2
-        failed, met = (failed, middle) if is_met(middle) else (middle, met)
-    answer = _answer(planned(met), met, goal, "found")
-    return answer
-
-
-def _answer(plan: Campaign | str, quarters: int, goal: Goal, status: str) -> Answer:
-    words, title = f"{quarters / 4:g} h", "hours of a plan from the pool"
-    if isinstance(plan, str):
-        return Answer("hours", title, "undetermined", grows=True, remarks=(plan,))
-    outcome = judge(goal, plan.prediction).words
-    value, qualified = HOUR * quarters / 4, plan.qualifications
-    first = "", True, words, value, outcome
-    return Answer("hours", title, status, *first, qualifications=qualified)  # type: ignore[arg-type]
+    most = int(sum(candidate.seconds for candidate in experiment.pool.candidates) / QUARTER)
+    doubled = [2**k for k in range(most.bit_length() + 1)]
+    met = next(filter(is_met, doubled), 0)
+    found = bisect_left(range(met), True, met // 2 + 1, key=is_met) if met else doubled[-1]
+    plan, title = planned(found), "hours of a plan from the pool"
+    if plan is None:
+        return Answer("hours", title, "undetermined", grows=True)
+    words, outcome = f"{found / 4:g} h", judge(goal, plan.prediction).words
+    shown = (title, "found" if met else "none", "", True, words, QUARTER * found, outcome)
+    return Answer("hours", *shown, qualifications=plan.qualifications)

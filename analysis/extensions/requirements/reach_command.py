@@ -16,9 +16,9 @@ DESCRIPTION = (
     "Solve for one unknown of a design at a time, with the others as in the file: the"
     " largest uncertainty of readings, certificates, tips or temperatures, the fewest repeats or"
     " balls, the smallest plate, or the shortest plan that meets a goal. Each answer is a value of"
-    " three digits, or a whole number, for which the design was computed and meets the goal; the next"
-    " value fails. The exit status is 0 if every requested unknown has such a value (without --by:"
-    " one), otherwise 1; with --fail it is 0 if the design in the"
+    " three digits, or a whole number, for which the design was computed and meets the goal; the"
+    " next value fails. The exit status is 0 if every requested unknown has such a value (without"
+    " --by: one), otherwise 1; with --fail it is 0 if the design in the"
     " file meets the goal, otherwise 1."
 )
 

@@ -4,11 +4,9 @@ name.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from ballplate.simulator.machines import Array
 
 from .stored import StoredResults
 
@@ -38,7 +36,7 @@ def frame_of(results: StoredResults, defined: dict[str, Any]) -> pandas.DataFram
         columns[axis["column"]] = values[chosen[:, k]]
     columns |= {name: [getattr(row, name) for row in results.rows] for name in ("status", "reason")}
     columns["given"] = ["; ".join(row.details.get("given", ())) for row in results.rows]
-    columns |= _whole(results.figures)
+    columns |= results.figures
     columns |= {
         "data_set_seed": np.array([row.seed for row in results.rows], np.int64),
         "fingerprint": results.keys,
@@ -47,17 +45,3 @@ def frame_of(results: StoredResults, defined: dict[str, Any]) -> pandas.DataFram
     for name in dict.fromkeys(name for row in results.rows for name in row.versions):
         columns[f"{name}_version"] = [row.versions.get(name, "") for row in results.rows]
     return pandas.DataFrame(columns)
-
-
-def _whole(figures: Mapping[str, Array]) -> dict[str, Array]:
-    """Return figures without maxima and averages over what is determined alone, as earlier versions
-    stored them.
-    """
-    whole = dict(figures)
-    for name, undetermined in figures.items():
-        symbol, _, is_count = name.rpartition("_undetermined")
-        for statistic in ("maximum", "average", "actual_maximum", "actual_average"):
-            for column in figures:
-                if symbol and not is_count and column.startswith(f"{symbol}_{statistic}_"):
-                    whole[column] = np.where(undetermined > 0, np.nan, figures[column])
-    return whole

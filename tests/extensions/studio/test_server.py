@@ -179,7 +179,8 @@ def test_figures_are_those_of_run(client, design):
     assert later["fingerprint"] == answer.json()["fingerprint"]
     assert later["lines"] and all(line in prediction.lines() for line in later["lines"])
     assumptions = prediction.assumptions
-    assert later["assumptions"]["warning"] == assumptions.warning != ""
+    warning = "; ".join(text for _, text in assumptions.doubling)
+    assert later["assumptions"]["warning"] == warning != ""
     assert later["assumptions"]["assumptions"] == assumptions.to_dict()["assumptions"]
 
 

@@ -18,7 +18,6 @@ from numpy.typing import NDArray
 
 from ..frame import frame_of
 from ..store import Store, chosen_sweep, results
-from ..store_columns import MORE, symbol_column
 from ..stored import StoredResults as Found
 
 if TYPE_CHECKING:
@@ -164,11 +163,6 @@ def _axis(stored: dict[str, Any]) -> ReportAxis:
         unit = units.pop()
         numbers = tuple(float(exact_number(match[1])) for match in matches if match is not None)
     return ReportAxis(in_one_line(stored["name"]), stored["column"], labels, numbers, unit)
-
-
-def partly_open(results: ReportedSweep, symbol: str) -> Flags:
-    """Return the rows of the frame (rows,) in which some values of a quantity are undetermined."""
-    return results.figure(f"{symbol_column(symbol.rstrip(MORE))}_undetermined") > 0
 
 
 def given_sentences(results: ReportedSweep) -> list[str]:
