@@ -64,6 +64,10 @@ def reach(
     :raises NotVariableError: the experiment lacks the single requested unknown.
     :raises ExperimentError: the target is invalid, or there are more than 10,000 evaluation points.
     """
+    if not experiment.positions:
+        raise refused(
+            experiment.source, "missing; reach changes a design that has some", "positions"
+        )
     count = len(experiment.evaluation.points)
     if count > MOST_POINTS:
         text = (
@@ -298,10 +302,12 @@ def _scanned(trials: _Trials) -> Answer:
             f" {refused[0].refusal}"
         )
     if searched.name == "size" and not any(trials.at(step).is_met for step in usable):
-        # What just does may lie beside each of the best of them: larger ones need not be better.
+        # What just does may lie beside any value that is better than both its neighbours.
         more = set(probes)
         distances = comparable([trials.judgement(step).distance for step in usable])
-        order = np.argsort(distances, kind="stable")
+        around = np.pad(distances, 1, constant_values=np.inf)
+        peaks = np.flatnonzero((distances <= around[:-2]) & (distances <= around[2:]))
+        order = peaks[np.argsort(distances[peaks], kind="stable")]
         for best in (probes.index(usable[k]) for k in order[:BEST]):
             ends = probes[max(best - 1, 0)], probes[min(best + 1, len(probes) - 1)]
             more |= {int(step) for step in np.linspace(*ends, REFINED).round()}
