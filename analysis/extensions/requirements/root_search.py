@@ -94,7 +94,7 @@ def reach(
     for name in counted(names, "unknowns", len(names), report):
         try:
             if name == "hours":
-                answers.append(hours_answer(experiment, goal))
+                answers.append(hours_answer(searched.built(root), goal))
                 continue
             sought = unknown(name, experiment, root, artefact, calibration)
         except NotVariableError as error:
