@@ -41,8 +41,8 @@ def sweep(
 
     def rows():
         for k, setting in enumerate(itertools.product(SIZES, BALLS, MODELS)):
-            size = worse * average(*setting)
             is_open = k in open_
+            size = np.nan if is_open else worse * average(*setting)
             yield done(
                 k,
                 {
@@ -221,7 +221,7 @@ def random_sweep(path: Path, seed: int) -> None:
             figures = {"rank_deficiency": float(open_ > 0), "as_expected": 1.0}
             figures["observations"] = float(draw.choice([10, 20]))
             if recorded:
-                size = np.nan if open_ == 9.0 else 1e-6 * draw.choice([1.0, 2.0, 3.0, 4.0])
+                size = np.nan if open_ else 1e-6 * draw.choice([1.0, 2.0, 3.0, 4.0])
                 figures |= {"U6_average_m": size, "U6_maximum_m": size, "U6_undetermined": open_}
                 if has_target and draw.random() < 0.9:
                     figures["U6_within_target"] = float(
