@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import chain
 from typing import Literal
 
 from ballplate.presentation import Data, Result, table_lines
@@ -88,9 +89,9 @@ class Reach(Result):
             notes += [f"{answer.name}: {remark}" for remark in answer.remarks]
         # A line for each condition: with other values only its figures differ.
         texts: dict[str, str] = {}
-        for one in (self, *self.answers):
-            for each in one.qualifications:
-                texts.setdefault(each.given, each.text)
+        of_answers = (answer.qualifications for answer in self.answers)
+        for each in chain(self.qualifications, *of_answers):
+            texts.setdefault(each.given, each.text)
         notes += texts.values()
         return lines + ["", *notes] if notes else lines
 

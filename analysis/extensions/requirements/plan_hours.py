@@ -9,7 +9,7 @@ from ballplate.planning import HOUR, Budget, Campaign, Request, campaign
 from ballplate.simulator.experiment import Experiment
 from ballplate.simulator.inputs import ExperimentError
 
-from .answers import Answer
+from .answers import Answer, Status
 from .goals import Goal, judge
 from .unknowns import NotVariableError
 
@@ -44,5 +44,6 @@ def hours_answer(experiment: Experiment, goal: Goal) -> Answer:
     if plan is None:
         return Answer("hours", title, "undetermined", grows=True)
     words, outcome = f"{found / 4:g} h", judge(goal, plan.prediction).words
-    shown = (title, "found" if met else "none", "", True, words, QUARTER * found, outcome)
-    return Answer("hours", *shown, qualifications=plan.qualifications)
+    status: Status = "found" if met else "none"
+    needed = words, QUARTER * found, outcome
+    return Answer("hours", title, status, "", True, *needed, qualifications=plan.qualifications)
