@@ -156,7 +156,7 @@ def run(
     if trials is None and until is None and (seed is not None or workers != 1):
         raise ValueError("seed and workers apply to trials or until only; leave them out")
     chosen = experiment_of(experiment)
-    predicted = study.predict(chosen, with_scale=True)
+    predicted = study.predict(chosen)
     if trials is None and until is None:
         return predicted
     from .montecarlo import experiments as replicates

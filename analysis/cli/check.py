@@ -57,8 +57,9 @@ def add_options(parser: ArgumentParser) -> None:
         "--fix",
         action="store_true",
         help=(
-            "write the first repair that --suggest finds for a deficient design into its file,"
-            " leave the rest of the file unchanged, and check the file again"
+            "write the first repair that --suggest finds for a deficient design, without a"
+            " certificate or a probe that the file does not state, into its file, leave the rest of"
+            " the file unchanged, and check the file again"
         ),
     )
     parser.add_argument(

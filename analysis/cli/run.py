@@ -79,7 +79,7 @@ def run(options: Namespace) -> int:
         names = ", ".join(str(experiment.name or experiment.label) for experiment in chosen)
         raise UsageError(f"--report is the page of one design; choose one with --variant: {names}")
     for experiment in chosen:
-        plans.append(predict(experiment, with_scale=True))
+        plans.append(predict(experiment))
         if options.report:
             _write_page(options, plans[-1])
         if not options.json:

@@ -42,7 +42,7 @@ SHIPPED = (
         commands={
             "reach": Command(
                 "reach_command",
-                "find the repeatability, certificate, repeats, balls or size that meets a target",
+                "find the equipment, plate size or hours that meet a target",
                 "plan",
             ),
         },

@@ -49,7 +49,8 @@ class MonteCarloComparison:
     """A quantity's replicates compared with its linearised uncertainties.
 
     `linear_...` are the linearised standard uncertainties, `actual_...` the root mean squares of
-    the errors, over `count` members, a `sampled` selection of all pairs. `spread` is the ratio of
+    the errors, over `count` members, a `sampled` selection of all pairs; NaN if others are
+    undetermined. `spread` is the ratio of
     the errors' standard deviation to the linearised uncertainty, root mean square over the members.
     `actual` is the root mean square of the errors, with those of noise-free readings, over that of
     the linearised uncertainties (of members in the same unit); `bias` the mean error, a root mean
@@ -185,15 +186,17 @@ def _comparison(aim: MonteCarloQuantity, sums: QuantityAccumulator, n: int) -> M
         flags.append("coverage")
     if not np.isnan(coverage_estimated.value) and coverage_estimated.differs_from(COVERAGE):
         flags.append("coverage with sigma estimated")
-    rms = np.sqrt(sums.squares / count)
+    # A maximum or an average over what is determined alone is none.
+    whole = np.nan if aim.is_partial else 1.0
+    rms, uncertainty = whole * np.sqrt(sums.squares / count), whole * aim.uncertainty
     present = [unit for unit in ("m", "rad", "1") if unit in aim.units]
     return MonteCarloComparison(
         aim.symbol,
         ", ".join(present),
         len(aim.base),
         aim.sampled,
-        float(aim.uncertainty.max()),
-        float(aim.uncertainty.mean()),
+        float(uncertainty.max()),
+        float(uncertainty.mean()),
         float(rms.max()),
         float(rms.mean()),
         spread,

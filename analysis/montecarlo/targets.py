@@ -44,7 +44,8 @@ class MonteCarloQuantity:
 
     `base` (q,) is its error in the estimate from readings without noise, `uncertainty` (q,) the
     linearised standard uncertainties, `change` its change (b, q) in replicates, `units` (q,)
-    metres, radians or 1. `sampled` marks a sample of all pairs.
+    metres, radians or 1. `sampled` marks a sample of all pairs, `is_partial` that some members are
+    undetermined and left out.
     """
 
     symbol: str
@@ -53,6 +54,7 @@ class MonteCarloQuantity:
     units: tuple[str, ...]
     change: Callable[[Deviations], Array]
     sampled: bool = False
+    is_partial: bool = False
 
     @cached_property
     def typical(self) -> Array:
@@ -163,6 +165,7 @@ def _uncertain(target: MonteCarloQuantity) -> MonteCarloQuantity | None:
         tuple(units[chosen].tolist()),
         change,
         target.sampled,
+        bool(np.isnan(target.uncertainty).any()),
     )
 
 

@@ -249,7 +249,7 @@ def _campaign(
         wanted.target,
         _gains(problem, best, candidates, report_earlier if request.curve else report),
         _left_out(unlimited, best, candidates),
-        predict(replace(timed, expected_rank_deficiency=expected or None), with_scale=True),
+        predict(replace(timed, expected_rank_deficiency=expected or None)),
         tuple(_curve(problem, best, candidates, workers, report)) if request.curve else (),
         completed,
         interrupted,

@@ -23,6 +23,7 @@ from ballplate.simulator.inputs.yamltree import Mark
 from ..rank.verdicts import Verdict
 from ..results.checked_designs import check
 from ..results.prediction import Advice, Prediction
+from ..results.qualifications import given_words
 
 WITH_MODULES = "leave --no-modules out if you trust the file"
 
@@ -152,11 +153,11 @@ def checked_design(
     report: Report = unreported,
 ) -> CheckedDesign:
     """An experiment judged, with changes looked for in its pool if there is one."""
-    prediction = check(experiment, with_scale=True)
+    prediction = check(experiment)
     suggestions = None
     if with_pool is not None:
         suggestions = service("suggested")(with_pool, prediction, report)
-    goals, missed = _judged(experiment, wanted.goals)
+    goals, missed = _judged(experiment, wanted.goals, prediction)
     if wanted.nothing_weak and prediction.verdict.weak:
         count = len(prediction.verdict.weak)
         missed += (number_of(count, "weakly determined direction"),)
@@ -184,9 +185,10 @@ def advised(design: CheckedDesign) -> CheckedDesign:
 
 
 def _judged(
-    experiment: Experiment, goals: Sequence[Any]
+    experiment: Experiment, goals: Sequence[Any], prediction: Prediction
 ) -> tuple[tuple[str, ...], tuple[str, ...]]:
     if not goals:
         return (), ()
-    goals_met, missed = service("judged_goals")(experiment, goals)
+    given = given_words(prediction.qualifications)
+    goals_met, missed = service("judged_goals")(experiment, goals, given)
     return goals_met, missed

@@ -15,6 +15,7 @@ from ballplate.simulator.inputs.settings import number_of
 
 from ..presentation.formatting import aligned, number, picked
 from ..presentation.result import Result
+from ..results.qualifications import Qualification, given_words, of_pool, qualification_data
 from ..results.text_blocks import target_lines
 from .choice import Gain, Selection
 from .constraints import HOUR, Spent
@@ -108,7 +109,12 @@ class Campaign(Selection, Result):
         if not self.is_determined:
             return f"{count}; something stays undetermined"
         value = f"{1e6 * self.value:.4g} µm" if self.unit == "m" else f"{self.value:.4g}"
-        return f"{count}, {self.criterion} {value}"
+        return f"{count}, {self.criterion} {value}{given_words(self.qualifications)}"
+
+    @property
+    def qualifications(self) -> tuple[Qualification, ...]:
+        """Those of its prediction, and of the reach of the probes."""
+        return (*self.prediction.qualifications, *of_pool(self.pool))
 
     def lines(self) -> list[str]:
         """Return the choice with its bound, effects, the curve, U1 to U6 and the run sheet, as
@@ -134,6 +140,7 @@ class Campaign(Selection, Result):
                 f" {100 * (1.0 - self.efficiency):.1f} %"
             )
         lines += target_lines(self.prediction.lengths)
+        lines += [each.text for each in self.qualifications if each.kind != "undetermined"]
         if self.excluded:
             lines.append(
                 f"left out of {self.criterion}: {self.excluded} that no choice from this pool"
@@ -179,6 +186,7 @@ class Campaign(Selection, Result):
             **picked(self, "order"),
             **(WITHOUT_DRIFT if self.orders is None else self.orders.data()),
             "run_sheet": sheet_data(self.sheet),
+            "qualifications": qualification_data(self.qualifications),
             "plan": self.prediction.to_dict(),
         }
 

@@ -12,7 +12,6 @@ from ballplate.simulator.design.arrays import Design
 from ballplate.simulator.estimation.linearisation import linearise
 from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.model import Experiment
-from ballplate.uncertainty.scale import scale_of
 from ballplate.uncertainty.summaries import Quantity, tasks_of, uncertainties
 from ballplate.uncertainty.tasks import TaskUncertainty
 
@@ -31,16 +30,14 @@ class PlannedUncertainty:
         return tasks_of(self.quantities)
 
 
-def check(
-    experiment: Experiment, design: Design | None = None, with_scale: bool = False
-) -> Prediction:
+def check(experiment: Experiment, design: Design | None = None) -> Prediction:
     """Judge the rank of an experiment's design, or of another, at zero machine error."""
-    return _predict(experiment, design or lay_out(experiment), False, with_scale)
+    return _predict(experiment, design or lay_out(experiment), False)
 
 
-def predict(experiment: Experiment, with_scale: bool = False) -> Prediction:
+def predict(experiment: Experiment) -> Prediction:
     """Return rank verdict and U1 to U6 of an experiment's design at zero machine error."""
-    return _predict(experiment, lay_out(experiment), True, with_scale)
+    return _predict(experiment, lay_out(experiment), True)
 
 
 @single_threaded
@@ -52,9 +49,7 @@ def planned_uncertainty(experiment: Experiment) -> PlannedUncertainty:
 
 
 @single_threaded
-def _predict(
-    experiment: Experiment, design: Design, with_quantities: bool, with_scale: bool
-) -> Prediction:
+def _predict(experiment: Experiment, design: Design, with_quantities: bool) -> Prediction:
     at, target = linearise(design), experiment.target_uncertainty
     judged = verdict(at, experiment.expected_rank_deficiency, target)
     quantities = {}
@@ -63,7 +58,6 @@ def _predict(
         lengths = quantities.get("U6")
     else:
         lengths = uncertainties(at, target=target, symbols=("U6",)).get("U6")
-    scale = scale_of(experiment, at) if with_scale else None
     return Prediction(
         experiment.label,
         experiment.title,
@@ -71,7 +65,6 @@ def _predict(
         judged,
         quantities,
         lengths,
-        scale,
         influences=influence_uncertainties(at) if with_quantities else (),
         experiment=experiment,
     )

@@ -27,10 +27,14 @@ class AskedResult(Protocol):
 
 
 class PredictedAssumptions(AskedResult, Protocol):
-    """Assumptions of a prediction; `warning` names one that more than doubles U6, if any."""
+    """Assumptions of a prediction; `doubling` are those that more than double U6, the largest
+    first: what is assumed, and a line of text.
+    """
 
     @property
-    def warning(self) -> str: ...
+    def doubling(self) -> Sequence[tuple[str, str]]: ...
+
+    def words_of(self, name: str) -> str: ...
 
     def summary(self) -> list[str]: ...
 

@@ -138,7 +138,11 @@ class Fit(FitResult):
         if not self.converged:
             return f"the estimate has {self.solution.status}"
         return ", ".join(
-            [rank_words(self.verdict), f"sigma {self.sigma:.3g}", *length_headline(self.quantities)]
+            [
+                rank_words(self.verdict),
+                f"sigma {self.sigma:.3g}",
+                *length_headline(self.quantities.get("U6")),
+            ]
         )
 
     def lines(self) -> list[str]:

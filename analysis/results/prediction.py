@@ -9,9 +9,10 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
-import numpy as np
 from ballplate.presentation.formatting import Data
+from ballplate.simulator.computing.threads import single_threaded
 from ballplate.simulator.design.arrays import Design
+from ballplate.simulator.estimation.linearisation import linearise
 from ballplate.simulator.inputs.extensions import optional_service, service
 from ballplate.simulator.inputs.settings import hint, number_of
 
@@ -19,11 +20,17 @@ from ..presentation.formatting import given
 from ..presentation.result import Result
 from ..presentation.table_columns import MainTable
 from ..rank.verdicts import Verdict
-from ..uncertainty.scale import Scale
+from ..uncertainty.scale import Scale, scale_of
 from ..uncertainty.summaries import Quantity, tasks_of
 from ..uncertainty.tasks import TaskUncertainty
 from .extension_results import PredictedAssumptions, SpaceView, picture_in_space, shown_in_space
 from .influences import InfluenceUncertainty, influence_data, influence_table
+from .qualifications import (
+    Qualification,
+    given_words,
+    qualification_data,
+    qualifications,
+)
 from .text_blocks import (
     QUANTITY_COLUMNS,
     map_lines,
@@ -31,7 +38,6 @@ from .text_blocks import (
     quantity_data,
     scale_data,
     scale_lines,
-    scale_warnings,
     target_lines,
     task_data,
     task_table,
@@ -64,9 +70,9 @@ class Prediction(Result):
     """Predicted uncertainties of a design: the verdict on its rank and, optionally, U1 to U6 and
     tasks.
 
-    `lengths` is U6 in any case, None without evaluation points, and `scale` the sources of scale,
-    if wanted and determined. `monte_carlo` has replicates, `advice` further results of a check.
-    `influences` belong to the quantities. `experiment` was judged.
+    `lengths` is U6 in any case, None without evaluation points. `monte_carlo` has replicates,
+    `advice` further results of a check. `influences` belong to the quantities. `experiment` was
+    judged.
     """
 
     label: str
@@ -75,22 +81,36 @@ class Prediction(Result):
     verdict: Verdict
     quantities: dict[str, Quantity]
     lengths: Quantity | None = None
-    scale: Scale | None = None
     monte_carlo: Trials | None = None
     advice: Advice | None = None
     influences: tuple[InfluenceUncertainty, ...] = ()
     experiment: Experiment | None = None
 
     @cached_property
+    def scale(self) -> Scale | None:
+        """The sources of scale; None if it is undetermined or has no evaluation points."""
+        return None if self.experiment is None else _scale(self.experiment, self.design)
+
+    @cached_property
+    def qualifications(self) -> tuple[Qualification, ...]:
+        """What the figures and verdicts take for granted, as every output states it."""
+        deficiency = self.verdict.deficiency
+        return tuple(qualifications(deficiency, self.scale, self.assumptions, self.experiment))
+
+    @property
+    def qualified(self) -> list[str]:
+        """Its qualifications as lines of text; those on the rank have lines of their own."""
+        return [each.text for each in self.qualifications if each.kind != "undetermined"]
+
+    @cached_property
     def assumptions(self) -> PredictedAssumptions | None:
         """What the prediction takes for granted, with U6 without it; None if U6 is undetermined,
-        zero or not computed, or without the extension.
+        zero or has no evaluation points, or without the extension.
         """
-        lengths = self.quantities.get("U6")
-        if lengths is None or self.experiment is None or not lengths.average > 0.0:
+        if self.lengths is None or self.experiment is None or not self.lengths.average > 0.0:
             return None
         effects = optional_service("assumption_effects")
-        return None if effects is None else effects(self.experiment, lengths)
+        return None if effects is None else effects(self.experiment, self.lengths)
 
     @cached_property
     def information(self) -> pandas.DataFrame:
@@ -110,9 +130,12 @@ class Prediction(Result):
     def headline(self) -> str:
         count = 0 if self.advice is None else len(self.advice.missed)
         missed = [f"{number_of(count, 'goal')} missed"] if count else []
-        doubled = "" if self.assumptions is None else self.assumptions.warning
-        parts = [rank_words(self.verdict), *length_headline(self.quantities), doubled, *missed]
-        return ", ".join(filter(None, parts))
+        # The rank has words of its own, and of assumptions the largest is stated with its effect.
+        others = [q for q in self.qualifications if q.kind not in ("undetermined", "assumption")]
+        assumed = [q.text for q in self.qualifications if q.kind == "assumption"][:1]
+        conditions = given_words(others).removeprefix(", ")
+        words = [rank_words(self.verdict), *length_headline(self.lengths), conditions]
+        return ", ".join(filter(None, [*words, *assumed, *missed]))
 
     def lines(self) -> list[str]:
         lines = [*self.table_lines(), *(() if self.advice is None else self.advice.lines)]
@@ -125,10 +148,13 @@ class Prediction(Result):
     def table_lines(self) -> list[str]:
         """Title, verdict and table, without replicates."""
         rank, *further = verdict_lines(self.verdict, lengths=self.lengths)
-        lines = [self.heading, rank, *scale_warnings(self.scale), *further]
-        lines += [] if self.quantities else target_lines(self.lengths)
+        qualified = self.qualified
+        lines = [self.heading, rank, *further]
+        lines += [] if self.quantities else [*target_lines(self.lengths), *qualified]
         lines += [*map_lines(self.experiment), *scale_lines(self.scale)]
-        lines += ["", *uncertainty_table(self.quantities)] if self.quantities else []
+        if not self.quantities:
+            return lines
+        lines += ["", *uncertainty_table(self.quantities), *qualified]
         lines += ["", *influence_table(self.influences)] if self.influences else []
         lines += ["", *task_table(self.tasks)] if self.tasks else []
         return lines if self.assumptions is None else [*lines, "", *self.assumptions.summary()]
@@ -145,7 +171,10 @@ class Prediction(Result):
                 influences=influence_data(self.influences),
             ),
             "scale": scale_data(self.scale),
-            **given(assumptions=self.assumptions and self.assumptions.to_dict()),
+            "qualifications": qualification_data(self.qualifications),
+            **given(
+                assumptions=self.quantities and self.assumptions and self.assumptions.to_dict()
+            ),
             **({} if self.advice is None else self.advice.data),
         }
         if self.monte_carlo is None:
@@ -200,9 +229,15 @@ class Prediction(Result):
             "weakly determined": [len(self.verdict.weak)],
             "U6 average, µm": [self.lengths.average if self.lengths else math.nan],
             "U6 maximum, µm": [self.lengths.maximum if self.lengths else math.nan],
+            "U6 undetermined": [self.lengths.undetermined if self.lengths else 0],
             "unit": ["m"],
         }
         return columns, [self]
+
+
+@single_threaded
+def _scale(experiment: Experiment, design: Design) -> Scale | None:
+    return scale_of(experiment, linearise(design))
 
 
 Named = TypeVar("Named")
@@ -223,9 +258,10 @@ def rank_words(judged: Verdict) -> str:
     return f"rank deficiency {judged.deficiency}" if judged.deficiency else "full rank"
 
 
-def length_headline(quantities: Mapping[str, Quantity]) -> list[str]:
-    """Return U6 as text; empty if it is undetermined or was not computed."""
-    lengths = quantities.get("U6")
-    if lengths is None or np.isnan(lengths.average):
+def length_headline(lengths: Quantity | None) -> list[str]:
+    """Return U6 as text; empty if it was not computed."""
+    if lengths is None:
         return []
+    if lengths.undetermined:
+        return [f"U6 undetermined ({lengths.undetermined} of {lengths.count})"]
     return [f"U6 {1e6 * lengths.average:.3g} µm on average, {1e6 * lengths.maximum:.3g} µm at most"]

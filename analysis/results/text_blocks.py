@@ -188,20 +188,16 @@ def not_read(unread: Collection[str]) -> str:
 
 
 def _lengths_words(lengths: Quantity) -> str:
-    if math.isnan(lengths.average):
-        return "all are undetermined"
+    if lengths.undetermined:
+        is_all = lengths.undetermined == lengths.count
+        part = f"{lengths.undetermined} of {lengths.count} distances"
+        return f"{'all are' if is_all else part} undetermined"
     # A share of an expanded uncertainty precedes this: name the standard one.
     symbol = "U6" if lengths.coverage_factor == 1.0 else "standard uncertainty U6"
-    words = (
+    return (
         f"{symbol} {number(1e6 * lengths.average)} µm on average,"
         f" {number(1e6 * lengths.maximum)} µm at most"
     )
-    open_ = (
-        f", {lengths.undetermined} of {lengths.count} distances undetermined"
-        if lengths.undetermined
-        else ""
-    )
-    return words + open_
 
 
 def target_lines(lengths: Quantity | None) -> list[str]:

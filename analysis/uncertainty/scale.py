@@ -13,6 +13,7 @@ from itertools import product
 
 import numpy as np
 from ballplate.simulator.computing.decompositions import lstsq
+from ballplate.simulator.computing.threads import single_threaded
 from ballplate.simulator.design.arrays import Design, State
 from ballplate.simulator.design.objects import Volume
 from ballplate.simulator.estimation.corrections import correction_rows
@@ -79,6 +80,7 @@ class Scale:
     loosened: Loosened | None = None
 
 
+@single_threaded
 def scale_of(experiment: Experiment, at: Linearisation) -> Scale | None:
     """Return the sources of a design's scale; None if it is undetermined or without evaluation
     points.

@@ -34,10 +34,10 @@ from .tasks import TaskUncertainty, task_uncertainties
 
 @dataclass(frozen=True)
 class Quantity:
-    """Standard uncertainties of a quantity: maximum and average of the determined ones.
+    """Standard uncertainties of a quantity: maximum and average of all.
 
-    `count` includes `undetermined` ones; if all are undetermined, maximum and average are NaN and
-    `largest`, the name of the maximum, is empty. `within_target` is the share of distances whose
+    `count` includes `undetermined` ones; with any, maximum and average are NaN and `largest`, the
+    name of the maximum, is empty. `within_target` is the share of distances whose
     uncertainty, `coverage_factor` times the standard one, is within the target uncertainty
     (undetermined ones are not); None without target. `places` locate the evaluation points of
     `largest`, and `pair` are their indices if it is a distance. `named` are distances with names,
@@ -189,12 +189,11 @@ def _of_pairs(
     )
     if not pairs.count:
         return None
-    determined = pairs.count - pairs.undetermined
     quantity = Quantity(symbol, np.nan, np.nan, "m", pairs.count, pairs.undetermined)
     places = groups[0][0]
-    if determined:
+    if not pairs.undetermined:
         where = " to ".join(places.name(design, label) for label in pairs.where)
-        average = sigma * pairs.total / determined
+        average = sigma * pairs.total / pairs.count
         quantity = replace(quantity, maximum=sigma * pairs.maximum, average=average, largest=where)
         if isinstance(places, MeasuredPoints):
             ends = tuple(_point(places, label) for label in pairs.where)
@@ -224,17 +223,12 @@ def point_pairs(
 
 
 def summarise(symbol: str, values: Array, unit: str, name_of: Callable[[int], str]) -> Quantity:
-    """Return maximum and average of the standard uncertainties `values` (m,) that are not NaN."""
-    open_ = np.isnan(values)
-    if open_.all():
-        return Quantity(symbol, np.nan, np.nan, unit, len(values), len(values))
-    top = first_largest(values)
+    """Return maximum and average of the standard uncertainties `values` (m,), NaN with any NaN."""
+    undetermined = int(np.isnan(values).sum())
+    # What is determined is a part that differs from design to design: an average over it is none.
+    if undetermined or not len(values):
+        return Quantity(symbol, np.nan, np.nan, unit, len(values), undetermined)
+    largest = name_of(first_largest(values))
     return Quantity(
-        symbol,
-        float(np.nanmax(values)),
-        float(np.nanmean(values)),
-        unit,
-        len(values),
-        int(open_.sum()),
-        name_of(top),
+        symbol, float(values.max()), float(values.mean()), unit, len(values), largest=largest
     )

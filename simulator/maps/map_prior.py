@@ -22,7 +22,7 @@ class EarlierCampaign:
     """The campaign of a prior map: its `file`, and its statement on sigma.
 
     `sum_of_squares` is S^2 at the stated uncertainties, None if unknown or rounding, and
-    `is_stated` is true if the map contains it.
+    `is_stated` is true if the map contains it. `caution` is the warning on the map's fit, if any.
     """
 
     file: str
@@ -30,6 +30,7 @@ class EarlierCampaign:
     degrees_of_freedom: int
     sum_of_squares: float | None
     is_stated: bool
+    caution: str = ""
 
     @property
     def estimate(self) -> float:
@@ -46,7 +47,8 @@ def campaign_of(fitted: FittedMap, file: str) -> EarlierCampaign:
         squares = fitted.sigma * fitted.sigma * freedom
     if squares is not None and squares < LEAST_SIGMA**2 * freedom:
         squares = None
-    return EarlierCampaign(file, fitted.sigma, freedom, squares, fitted.sum_of_squares is not None)
+    caution, is_stated = fitted.known_lack_of_fit.caution, fitted.sum_of_squares is not None
+    return EarlierCampaign(file, fitted.sigma, freedom, squares, is_stated, caution)
 
 
 @dataclass(frozen=True)

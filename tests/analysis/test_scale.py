@@ -148,7 +148,7 @@ def test_the_readings_alone_never_tell_the_scale(tmp_path: Path) -> None:
 
 
 def test_a_design_without_a_certificate_is_told_where_its_scale_comes_from(tmp_path: Path) -> None:
-    found = check(experiment_of(tmp_path, without_certificate()), with_scale=True)
+    found = check(experiment_of(tmp_path, without_certificate()))
     assert found.verdict.deficiency == 0 and found.scale is not None
     assert [one.words for one in found.scale.carriers] == [EXACT_OFFSETS]
     assert found.scale.rests_on_offsets and found.scale.loosened is not None
@@ -161,7 +161,7 @@ def test_a_design_without_a_certificate_is_told_where_its_scale_comes_from(tmp_p
 
 def test_a_certificate_and_offsets_are_each_told_with_what_is_left_without(tmp_path: Path) -> None:
     certified = experiment_of(tmp_path, QUICKSTART)
-    found = predict(certified, with_scale=True).scale
+    found = predict(certified).scale
     assert found is not None and not found.rests_on_offsets and found.loosened is None
     told = {one.words: one.without for one in found.carriers}
     bare = experiment_of(tmp_path, without_certificate(QUICKSTART))
@@ -173,13 +173,13 @@ def test_a_certificate_and_offsets_are_each_told_with_what_is_left_without(tmp_p
 
 
 def test_one_probe_leaves_nothing_but_the_certificate(tmp_path: Path) -> None:
-    found = check(experiment_of(tmp_path, ONE_PROBE), with_scale=True)
+    found = check(experiment_of(tmp_path, ONE_PROBE))
     assert found.verdict.deficiency == 0 and found.scale is not None
     assert [one.words for one in found.scale.carriers] == ["certificates of plate"]
     bare = (
         ONE_PROBE[: ONE_PROBE.index("calibration:")] + ONE_PROBE[ONE_PROBE.index("evaluation:") :]
     )
-    open_ = check(experiment_of(tmp_path, bare), with_scale=True)
+    open_ = check(experiment_of(tmp_path, bare))
     assert open_.verdict.deficiency and open_.scale is None
 
 
@@ -190,13 +190,13 @@ def test_priors_and_stated_offsets_are_told(tmp_path: Path) -> None:
         line = next(one for one in stated.splitlines() if one.strip().startswith(f"{name}: ["))
         offset = line.split(": ", 1)[1]
         stated = stated.replace(line, f"  {name}: {{offset: {offset}, standard_uncertainty: 1 um}}")
-    found = check(experiment_of(tmp_path, stated), with_scale=True).scale
+    found = check(experiment_of(tmp_path, stated)).scale
     assert found is not None and not found.rests_on_offsets
     assert [one.words for one in found.carriers] == [wording.PROBE_OFFSETS_WITH_A_STANDARD]
     prior = (
         stated + "\npriors:\n  - {parameter: EXX t^1, value: 0 um, standard_uncertainty: 0.1 um}\n"
     )
-    both = check(experiment_of(tmp_path, prior), with_scale=True).scale
+    both = check(experiment_of(tmp_path, prior)).scale
     assert both is not None and both.carriers[0].words == "priors"
     assert both.uncertainty < found.uncertainty
 
@@ -209,7 +209,7 @@ def test_a_model_that_cannot_stretch_has_the_machines_own_scale(tmp_path: Path) 
         )
         design = lay_out(experiment)
         assert can_stretch(design, nominal_state(design)) is is_free
-        found = check(experiment, with_scale=True)
+        found = check(experiment)
         assert found.scale is not None
         assert (OWN_SCALES in [one.words for one in found.scale.carriers]) is not is_free
         assert ("the machine's own scales" in "\n".join(found.lines())) is not is_free
@@ -232,7 +232,7 @@ def test_a_model_that_can_stretch_in_part_has_certificates_and_its_own_scales(
         for one in load(Path("designs/gilsinn/scales-in-two-parts.yaml"))
         if one.name == "level ends"
     ]
-    found = check(experiment, with_scale=True).scale
+    found = check(experiment).scale
     assert found is not None and found.uncertainty > 1e-8
     assert found.carriers[-1].words == OWN_SCALES
     for one in found.carriers[:-1]:
@@ -272,7 +272,7 @@ def test_what_cannot_be_laid_out_has_no_scale(tmp_path: Path) -> None:
         lay_out(without)
     assert 0.0 < scale_uncertainty(experiment) < 1e-6
     assert scale_uncertainty(without) == np.inf
-    found = check(experiment, with_scale=True).scale
+    found = check(experiment).scale
     assert found is not None
     assert [(one.words, one.without) for one in found.carriers] == [
         ("certificates of plate", np.inf)

@@ -604,9 +604,10 @@ def spread(solution: Solution, rows_: list[dict[Key, Number]]) -> list[Number | 
 
 def summary(values: list[Number | None]) -> dict[str, Any]:
     known = [value for value in values if value is not None]
+    is_determined = bool(known) and len(known) == len(values)
     return {
-        "maximum": max(known) if known else None,
-        "average": sum(known, mpf(0)) / len(known) if known else None,
+        "maximum": max(known) if is_determined else None,
+        "average": sum(known, mpf(0)) / len(known) if is_determined else None,
         "count": len(values),
         "undetermined": len(values) - len(known),
     }

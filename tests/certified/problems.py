@@ -365,7 +365,7 @@ def deficient() -> Problem:
     given.update(
         name="deficient",
         title="Four symmetrical positions",
-        why="Exactly deficient; what it does determine has an uncertainty all the same.",
+        why="Exactly deficient; what is averaged over the determined values alone shows itself.",
         planned_only=True,
     )
     given["positions"][3]["rotation_degrees"][2] -= 0.2

@@ -34,7 +34,7 @@ class AssumptionEffect:
 
     `bias` of a systematic one is the root mean square and the largest error of lengths in metres,
     with which `average` and `maximum` are combined. `ratio` is that of the average to the present
-    one.
+    one, infinite if a distance is undetermined.
     """
 
     assumption: PredictionAssumption
@@ -43,6 +43,13 @@ class AssumptionEffect:
     undetermined: int
     ratio: float
     bias: tuple[float, float] | None = None
+
+    @property
+    def words(self) -> str:
+        """The assumption with its effect, as a line of text."""
+        times = f"{number(self.ratio, 2)} times as large"
+        then = "undetermined" if self.undetermined else times
+        return f"assumed: {self.assumption.assumed}; otherwise U6 is {then}"
 
     @property
     def entries(self) -> str:
@@ -68,14 +75,21 @@ class Assumptions(Result):
     def headline(self) -> str:
         if not self.effects:
             return "no assumptions"
-        effect = self.effects[0]
-        times = number(effect.ratio, 2)
-        return f"assumed: {effect.assumption.assumed}; otherwise U6 is {times} times as large"
+        return self.effects[0].words
 
     @property
-    def warning(self) -> str:
-        """The first assumption, if it more than doubles U6; otherwise empty."""
-        return self.headline() if self.effects and self.effects[0].ratio > LARGE else ""
+    def doubling(self) -> tuple[tuple[str, str], ...]:
+        """The assumptions that more than double U6, each with a line of text."""
+        return tuple(
+            (effect.assumption.assumed, effect.words)
+            for effect in self.effects
+            if effect.ratio > LARGE
+        )
+
+    def words_of(self, name: str) -> str:
+        """Return the line of an assumption by its name; empty if it has no result."""
+        found = (effect.words for effect in self.effects if effect.assumption.name == name)
+        return next(found, "")
 
     def summary(self) -> list[str]:
         """Return the first rows as lines of text."""
@@ -263,16 +277,16 @@ def _effect(
             changed = _entries_of(together, experiment, [assumption])
         found = uncertainties(linearise(lay_out(changed)), symbols=("U6",))["U6"]
     average, maximum = np.hypot((found.average, found.maximum), bias or (0.0, 0.0)).tolist()
-    ratio = average / lengths.average
+    ratio = np.inf if found.undetermined else average / lengths.average
     return AssumptionEffect(assumption, average, maximum, found.undetermined, ratio, bias)
 
 
 def _with_choice(experiment: Experiment, changed: Experiment) -> Experiment:
-    """Return a changed experiment with the positions and the calibration that a plan chose."""
-    names = [[position.name for position in each.positions] for each in (experiment, changed)]
-    if names[0] == names[1] and changed.pool is None:
-        return changed
-    placed = placed_only(replace(changed, positions=experiment.positions))
+    """Return a changed experiment with the positions, the probes and the calibration that a plan
+    or a repair chose.
+    """
+    probes = {**experiment.probes, **changed.probes}
+    placed = placed_only(replace(changed, positions=experiment.positions, probes=probes))
     bought = experiment.calibration[len(placed.calibration) :]
     return replace(placed, calibration=(*placed.calibration, *bought))
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from ballplate.extensions.requirements.goals import Goal, check_goal, judge
-from ballplate.results import FEW, Fit, PlannedUncertainty, with_sigmas
+from ballplate.results import FEW, Fit, PlannedUncertainty, check, with_sigmas
 from ballplate.results import fit as fit_observed
 from ballplate.simulator.computing import Report, counted, single_threaded, unreported
 from ballplate.simulator.estimation import Linearisation, linearise
@@ -90,7 +90,13 @@ def next_step(
         )
         suspected = tuple(fit.diagnosis.words(observed.marks)) if fit.diagnosis else ()
         step = replace(
-            step, sigma=sigma, bound=bound, now=judged, is_sure=is_sure, suspected=suspected
+            step,
+            sigma=sigma,
+            bound=bound,
+            now=judged,
+            is_sure=is_sure,
+            suspected=suspected,
+            qualifications=check(chosen, observed.design).qualifications,
         )
     if step.is_met:
         return step

@@ -8,7 +8,14 @@ from dataclasses import dataclass, field
 
 from ballplate.extensions.requirements.goals import Goal, Judgement
 from ballplate.presentation import Data, MainTable, Result, number
-from ballplate.results import Fit, PlannedUncertainty, freedom_words
+from ballplate.results import (
+    Fit,
+    PlannedUncertainty,
+    Qualification,
+    freedom_words,
+    given_words,
+    qualification_data,
+)
 from ballplate.simulator.computing import comparable
 from ballplate.simulator.inputs import listing, number_of
 from ballplate.simulator.readings import ObservedReadings
@@ -47,7 +54,7 @@ class NextStep(Result):
     yet, for the reason `why`. Uncertainties are those stated times `sigma`, with upper limit
     `bound`; `now` judges the goal, `is_sure` also at the bound. `suspected` are findings of the
     residuals as text. `offered` are possible next positions, the best first; empty once the target
-    is met.
+    is met. `qualifications` are those of the positions read.
     """
 
     label: str
@@ -64,6 +71,7 @@ class NextStep(Result):
     is_sure: bool = False
     suspected: tuple[str, ...] = ()
     offered: tuple[Offered, ...] = field(default=())
+    qualifications: tuple[Qualification, ...] = ()
 
     @property
     def is_met(self) -> bool:
@@ -110,18 +118,18 @@ class NextStep(Result):
         shown = [f"suspected: {words}" for words in self.suspected] or ["nothing suspected"]
         lengths = self.fit.quantities.get("U6")
         reached = [self.now.words, *([] if lengths is None else self._maximum())]
-        return [sigma_text, *shown, "; ".join(reached)]
+        qualified = (each.text for each in self.qualifications)
+        return [sigma_text, *shown, "; ".join(reached), *qualified]
 
     def _maximum(self) -> list[str]:
         """Return the largest U6, unless the goal states it."""
         assert self.fit is not None
         lengths = self.fit.quantities["U6"]
-        if lengths.undetermined == lengths.count:
-            return [f"U6 undetermined of all {lengths.count} lengths"] if lengths.count else []
+        if lengths.undetermined:
+            part = "all" if lengths.undetermined == lengths.count else f"{lengths.undetermined} of"
+            return [f"U6 undetermined of {part} {lengths.count} lengths"]
         largest = lengths.maximum * self.sigma / self.fit.sigma
-        open_ = lengths.undetermined
-        some = f", {open_} of {lengths.count} undetermined" if open_ else ""
-        return [f"largest U6 {number(1e6 * largest)} µm{some}"]
+        return [f"largest U6 {number(1e6 * largest)} µm"]
 
     def _verdict(self) -> str:
         then = "" if self.next is None else f", then {self.next.then.words}"
@@ -132,7 +140,7 @@ class NextStep(Result):
             assert self.fit is not None
             by_itself = not can_stretch(self.fit.design, self.fit.solution.state)
             limitation = " by the machine's own scales: not traceable" if by_itself else ""
-            return f"target met{limitation}: stop"
+            return f"target met{limitation}{given_words(self.qualifications)}: stop"
         reason = self._reason()
         if self.next is None:
             return f"{reason}; no position is left to read"
@@ -181,6 +189,7 @@ class NextStep(Result):
             "U6_maximum": lengths and times * lengths.maximum,
             "goal_met": self.now is not None and self.now.is_met,
             "goal_met_at_bound": self.is_sure,
+            "qualifications": qualification_data(self.qualifications),
             "next": self.next and self.next.name,
             "offered": self.rows(),
             "remarks": self.notes,

@@ -8,7 +8,6 @@ from pathlib import Path
 from ballplate.planning import CheckedDesign, CheckedFile
 from ballplate.results import (
     scale_lines,
-    scale_warnings,
     target_lines,
     verdict_lines,
 )
@@ -43,15 +42,15 @@ def _design_lines(file: str, design: CheckedDesign, workspace: Path | None) -> l
     lines = [
         *verdict_lines(prediction.verdict, lengths=prediction.lengths),
         *target_lines(prediction.lengths),
+        *prediction.qualified,
         *scale_lines(prediction.scale),
-        *scale_warnings(prediction.scale),
     ]
     advice = prediction.advice
     suggested = () if advice is None else advice.lines
     if design.place is None:
         # What stands before the name keeps it from being read as a command, and so does the space
         # after a hash.
-        first = "; ".join([lines[0], *(line for line in lines if line.startswith("warning:"))])
+        first = "; ".join([lines[0], *prediction.qualified])
         start = f"as expected: {file}: {design.prediction.label}: "
         return [
             in_one_line(f"{start}{line}").replace("##[", "# #[") for line in (first, *suggested)

@@ -53,7 +53,8 @@ def _case(file: str, design: CheckedDesign) -> ElementTree.Element:
         ElementTree.SubElement(case, "system-out").text = "\n".join(lines)
         return case
     is_rank = bool(prediction.verdict.complaint)
-    message = _clean(verdict_lines(prediction.verdict)[0] if is_rank else "; ".join(design.missed))
+    failures = verdict_lines(prediction.verdict)[:1] if is_rank else design.missed
+    message = _clean("; ".join([*failures, *prediction.qualified]))
     kind = "rank" if is_rank else "goal"
     failure = ElementTree.SubElement(case, "failure", {"type": kind, "message": message})
     place = f"{design.place.file}:{design.place.line}:{design.place.column}"

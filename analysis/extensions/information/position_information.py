@@ -243,7 +243,7 @@ def _variances(at: Linearisation) -> dict[str, float]:
 
 
 def _average(lengths: Quantity | None) -> float:
-    return np.nan if lengths is None or lengths.undetermined else lengths.average
+    return np.nan if lengths is None else lengths.average
 
 
 def _minutes(experiment: Experiment) -> dict[str, float]:

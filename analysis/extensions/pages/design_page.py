@@ -142,7 +142,12 @@ def _verdict(run: QuotedData, target: str, lengths: QuotedData) -> Html:
         expected = "" if data["as_expected"] else ", though the file expects a deficiency"
         first = sentence(f"Full rank{expected}: the readings determine all ", counts, f"{weak}.")
     second = sentence(lengths_words(run, target), *_throughout(run, lengths))
-    return joined([first, second])
+    qualified = (
+        sentence(each.text("text"), ".")
+        for each in run.at("qualifications").each()
+        if each.data["kind"] != "undetermined"
+    )
+    return joined([first, second, *qualified])
 
 
 def _throughout(run: QuotedData, lengths: QuotedData) -> list[str | Html]:

@@ -97,7 +97,7 @@ def page(
         chosen = subject.experiment if isinstance(subject, Prediction) else experiment_of(subject)
         if chosen is None:
             raise ValueError("the prediction holds no experiment; predict it again")
-        text = page_of_design(chosen, predicted or predict(chosen, with_scale=True), report)
+        text = page_of_design(chosen, predicted or predict(chosen), report)
     if path is not None:
         write_file(Path(path), text.encode("utf-8", "replace"))
     return text

@@ -95,8 +95,10 @@ def lengths_words(result: QuotedData, target: str, caveat: str = "") -> Html:
     if u6 is None:
         return Html("The design has no evaluation points, so that no lengths are judged.")
     lengths = result.at("quantities", "U6")
-    if u6["average"] is None:
-        return Html("All distances between corrected points are undetermined.")
+    if u6["undetermined"]:
+        part = "All" if u6["undetermined"] == u6["count"] else ""
+        count = part or [lengths.number("undetermined"), " of ", lengths.number("count")]
+        return joined([*count, " distances between corrected points are undetermined."])
     amounts = joined(
         [
             lengths.micro("average", digits=3),
@@ -105,25 +107,18 @@ def lengths_words(result: QuotedData, target: str, caveat: str = "") -> Html:
             " µm at most",
         ]
     )
-    open_ = (
-        joined(
-            [lengths.number("undetermined"), " of ", lengths.number("count"), " are undetermined. "]
-        )
-        if u6["undetermined"]
-        else Html()
-    )
     if u6.get("within_target") is None:
         words = joined(
             ["Distances between corrected points have a standard uncertainty of ", amounts]
         )
-        return joined([open_, words, "; the file states no target."])
+        return joined([words, "; the file states no target."])
     by = uncertainty_words(u6["target_coverage_factor"])
     share = lengths.share("within_target")
     sentence = (
         f" of the distances between corrected points are within the target {target} ({by}){caveat};"
         " u is "
     )
-    return joined([open_, share, sentence, amounts, "."])
+    return joined([share, sentence, amounts, "."])
 
 
 def scale_section(result: QuotedData) -> Html:
@@ -151,26 +146,6 @@ def scale_section(result: QuotedData) -> Html:
             "scale", "What carries scale", ["carried by", "u of scale without it, ppm"], carriers
         ),
     ]
-    if scale.data["rests_on_exact_offsets"]:
-        parts.append(
-            sentence(
-                "Warning: the scale rests on probe offsets that are held exact; calibrate a"
-                " distance, or state the standard uncertainty of the offsets."
-            )
-        )
-    if scale.data["with_uncertain_offsets"] is not None:
-        loose = scale.at("with_uncertain_offsets")
-        parts.append(
-            sentence(
-                "With a standard uncertainty of ",
-                loose.micro("standard_uncertainty"),
-                " µm of each offset but one, U6 would be ",
-                loose.micro("U6_average"),
-                " µm on average and ",
-                loose.micro("U6_maximum"),
-                " µm at most.",
-            )
-        )
     return joined(parts)
 
 

@@ -15,7 +15,7 @@ from ballplate.extensions.reliability.scatter import log_chances as scatter_chan
 from ballplate.extensions.reliability.suspects import Diagnosis, Suspect
 from ballplate.presentation import number
 from ballplate.results import Fit, ParameterEstimate
-from ballplate.simulator.computing import single_threaded
+from ballplate.simulator.computing import single_threaded, svd
 from ballplate.simulator.estimation import Linearisation, estimate, linearise, linearised_fit
 from ballplate.simulator.machines import Array
 from ballplate.uncertainty import uncertainties
@@ -161,7 +161,7 @@ def _parameters(cause: PossibleCause, at: Linearisation) -> tuple[tuple[str, ...
     if len(columns) <= at.design.dimension and np.isnan(at.of_shared(rows)).any():
         scale = at.as_drawn.spectrum.scale[columns]
         moves = at.shared_null[columns] / scale[:, None]
-        directions, sizes, _ = np.linalg.svd(moves, full_matrices=True)
+        directions, sizes, _ = svd(moves, full_matrices=True)
         open_directions = int((sizes > OPEN * sizes.max(initial=0.0)).sum())
         combined = reduced(directions[:, open_directions:].T / scale)
     names = tuple(combination(row, cause.parameters) for row in combined)

@@ -16,7 +16,8 @@ def repair(path: PathLike, variant: str | None = None) -> str:
     """Return the text of an experiment file with the first full repair of `check --suggest`, for
     one variant or for each; the rest keeps every byte, line ends included.
 
-    A file without undetermined parameters is returned unchanged. No file is written.
+    A file without undetermined parameters is returned unchanged. No file is written. A repair with
+    a certificate or a probe that the file does not state is left out.
 
     :raises ExperimentError: the file cannot be used; no changes were found, or writing them would
         change the rest of the file.
@@ -40,7 +41,10 @@ def repair(path: PathLike, variant: str | None = None) -> str:
             continue
         chosen_repair = to_write(repairs(with_pool(experiment)), judged)
         if chosen_repair is None:
-            words = "no changes were found that determine everything"
+            words = (
+                "no changes were found that determine everything without a certificate or a probe"
+                " that the file does not state"
+            )
             raise experiment.refused((), words)
         text = mended(text, Path(path), experiment.name, chosen_repair, experiment.trust)
     return text

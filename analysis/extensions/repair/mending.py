@@ -22,7 +22,7 @@ from ballplate.simulator.inputs import (
 )
 from ballplate.simulator.inputs import Mapping as MappingNode
 
-from .changes import apply_all
+from .changes import ChangeKind, apply_all
 from .repair_search import Repair, Repairs
 from .written import Edit, edits, lacks_probes, position_settings
 from .yamltext import TextChange, changed_data, with_changes
@@ -32,16 +32,25 @@ READINGS = ("probes", "balls", "repeats", "standard_uncertainty", "readings")
 
 
 def to_write(repairs: Repairs | None, judged: Verdict, nothing_weak: bool = False) -> Repair | None:
-    """Return the cheapest repair, which may be written without a question, unless the design needs
-    none or it would repair the design in name only.
+    """Return the best repair that may be written without a question, unless the design needs none:
+    none that invents anything, or that would repair the design in name only.
 
     With `nothing_weak` a weakly determined design needs one too.
     """
-    if repairs is None or not repairs.complete or not (judged.deficiency or nothing_weak):
+    if repairs is None or not (judged.deficiency or nothing_weak):
         return None
-    cheapest = repairs.complete[0]
-    is_enough = judged.deficiency or not cheapest.weak
-    return cheapest if is_enough and not cheapest.is_faint else None
+    for repair in repairs.complete:
+        is_enough = judged.deficiency or not repair.weak
+        if is_enough and not repair.is_faint and not invents(repair):
+            return repair
+    return None
+
+
+def invents(repair: Repair) -> bool:
+    """Return whether a repair needs a certificate or a probe that the file does not state."""
+    return any(change.kind is ChangeKind.CERTIFICATE for change in repair.changes) or any(
+        edit.steps[0] == "probes" for edit in repair.edits
+    )
 
 
 def mended(

@@ -16,7 +16,7 @@ from ballplate.planning import (
 )
 from ballplate.simulator.inputs import ExperimentError, Message, read_text, refused
 
-from .mending import mended, to_write
+from .mending import invents, mended, to_write
 from .repair_tables import changes_in_words
 from .suggestions import Suggestions
 
@@ -27,7 +27,8 @@ BAD_FILE = 3
 def with_repairs(
     checked: CheckedFile, wanted: Wanted, options: Namespace
 ) -> tuple[CheckedFile, int]:
-    """Write the cheapest repair of each design into a checked file and return its new check.
+    """Write the best repair of each design that invents nothing into a checked file and return its
+    new check.
 
     Unrepaired designs keep their suggestions. The number is the least exit status.
     """
@@ -42,6 +43,11 @@ def with_repairs(
             repairs_found = _suggestions(design).repairs
             repair = to_write(repairs_found, design.prediction.verdict, wanted.nothing_weak)
             name = f"{path}: {design.prediction.label}"
+            best = repairs_found.complete[0] if repairs_found and repairs_found.complete else None
+            is_bad = design.prediction.verdict.deficiency or wanted.nothing_weak
+            if is_bad and best is not None and best is not repair and invents(best):
+                words = "a certificate or a probe that the file does not state"
+                statuses.append(f"{name}: not written, {words}: {changes_in_words(best)}")
             if repair is None:
                 if not design.prediction.verdict.deficiency:
                     statuses.append(f"{name}: nothing to repair")

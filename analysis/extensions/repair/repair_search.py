@@ -355,7 +355,7 @@ class _Search:
         experiment = self.base.experiment
         changed = apply_all(changes, experiment)
         after = self.judge(changes)
-        planned = predict(placed_only(changed), with_scale=True) if removes is None else None
+        planned = predict(placed_only(changed)) if removes is None else None
         if planned is not None and planned.verdict.deficiency != after.deficiency:
             raise AssertionError("two computations of one design's rank differ")
         gone = tuple(range(self.before.deficiency)) if removes is None else removes

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from ballplate.presentation import Data, finite, number, picked
 from ballplate.rank import Verdict, changed_names, length
+from ballplate.results import given_words, qualification_data
 from ballplate.simulator.inputs import listed
 from ballplate.uncertainty import OFFSET_TRIAL, exact_offsets
 
@@ -65,9 +66,9 @@ def _worth(repair: Repair, judged: Verdict) -> str:
     else:
         words += ", and no weak direction"
     u6 = None if repair.prediction is None else repair.prediction.quantities.get("U6")
-    words += caveat(repair)
     if u6 is not None:
         words += f"; average U6 {number(1e6 * u6.average)} µm{_with_offsets(repair)}"
+    words += caveat(repair)
     minutes = f"{duration(repair.seconds)} more" if repair.seconds else "no time more"
     words += f"; {repair.readings:+d} readings, {minutes}" if repair.readings else ""
     if repair.removes:
@@ -76,8 +77,8 @@ def _worth(repair: Repair, judged: Verdict) -> str:
 
 
 def caveat(repair: Repair) -> str:
-    """Return the note that scale rests on offsets taken as exact after a repair, if it does."""
-    return "; scale rests on probe offsets taken as exact" if repair.rests_on_offsets else ""
+    """Return what the figures after a repair take for granted."""
+    return "" if repair.prediction is None else given_words(repair.prediction.qualifications)
 
 
 def _with_offsets(repair: Repair) -> str:
@@ -163,6 +164,9 @@ def _data(repair: Repair) -> Data:
         "average_U6_with_uncertain_offsets": None if loose is None else loose.total / loose.count,
         "offset_uncertainty": OFFSET_TRIAL,
         "rests_on_exact_offsets": repair.rests_on_offsets,
+        "qualifications": qualification_data(
+            () if repair.prediction is None else repair.prediction.qualifications
+        ),
         **picked(repair, "readings", "seconds"),
         "edits": _edit_data(repair.edits),
     }

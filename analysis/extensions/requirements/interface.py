@@ -10,7 +10,7 @@ from ballplate.arguments import (
     experiment_of,
 )
 from ballplate.simulator.computing import Report, unreported
-from ballplate.simulator.experiment import Experiment
+from ballplate.simulator.experiment import Experiment, with_pool
 from ballplate.simulator.inputs import (
     ensure_one_of,
     ensure_positive,
@@ -34,11 +34,11 @@ def reach(
     calibration: int | None = None,
     report: Report = unreported,
 ) -> Reach:
-    """Return the repeatability, certificate, repeats, balls or size of the plate that meets a
-    goal.
+    """Return the value of each of some unknowns that meets a goal, the others unchanged.
 
     `goal` is as for `ballplate reach --goal`, with the `share` of lengths to be within, `unknowns`
-    one or several of repeatability, certificate, repeats, balls and size; by default all five.
+    one or several of repeatability, certificate, tips, thermometers, repeats, balls, size and
+    hours (of a plan from the experiment's pool); by default all but hours.
     `target` replaces the experiment's target, as a text with a unit. The `artefact` by its name
     and the entry of the `calibration` select the varied ones among several.
 
@@ -59,8 +59,9 @@ def reach(
     names = (unknowns,) if isinstance(unknowns, str) else tuple(unknowns or NAMES)
     for name in names:
         ensure_one_of(NAMES, unknowns=name)
+    chosen = experiment_of(experiment)
     return search(
-        experiment_of(experiment),
+        with_pool(chosen) if "hours" in names else chosen,
         parse_goal(goal, share),
         names,
         artefact,

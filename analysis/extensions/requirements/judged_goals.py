@@ -11,9 +11,9 @@ from .goals import Goal, GoalError, check_goal, judge
 
 
 def judged_goals(
-    experiment: Experiment, goals: Sequence[Goal]
+    experiment: Experiment, goals: Sequence[Goal], given: str = ""
 ) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """Return a line per goal, and those that are not met."""
+    """Return a line per goal, and those that are not met; a goal is met as `given`."""
     planned = planned_uncertainty(experiment)
     lines, missed = [], []
     for goal in goals:
@@ -24,6 +24,7 @@ def judged_goals(
             missed.append(lines[-1])
             continue
         judged = judge(goal, planned)
-        lines.append(f"goal {'met' if judged.is_met else 'not met'}: {goal}; {judged.words}")
+        verdict = f"met{given}" if judged.is_met else "not met"
+        lines.append(f"goal {verdict}: {goal}; {judged.words}")
         missed += [] if judged.is_met else [lines[-1]]
     return tuple(lines), tuple(missed)

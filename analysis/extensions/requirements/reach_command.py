@@ -6,16 +6,19 @@ from argparse import ArgumentParser, Namespace
 
 from ballplate.cli import UsageError, add_file, add_goal, add_json, show, single, whole
 
-UNKNOWNS = ("repeatability", "certificate", "repeats", "balls", "size")
+UNKNOWNS = (
+    *("repeatability", "certificate", "tips", "thermometers", "repeats", "balls", "size"),
+    "hours",
+)
 
 
 DESCRIPTION = (
     "Solve for one unknown of a design at a time, with the others as in the file: the"
-    " largest repeatability or certificate uncertainty, or the fewest repeats, fewest"
-    " balls or smallest plate that meets a goal. Each answer is a value of three digits,"
-    " or a whole number, for which the design was computed and meets the goal; the next"
-    " value fails. The exit status is 0 if every requested unknown has such a value (without --by:"
-    " one), otherwise 1; with --fail it is 0 if the design in the"
+    " largest uncertainty of readings, certificates, tips or temperatures, the fewest repeats or"
+    " balls, the smallest plate, or the shortest plan that meets a goal. Each answer is a value of"
+    " three digits, or a whole number, for which the design was computed and meets the goal; the"
+    " next value fails. The exit status is 0 if every requested unknown has such a value (without"
+    " --by: one), otherwise 1; with --fail it is 0 if the design in the"
     " file meets the goal, otherwise 1."
 )
 
@@ -61,8 +64,8 @@ def run(options: Namespace) -> int:
         goal = parse_goal(options.goal, options.share)
         if options.target is not None:
             parse_length_function(options.target)
-        names = tuple(dict.fromkeys(options.by or UNKNOWNS))
-        experiment = single(options)
+        names = tuple(dict.fromkeys(options.by or UNKNOWNS[:-1]))
+        experiment = single(options, planning="hours" in names)
         with progress(options) as shown:
             result = reach(
                 experiment,

@@ -5,26 +5,28 @@ prediction of its own.
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
-from ballplate.results import PlannedUncertainty, planned_uncertainty, predict
+from ballplate.results import PlannedUncertainty, Prediction, planned_uncertainty, predict
 from ballplate.simulator.computing import Report, comparable, counted, single_threaded, unreported
 from ballplate.simulator.experiment import Experiment, override
 from ballplate.simulator.inputs import ExperimentError, Mapping, Node, Scalar, listing, refused
 
-from .answers import Answer, Reach
+from .answers import Answer, Reach, Status
 from .goals import Goal, Judgement, check_goal, judge
+from .plan_hours import hours_answer
 from .steps import PER_DECADE
-from .unknowns import NAMES, NotVariableError, Unknown, UnknownName, unknown
+from .unknowns import NAMES, SOURCES, NotVariableError, Unknown, UnknownName, unknown
 
 # Evaluation points, the distances between which are gone through for each value tried.
 MOST_POINTS = 10_000
 
 # Columns of balls up to which every number is tried, and the ratio beyond; values of a size that
-# are tried first, and about the best of them if none does.
-EVERY, RATIO, SIZES, REFINED = 12, 1.25, 16, 12
+# are tried first, and about each of the best of them if none does.
+EVERY, RATIO, SIZES, REFINED, BEST = 12, 1.25, 32, 12, 4
 
 
 @dataclass(frozen=True)
@@ -62,6 +64,10 @@ def reach(
     :raises NotVariableError: the experiment lacks the single requested unknown.
     :raises ExperimentError: the target is invalid, or there are more than 10,000 evaluation points.
     """
+    if not experiment.positions:
+        raise refused(
+            experiment.source, "missing; reach changes a design that has some", "positions"
+        )
     count = len(experiment.evaluation.points)
     if count > MOST_POINTS:
         text = (
@@ -74,9 +80,10 @@ def reach(
         )
         raise refused(experiment.source, text, "evaluation.points")
     root = experiment.tree
-    # Planning is at zero machine error, and true machines take time to check.
-    zero = Mapping(root.mark, {"kind": Scalar(root.mark, "zero")}, {"kind": root.mark})
-    root = override(root, "true_machine", zero, root.mark)
+    if getattr(experiment.true_machine, "kind", None) != "random":
+        # Planning is at zero machine error, and true machines of files take time to check.
+        zero = Mapping(root.mark, {"kind": Scalar(root.mark, "zero")}, {"kind": root.mark})
+        root = override(root, "true_machine", zero, root.mark)
     if target is not None:
         root = override(root, "target_uncertainty", Scalar(root.mark, target), root.mark)
     searched = _Searched(root, experiment.builder, goal)
@@ -86,6 +93,9 @@ def reach(
     answers = []
     for name in counted(names, "unknowns", len(names), report):
         try:
+            if name == "hours":
+                answers.append(hours_answer(searched.built(root), goal))
+                continue
             sought = unknown(name, experiment, root, artefact, calibration)
         except NotVariableError as error:
             if len(names) == 1:
@@ -93,9 +103,34 @@ def reach(
             answers.append(Answer(name, name, "varied", remarks=(str(error),)))
             continue
         answers.append(_answer(sought, searched, judged, present.deficiency))
-    return Reach(
-        experiment.label, experiment.title, goal, judged, present.deficiency, tuple(answers)
-    )
+    limit = ""
+    if not judged.is_met and any(answer.status in ("none", "limited") for answer in answers):
+        limit = _limit(experiment, root, searched, judged, present.deficiency)
+    qualified = predict(searched.built(root)).qualifications
+    first = experiment.label, experiment.title, goal, judged, present.deficiency
+    return Reach(*first, tuple(answers), limit, qualified)
+
+
+def _limit(
+    experiment: Experiment, root: Node, searched: _Searched, present: Judgement, deficiency: int
+) -> str:
+    """Return which source of uncertainty limits a design most, as text: the one whose least value
+    alone comes nearest to the goal; empty if none comes nearer than now.
+    """
+    nearest, words = present.distance, ""
+    for name in SOURCES:
+        with suppress(NotVariableError):
+            source = unknown(name, experiment, root, None, None)
+            trials = _Trials(source, searched)
+            found = trials.at(_best(trials, deficiency)).judgement
+            if found is not None and found.distance < nearest * (1.0 - 1e-6):
+                nearest = found.distance
+                meets = "would meet the goal" if found.is_met else "would give"
+                words = (
+                    f"limited most by: {source.title}, {source.present}; as good as none"
+                    f" {meets}: {found.words}"
+                )
+    return words
 
 
 @dataclass(frozen=True)
@@ -145,9 +180,9 @@ class _Trials:
         """Return the value nearest to the goal among those for which the file is valid."""
         return steps[int(comparable([self.judgement(step).distance for step in steps]).argmin())]
 
-    def verified(self, step: int) -> Judgement:
-        """A value judged by a prediction of its own."""
-        return judge(self.searched.goal, predict(self.searched.built(self.one.tree(step))))
+    def verified(self, step: int) -> Prediction:
+        """The prediction with a value."""
+        return predict(self.searched.built(self.one.tree(step)))
 
     def is_right(self, step: int) -> bool:
         """True if the file is valid with a value; quicker than the result."""
@@ -177,13 +212,15 @@ def _without_value(
     )
 
 
-def _told(
-    trials: _Trials, status: Literal["found", "any", "none"], step: int, remarks: list[str]
-) -> Answer:
-    searched, verified = trials.one, trials.verified(step)
-    assert verified.is_met is (status != "none")
+def _told(trials: _Trials, status: Status, step: int, remarks: list[str]) -> Answer:
+    searched, prediction = trials.one, trials.verified(step)
+    verified = judge(trials.searched.goal, prediction)
+    assert verified.is_met is (status in ("found", "any"))
+    if searched.name == "balls" and verified.is_met and prediction.assumptions is not None:
+        remarks += filter(None, [prediction.assumptions.words_of("model")])
     needed = searched.words(step), searched.value(step), verified.words, "", tuple(remarks)
-    return Answer(searched.name, searched.title, status, searched.present, searched.grows, *needed)
+    first = searched.name, searched.title, status, searched.present, searched.grows
+    return Answer(*first, *needed, prediction.qualifications)
 
 
 def _found(trials: _Trials, met: int, failed: int, remarks: list[str]) -> Answer:
@@ -219,16 +256,18 @@ def _monotone(trials: _Trials, deficiency: int) -> Answer:
         remarks.append(
             f"more than {searched.words(best)} are not possible: {trials.at(best + 1).refusal}"
         )
-    # Where an extreme drowns everything else in rounding, it tells nothing.
-    while (
-        not searched.grows
-        and trials.at(best).deficiency > deficiency
-        and best + PER_DECADE < searched.last
-    ):
-        best += PER_DECADE
+    best = best if searched.grows else _best(trials, deficiency)
     if not trials.at(best).is_met:
-        return _told(trials, "none", best, remarks)
+        return _told(trials, "limited" if remarks else "none", best, remarks)
     return _found(trials, best, worst, [])
+
+
+def _best(trials: _Trials, deficiency: int) -> int:
+    """Return the least uncertainty that does not drown everything else in rounding."""
+    best = trials.one.first
+    while trials.at(best).deficiency > deficiency and best + PER_DECADE < trials.one.last:
+        best += PER_DECADE
+    return best
 
 
 def _border(trials: _Trials, right: int, wrong: int) -> int:
@@ -263,10 +302,16 @@ def _scanned(trials: _Trials) -> Answer:
             f" {refused[0].refusal}"
         )
     if searched.name == "size" and not any(trials.at(step).is_met for step in usable):
-        # What just does may lie beside the best of them.
-        best = probes.index(trials.nearest(usable))
-        ends = probes[max(best - 1, 0)], probes[min(best + 1, len(probes) - 1)]
-        probes = sorted({*probes, *(int(step) for step in np.linspace(*ends, REFINED).round())})
+        # What just does may lie beside any value that is better than both its neighbours.
+        more = set(probes)
+        distances = comparable([trials.judgement(step).distance for step in usable])
+        around = np.pad(distances, 1, constant_values=np.inf)
+        peaks = np.flatnonzero((distances <= around[:-2]) & (distances <= around[2:]))
+        order = peaks[np.argsort(distances[peaks], kind="stable")]
+        for best in (probes.index(usable[k]) for k in order[:BEST]):
+            ends = probes[max(best - 1, 0)], probes[min(best + 1, len(probes) - 1)]
+            more |= {int(step) for step in np.linspace(*ends, REFINED).round()}
+        probes = sorted(more)
         usable = [step for step in probes if not trials.at(step).refusal]
     good = _first_met(trials, probes, -1)
     if good < 0:
@@ -279,7 +324,8 @@ def _scanned(trials: _Trials) -> Answer:
                 f" {searched.words(usable[-1])}"
             )
             return _without_value(searched, "undetermined", reason)
-        return _told(trials, "none", best, remarks)
+        is_limited = searched.name == "size" and best == usable[-1] < searched.last
+        return _told(trials, "limited" if is_limited else "none", best, remarks)
     if searched.name == "size":
         again = next(
             (trials.at(step) for step in probes[good:] if not trials.at(step).is_met), None

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from contextlib import suppress
+from dataclasses import dataclass, replace
 from decimal import Decimal
 from fractions import Fraction
 from itertools import chain, product
-from typing import Literal
+from typing import Literal, get_args
 
 from ballplate.simulator.experiment import Experiment, node_at, override
 from ballplate.simulator.geometry import GridSettings, SquareSettings
@@ -28,11 +29,17 @@ from ballplate.simulator.inputs import (
     plain_unit,
     typed_length,
 )
+from ballplate.uncertainty import exact_offsets
 
 from .steps import at_step, exact, round_down, round_up, step_of, times
 
-UnknownName = Literal["repeatability", "certificate", "repeats", "balls", "size"]
-NAMES: tuple[UnknownName, ...] = ("repeatability", "certificate", "repeats", "balls", "size")
+UnknownName = Literal[
+    "repeatability", "certificate", "tips", "thermometers", "repeats", "balls", "size", "hours"
+]
+# Those that are tried by default: plans of many hours take long.
+NAMES: tuple[UnknownName, ...] = get_args(UnknownName)[:-1]
+# Those that limit all others, where they are uncertain.
+SOURCES = NAMES[:4]
 
 # Ratio to the present value at which a repeatability or certificate counts as exact, or as of no
 # use.
@@ -97,6 +104,10 @@ def unknown(
         raise NotVariableError(f"there is no calibration[{calibration}]; {indices_text}")
     if name == "repeatability":
         return _scaled(name, "machine's repeatability", root, ["machine.repeatability"])
+    if name == "tips":
+        return _tips(experiment, root)
+    if name == "thermometers":
+        return _thermometers(root)
     if name == "certificate":
         chosen = [
             k
@@ -141,6 +152,48 @@ def _certificate(root: Node, items: list[str]) -> Unknown:
     if skipped:
         title += f" (without {listing(skipped)}, which states no standard_uncertainty to multiply)"
     return _scaled("certificate", title, root, lengths + rows_skipped)
+
+
+def _tips(experiment: Experiment, root: Node) -> Unknown:
+    """Return the stated uncertainties of tips, or one of all exact offsets but the first.
+
+    :raises NotVariableError: there is a single tip, or all are estimated without a statement.
+    """
+    certified = [probe.name for probe, *_ in experiment.certified_offsets]
+    exact_names = () if certified else exact_offsets(experiment)
+    for name in exact_names:
+        node = node_at(root, f"probes[{name}]")
+        if not isinstance(node, Mapping):
+            entry = Mapping(root.mark, {"offset": node or root}, {"offset": root.mark})
+            root = override(root, f"probes[{name}]", entry, root.mark)
+        path = f"probes[{name}].standard_uncertainty"
+        root = override(root, path, Scalar(root.mark, "1 um"), root.mark)
+    if not certified and not exact_names:
+        raise NotVariableError("the file states no second tip whose offset may be uncertain")
+    paths = [f"probes[{name}].standard_uncertainty" for name in certified or exact_names]
+    found = _scaled("tips", "standard uncertainty of tips", root, paths)
+    return replace(found, present="exact") if exact_names else found
+
+
+def _thermometers(root: Node) -> Unknown:
+    """Return the stated uncertainties of temperatures by one factor.
+
+    :raises NotVariableError: none is stated.
+    """
+    influences, paths = child(root, "influences"), []
+    for k in range(len(influences.items) if isinstance(influences, Sequence) else 0):
+        for place in ("artefact_temperature", "scale_temperature"):
+            for key in ("standard_uncertainty", "sensor_uncertainty"):
+                path = f"influences[{k}].{place}.{key}"
+                with suppress(QuantityError, ValueError):
+                    if (node := node_at(root, path)) is not None and _leaves(node):
+                        paths.append(path)
+    if not paths:
+        raise NotVariableError(
+            "the file states no uncertainty of temperatures; ballplate run --assumptions prints"
+            " such an influence"
+        )
+    return _scaled("thermometers", "standard uncertainty of temperatures", root, paths)
 
 
 @dataclass(frozen=True)

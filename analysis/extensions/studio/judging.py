@@ -11,7 +11,7 @@ from typing import Any
 
 from ballplate.extensions.repair.yamltext import TextChange
 from ballplate.presentation import Data
-from ballplate.results import check, predict, scale_lines, scale_warnings
+from ballplate.results import check, predict, scale_lines
 from ballplate.simulator.computing import Report, single_threaded, unreported
 from ballplate.simulator.estimation import Linearisation, linearise
 from ballplate.simulator.experiment import Experiment, lay_out
@@ -113,11 +113,13 @@ def _support(document: DesignDocument, arguments: Arguments, report: Report) -> 
     """Return the source of scale as `lines` of text, and `assumptions`, None without U6; the design
     is evaluated again for each row.
     """
-    prediction = predict(evaluable_of(document), with_scale=True)
-    scale, assumptions = prediction.scale, prediction.assumptions
+    prediction = predict(evaluable_of(document))
+    assumptions, qualified = prediction.assumptions, prediction.qualifications
+    texts = [each.text for each in qualified if each.kind != "assumption"]
+    assumed = "; ".join(each.text for each in qualified if each.kind == "assumption")
     return {
-        "lines": [*scale_lines(scale), *scale_warnings(scale)],
-        "assumptions": assumptions and {**assumptions.to_dict(), "warning": assumptions.warning},
+        "lines": [*scale_lines(prediction.scale), *texts],
+        "assumptions": assumptions and {**assumptions.to_dict(), "warning": assumed},
     }
 
 

@@ -15,7 +15,7 @@ from ballplate.extensions.repair.repair_search import Repair, repairs
 from ballplate.extensions.repair.repair_tables import caveat, changes_in_words
 from ballplate.extensions.repair.written import Edit, position_settings
 from ballplate.presentation import Data, picked
-from ballplate.results import planned_uncertainty
+from ballplate.results import given_words, planned_uncertainty, predict
 from ballplate.simulator.computing import Report, counted, unreported
 from ballplate.simulator.experiment import Experiment, Position
 from ballplate.simulator.inputs import ExperimentError
@@ -99,8 +99,9 @@ def next_positions(
         settings = position_settings(experiment, change.adds)
         added = done(document, {"do": "add", "settings": settings})
         after = evaluable_of(added, planning=True)
+        given = given_words(predict(change.apply(experiment)).qualifications)
         row = {
-            "words": change.words.partition(" again ")[2] or change.words,
+            "words": (change.words.partition(" again ")[2] or change.words) + given,
             "deficiency": order[0],
             **picked(lengths, "average", "maximum"),
             "minutes": 60.0 * (hours_of(after)["hours"] - before),

@@ -30,6 +30,7 @@ METHODS = {
         "data sets of Monte Carlo that are hard to estimate, the standard errors of biases, and"
         " scales with several expansions whose temperature one sensor measures"
     ),
+    4: "averages of what is undetermined in part, and what figures take for granted",
 }
 METHOD = max(METHODS)
 

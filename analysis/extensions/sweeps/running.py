@@ -97,7 +97,8 @@ class SweepResult(Result):
         names = list(self.table.columns)
         averages = [name for name in names if AVERAGE.fullmatch(name)]
         axes = names[: names.index("status") + 1]
-        shown = [*axes, *(name for name in ("rank_deficiency",) if name in names), *averages]
+        rank = [name for name in ("rank_deficiency",) if name in names]
+        shown = [*axes, *rank, *averages, "given"]
         table = self.table[shown].to_string(index=False).splitlines()
         return [self.heading, self.headline(), *self.remarks, "", *table]
 

@@ -214,6 +214,7 @@ def plan_figures(
             for symbol, quantity in planned.quantities.items()
             if quantity.largest
         },
+        "given": [each.given for each in planned.qualifications],
     }
     return figures, details
 

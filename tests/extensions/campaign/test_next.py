@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -20,6 +21,7 @@ from ballplate.extensions.campaign.next_position import (
 from ballplate.extensions.campaign.next_result import NextStep
 from ballplate.extensions.campaign.watching_command import settled
 from ballplate.extensions.requirements.goals import GoalError, parse_goal
+from ballplate.results import given_words
 from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.inputs.yamltree import GivenText
@@ -80,7 +82,9 @@ def test_what_was_promised_is_reached(readings: pandas.DataFrame) -> None:
     assert after.fit is not None
     reached = after.fit.quantities["U6"].average / after.fit.sigma
     assert before.next.average == pytest.approx(reached, rel=0.01)
-    assert after.lines()[0].endswith("target met: stop")
+    # The qualifications are those of the six positions as a design.
+    verdict = f"target met{given_words(bp.check(bp.quickstart()).qualifications)}: stop"
+    assert after.lines()[0].endswith(verdict)
 
 
 def test_scatter_above_what_is_stated_counts(readings: pandas.DataFrame) -> None:
@@ -256,7 +260,8 @@ def test_the_command_begins_with_the_verdict(
     readings.to_csv(table, index=False)
     assert main(["next", QUICKSTART, str(table)]) == 0
     out = capsys.readouterr().out
-    assert out.partition("\n")[0] == "6 positions read, last y high; target met: stop"
+    given = given_words(bp.check(bp.quickstart()).qualifications)
+    assert out.partition("\n")[0] == f"6 positions read, last y high; target met{given}: stop"
     assert max(map(len, out.splitlines())) < 120
     assert main(["next", QUICKSTART, str(table), "--target", "0.01 um", "--json"]) == 1
     told = json.loads(capsys.readouterr().out)
@@ -335,7 +340,7 @@ def test_a_folder_is_watched_until_the_target_is_met(
     lines = told.out.splitlines()
     answers = [line for line in lines if " positions read, last " in line]
     assert answers[0].startswith(wording.POSITIONS_READ_LAST_LOW)
-    assert len(answers) >= 2 and answers[-1].endswith("target met: stop")
+    assert len(answers) >= 2 and re.search("target met, given .*: stop$", answers[-1])
     assert "wrong.csv" in told.err and set(waits) == {0.5}
 
 

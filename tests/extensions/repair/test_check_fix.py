@@ -69,6 +69,7 @@ def test_deficient_variants_are_mended_and_the_others_left(
     notes = [line for line in err.splitlines() if line.startswith(str(path))]
     assert [line.split(": ")[1:3] for line in notes] == [
         ["6.1.1[A]", "nothing to repair"],
+        ["6.1.1[B]", wording.NOT_WRITTEN],
         ["6.1.1[B]", "repaired"],
         ["6.1.1[C]", "nothing to repair"],
         ["6.1.1[D]", "repaired"],
@@ -212,6 +213,23 @@ def test_a_file_that_changes_meanwhile_is_left(
     assert run("check", "--fix", path) == 3
     assert wording.THE_FILE_HAS_CHANGED_MEANWHILE in capsys.readouterr().err
     assert path.read_text(encoding="utf-8") == "title: other\n"
+
+
+@pytest.mark.parametrize(("file", "variant"), [("hurt_foss/bar-bell", "length unknown")])
+def test_nothing_is_invented(
+    file: str, variant: str, folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A certificate that the file does not state is printed, and never written."""
+    path = folder / "invented.yaml"
+    copy_file(Path(__file__).parents[3] / f"designs/{file}.yaml", path)
+    before = path.read_bytes()
+    assert run("check", "--fix", path, "--variant", variant) in (0, 1)
+    out, err = capsys.readouterr()
+    assert path.read_bytes() == before
+    assert wording.NOT_WRITTEN in err and "repaired" not in err
+    assert "in the file: add to calibration" in out
+    with pytest.raises(bp.ExperimentError, match="does not state"):
+        bp.repair(path, variant=variant)
 
 
 def test_a_weak_design_is_mended_where_weak_ones_fail(

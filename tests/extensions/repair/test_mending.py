@@ -10,7 +10,7 @@ from random import Random
 from typing import Any
 
 import pytest
-from ballplate.extensions.repair.mending import mended, to_write
+from ballplate.extensions.repair.mending import mended
 from ballplate.extensions.repair.repair_search import Repair, repairs
 from ballplate.results.checked_designs import check
 from ballplate.simulator.experiment.loading import load
@@ -49,9 +49,9 @@ def experiment(text: str, variant: str | None = None) -> Experiment:
 
 def first_repair(text: str, variant: str | None = None) -> Repair:
     chosen = experiment(text, variant)
-    found = to_write(repairs(chosen), check(chosen).verdict)
-    assert found is not None
-    return found
+    found = repairs(chosen)
+    assert found is not None and found.complete
+    return found.complete[0]
 
 
 def text_of(said: dict[str, Any], seed: int = 0, comments: bool = False) -> str:

@@ -16,7 +16,7 @@ import yaml
 from ballplate.extensions.repair import repair_search
 from ballplate.extensions.repair.changes import Change, ChangeKind, apply_all
 from ballplate.extensions.repair.judging import examine, judge
-from ballplate.extensions.repair.mending import mended, to_write
+from ballplate.extensions.repair.mending import invents, mended, to_write
 from ballplate.extensions.repair.offers import offers
 from ballplate.extensions.repair.repair_search import Repair, Repairs, repairs
 from ballplate.extensions.repair.repair_tables import repair_lines
@@ -148,8 +148,13 @@ def test_the_first_repair_is_written_into_the_shipped_file(
     """Nothing of the file is another than before but the one variant, read by PyYAML alone."""
     source = Path(f"designs/{file}.yaml")
     text = source.read_text(encoding="utf-8")
-    repair = to_write(repaired(file, variant), check(design(file, variant)).verdict)
-    assert repair is not None
+    found_repairs = repaired(file, variant)
+    repair = to_write(found_repairs, check(design(file, variant)).verdict)
+    if repair is None:
+        # Only certificates are left, which --fix prints and the studio writes.
+        assert found_repairs is not None
+        repair = found_repairs.complete[0]
+        assert invents(repair)
     new = mended(text, source, variant, repair)
     before, after = yaml.safe_load(text), yaml.safe_load(new)
     assert after["variants"].pop(variant)["expected_rank_deficiency"] == 0

@@ -26,10 +26,11 @@ REPAIR_IN_THE_FILE_POSITIONS = (
 REPAIR_TURN_POSITION_BY_ONE_QUARTER = (
     'repair 1: turn position "z low" by one quarter-turn; and calibrate the dist'
 )
-SCALE_RESTS_ON_PROBE_OFFSETS = "scale rests on probe offsets"
+SCALE_RESTS_ON_PROBE_OFFSETS = "exact probe offsets as scale"
 SMALLEST_SINGULAR_VALUE = "smallest singular value 0.0"
 THE_EXISTING_FILE_IS_UNCHANGED = "the existing file is unchanged"
 THE_FILE_EXPECTS = "the file expects that"
 THE_FILE_HAS_CHANGED_MEANWHILE = "the file has changed meanwhile and is not overwritten"
 THE_SCALE_RESTS_ON_PROBE_2 = "warning: the scale rests on probe offsets"
 THE_SCALE_RESTS_ON_PROBE_OFFSETS = "the scale rests on probe offsets"
+NOT_WRITTEN = "not written, a certificate or a probe that the file does not state"

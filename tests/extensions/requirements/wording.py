@@ -5,3 +5,4 @@ REPEATS_OF_EVERY_READING = "repeats of every reading"
 THE_FILE_HAS_NO_TASKS = "the file has no tasks"
 THE_FILE_IS_INVALID = "the file is invalid with 2 x 2, 3 x 2"
 UNKNOWN_ARTEFACT_DID_YOU_MEAN = 'unknown artefact "plat"; did you mean "plate"?'
+LIMITED_BY_TEMPERATURES = "limited most by: standard uncertainty of temperatures"

@@ -175,11 +175,12 @@ def test_figures_are_those_of_run(client, design):
         shown = ", ".join(f"{round(1e3 * value, 1) + 0.0:.9g}" for value in found["worst"][end])
         assert f"({shown}) mm" in place
     later = client.get("/api/later").json()
-    prediction = predict(experiment, with_scale=True)
+    prediction = predict(experiment)
     assert later["fingerprint"] == answer.json()["fingerprint"]
     assert later["lines"] and all(line in prediction.lines() for line in later["lines"])
     assumptions = prediction.assumptions
-    assert later["assumptions"]["warning"] == assumptions.warning != ""
+    warning = "; ".join(text for _, text in assumptions.doubling)
+    assert later["assumptions"]["warning"] == warning != ""
     assert later["assumptions"]["assumptions"] == assumptions.to_dict()["assumptions"]
 
 

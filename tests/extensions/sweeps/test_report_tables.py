@@ -38,7 +38,7 @@ def figures(size: float, is_open: bool = False) -> dict[str, float]:
         "U4_average_m": NAN if is_open else 1.005e-7 * size,
         "U4_undetermined": 600.0 * is_open,
         "U4_within_target": 0.756,
-        "U4_actual_average_m": 1.01e-7 * size,
+        "U4_actual_average_m": NAN if is_open else 1.01e-7 * size,
         "U4_spread_ratio": 0.987,
         "U4_spread_ratio_standard_error": 0.012,
         "U4_actual_ratio": 0.99,
@@ -113,8 +113,8 @@ def test_many_cells_are_rows_and_end_with_a_sentence(tmp_path: Path) -> None:
 
 
 def test_what_one_distance_stands_for_is_no_ordinary_value(tmp_path: Path) -> None:
-    """Of the cell in the middle 600 values are but one undetermined: it is neither shaded, drawn
-    nor told unmarked.
+    """Of the cell in the middle 600 values are but one undetermined: its average is none, and
+    neither shown, shaded nor drawn.
     """
     axes = [
         axis("size", ["1 mm", "2 mm", "3 mm"], [1e-3, 2e-3, 3e-3], "m"),
@@ -123,19 +123,21 @@ def test_what_one_distance_stands_for_is_no_ordinary_value(tmp_path: Path) -> No
     rows = []
     for cell in range(6):
         is_partial = cell == 2
-        some = figures(0.001 if is_partial else 1.0 + cell)
+        some = figures(1.0 + cell, is_partial)
         some |= {"rank_deficiency": 3.0, "U4_undetermined": 599.0} if is_partial else {}
         rows.append(done(cell, some))
     results = read_results(made_up(tmp_path / "partial.sqlite", "partial", axes, rows), 1)
-    marked = {
+    unknown = {
         (entry.cell, entry.figure)
         for table in report_tables(results)
         for block in table.blocks
         for row in block.rows
         for entry in row.entries
-        if entry.text.endswith("*")
+        if entry.text == "-"
     }
-    assert marked == {(2, name) for name in ("U4_maximum_m", "U4_average_m", "U4_actual_average_m")}
+    assert unknown == {
+        (2, name) for name in ("U4_maximum_m", "U4_average_m", "U4_actual_average_m")
+    }
     (heat,) = heat_maps(results)
     assert [[entry.text.endswith("*") for entry in row] for row in heat.entries] == [
         [False, False], [True, False], [False, False]

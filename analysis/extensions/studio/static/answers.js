@@ -33,14 +33,13 @@ function answered(design, of_rest, is_old) {
   if (!lengths) return figure("", "–", "no evaluation points: no lengths are judged");
   const { average, maximum, count, undetermined } = lengths;
   const before = lengths_of(page.state.kept);
-  const others = undetermined ? " of the others" : "";
   const [part, whole] = [undetermined, count].map((one) => one.toLocaleString("en"));
   return [
     undetermined ? figure("bad", "Undetermined", undetermined === count
       ? "All distances are undetermined." : `${part} of ${whole} distances are undetermined.`) : [],
-    undetermined === count ? [] : [
-      figure("", `${micro(average)} µm`, `U6${others} on average`, was(micro(before?.average))),
-      figure("", `${micro(maximum)} µm`, `U6${others} at most`, was(micro(before?.maximum)))],
+    undetermined ? [] : [
+      figure("", `${micro(average)} µm`, "U6 on average", was(micro(before?.average))),
+      figure("", `${micro(maximum)} µm`, "U6 at most", was(micro(before?.maximum)))],
     target(design, before, of_rest, is_old),
   ];
 }

@@ -15,7 +15,7 @@ from ballplate.simulator.machines import Array, Integers
 
 from .axis_worth import AxisWorth, axis_worths
 from .measures import column_unit
-from .results import ReportedSweep, best_first, criterion, partly_open
+from .results import ReportedSweep, best_first, criterion, given_sentences
 
 # Settings in the answer's table.
 LISTED = 8
@@ -44,9 +44,9 @@ def answer(results: ReportedSweep) -> SweepAnswer | None:
     done = np.flatnonzero(results.done)
     if judged is None or not len(done):
         return None
-    column, symbol = judged
+    column = judged[0]
     value, observations = results.figure(column)[done], results.figure("observations")[done]
-    partly = partly_open(results, symbol)[done] | ~np.isfinite(value)
+    partly = ~np.isfinite(value)
     share = results.figure(WITHIN)[done]
     meets = share == 1.0
     if np.isfinite(share).any():
@@ -57,11 +57,12 @@ def answer(results: ReportedSweep) -> SweepAnswer | None:
     else:
         sentences = _sentences_without_target(results, done, column, value, partly)
         order = best_first(partly, value)
+    sentences[1:1] = given_sentences(results)
     sentences += _sentences_on_others(results, done)
     return SweepAnswer(
         _symbol(column),
         tuple(sentences),
-        _table(results, done[order[:LISTED]], column, symbol),
+        _table(results, done[order[:LISTED]], column),
         tuple(axis_worths(results, column, done[~partly])),
         bool(meets.any()) or not np.isfinite(share).any(),
     )
@@ -202,7 +203,7 @@ def _quantity(results: ReportedSweep, column: str, value: float) -> str:
     return f"{_symbol(column)}, {number(1e6 * value, 3)} {column_unit(column)}"
 
 
-def _table(results: ReportedSweep, rows: Integers, column: str, symbol: str) -> Table:
+def _table(results: ReportedSweep, rows: Integers, column: str) -> Table:
     of_largest = column.replace("_average_", "_maximum_")
     unit, words = column_unit(column), _symbol(column)
     columns = [("observations", "observations", 1.0), (f"{words} average, {unit}", column, 1e6)]
@@ -210,13 +211,12 @@ def _table(results: ReportedSweep, rows: Integers, column: str, symbol: str) -> 
         columns.append((f"{words} maximum, {unit}", of_largest, 1e6))
     if WITHIN in results.frame:
         columns.append(("lengths within target", WITHIN, 100.0))
-    starred = partly_open(results, symbol)
     listed = []
     for row in rows.tolist():
         entries = []
         for _, name, factor in columns:
             value = results.value(name, row)
-            text = number(factor * value, 4) + ("*" if starred[row] and factor == 1e6 else "")
+            text = number(factor * value, 4)
             if name == WITHIN:
                 text = "-" if np.isnan(value) else percent(value)
             if name == "observations":
@@ -225,9 +225,8 @@ def _table(results: ReportedSweep, rows: Integers, column: str, symbol: str) -> 
         listed.append(Row(results.labels(row), tuple(entries)))
     headings = tuple(axis.name for axis in results.axes)
     names = tuple(name for name, _, _ in columns)
-    notes = ["Observations are readings and certified values; other costs are not included."]
-    if starred[rows].any():
-        notes.append("Values marked * exclude undetermined ones.")
+    costs = "Observations are readings and certified values; other costs are not included."
+    notes = (*given_sentences(results), costs)
     caption = "The best cases"
     blocks = (Block("", tuple(listed)),)
-    return Table("answer", caption, headings, names, blocks, notes=tuple(notes))
+    return Table("answer", caption, headings, names, blocks, notes=notes)

@@ -10,15 +10,16 @@ from ballplate.presentation import Entry, number
 from ballplate.simulator.machines import Array, Integers
 
 from .measures import Measure, uncertainty_measures
-from .results import ReportAxis, ReportedSweep, criterion, partly_open, ranked
+from .results import ReportAxis, ReportedSweep, criterion, ranked
 from .series import evenly
-from .tables import DIGITS, NOT_DONE, STAR
+from .tables import DIGITS, NOT_DONE
 
 # Limits: values of an axis, distinguishable shades, pairs of axes.
 MOST_VALUES, SHADES, MOST_PAIRS = 12, 8, 10
 
 # Instead of a shade: something is undetermined; no value.
 DEFICIENT, BLANK = -2, -1
+STAR = "*"
 
 
 @dataclass(frozen=True)
@@ -69,7 +70,7 @@ def _heat(results: ReportedSweep, i: int, j: int, measure: Measure, best: int) -
     grid = [[(a, b) for b in column_values] for a in row_values]
     if sum(place in places for line in grid for place in line) < 4:
         return None
-    open_ = partly_open(results, measure.symbol) | (results.figure("rank_deficiency") > 0)
+    open_ = np.isnan(results.figure(measure.figure)) | (results.figure("rank_deficiency") > 0)
     values = np.full((len(row_values), len(column_values)), np.nan)
     is_open = np.zeros(values.shape, bool)
     entries = []

@@ -18,7 +18,6 @@ from numpy.typing import NDArray
 
 from ..frame import frame_of
 from ..store import Store, chosen_sweep, results
-from ..store_columns import MORE, symbol_column
 from ..stored import StoredResults as Found
 
 if TYPE_CHECKING:
@@ -166,9 +165,17 @@ def _axis(stored: dict[str, Any]) -> ReportAxis:
     return ReportAxis(in_one_line(stored["name"]), stored["column"], labels, numbers, unit)
 
 
-def partly_open(results: ReportedSweep, symbol: str) -> Flags:
-    """Return the rows of the frame (rows,) in which some values of a quantity are undetermined."""
-    return results.figure(f"{symbol_column(symbol.rstrip(MORE))}_undetermined") > 0
+def given_sentences(results: ReportedSweep) -> list[str]:
+    """Return a sentence on each condition that figures of finished cells take for granted."""
+    cells_of: dict[str, list[int]] = {}
+    done = [results.cell(row) for row in np.flatnonzero(results.done).tolist()]
+    for cell in done:
+        for given in results.texts.get(cell, {}).get("given", ()):
+            cells_of.setdefault(str(given), []).append(cell)
+    return [
+        f"Given {given}: {'all cases' if len(cells) == len(done) else f'cases {cell_list(cells)}'}."
+        for given, cells in cells_of.items()
+    ]
 
 
 def criterion(results: ReportedSweep) -> tuple[str, str] | None:

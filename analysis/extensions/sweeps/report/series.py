@@ -11,7 +11,7 @@ from ballplate.simulator.machines import Array, Integers
 
 from ..store_columns import symbol_column
 from .measures import Measure, uncertainty_measures
-from .results import ReportAxis, ReportedSweep, criterion, partly_open, ranked
+from .results import ReportAxis, ReportedSweep, criterion, ranked
 
 # Limits: distinguishable lines, values along an axis, pictures of one quantity for settings of
 # further axes, cells drawn as points.
@@ -162,15 +162,14 @@ def _picture(
 def _plot(results: ReportedSweep, k: int, picture: _Picture, measure: Measure) -> Plot:
     axis = results.axes[k]
     x = np.array(axis.numbers)[results.chosen[:, k]]
-    left_out = partly_open(results, measure.symbol)
-    values = np.where(left_out, np.nan, measure.factor * results.figure(measure.figure))
+    values = measure.factor * results.figure(measure.figure)
     actual, error = _actual(results, measure)
     lines = tuple(
         SeriesLine(label, x[rows], values[rows], actual[rows], error[rows])
         for label, rows in picture.lines
     )
     note = picture.note
-    if any(left_out[rows].any() for _, rows in picture.lines):
+    if any(np.isnan(line.y).any() for line in lines):
         note = f"{note} Cases with undetermined values are left out.".strip()
     return Plot(axis, measure, lines, note, picture.is_scattered)
 

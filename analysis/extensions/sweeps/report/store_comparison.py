@@ -15,7 +15,7 @@ from ballplate.simulator.machines import Array
 from .answer import WITHIN
 from .axis_worth import SAME
 from .measures import column_unit
-from .results import Integers, ReportedSweep, best_first, criterion, partly_open
+from .results import Integers, ReportedSweep, best_first, criterion
 
 # Settings in the table, those that differ most.
 LISTED = 12
@@ -63,9 +63,7 @@ def compared(results: ReportedSweep, reference: ReportedSweep, name: str) -> Sto
     rows = np.array([here[key] for key in common], np.int64)
     rows_there = np.array([there[key] for key in common], np.int64)
     value, before = results.figure(column)[rows], reference.figure(column)[rows_there]
-    # Averages that leave out what is undetermined are not of the same lengths.
-    open_ = partly_open(results, symbol)[rows] | partly_open(reference, symbol)[rows_there]
-    open_ |= ~(np.isfinite(value) & np.isfinite(before))
+    open_ = ~(np.isfinite(value) & np.isfinite(before))
     ratio = np.full(len(rows), np.nan)
     np.divide(value, before, out=ratio, where=~open_ & (value > 0.0) & (before > 0.0))
     if open_.any():

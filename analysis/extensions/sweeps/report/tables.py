@@ -11,14 +11,13 @@ from ballplate.presentation import Block, Entry, Row, Table, number, percent
 from ..store_columns import symbol_column
 from .answer import answer
 from .measures import (
-    STATISTICS,
     Measure,
     descriptions,
     rank_measures,
     trial_measures,
     uncertainty_measures,
 )
-from .results import ReportedSweep, partly_open
+from .results import ReportedSweep, given_sentences
 
 DIGITS = 3
 
@@ -28,18 +27,14 @@ MOST_COLUMNS, MOST_BLOCKS, MOST_ROWS = 12, 12, 200
 NOT_DONE = "left"
 UNREADABLE = "unreadable"
 
-# Mark of values that exclude undetermined ones.
-STAR = "*"
-
 
 def report_tables(results: ReportedSweep) -> tuple[Table, ...]:
     """Return all tables: uncertainties and, if there were trials, Monte Carlo."""
     in_columns = _fits_columns(results)
+    given = tuple(given_sentences(results))
     measures = [*rank_measures(results), *uncertainty_measures(results, in_columns)]
-    open_ = f"Maxima and averages marked {STAR} exclude undetermined values."
-    notes = (open_,) if rank_measures(results) else ()
     tables = (
-        [_table(results, "uncertainties", "Standard uncertainties", measures, in_columns, notes)]
+        [_table(results, "uncertainties", "Standard uncertainties", measures, in_columns, given)]
         if measures
         else []
     )
@@ -52,9 +47,7 @@ def report_tables(results: ReportedSweep) -> tuple[Table, ...]:
             " uncertainty for 95 %. Of more than 1000 distances of U5 and U6, a sample of 1000"
             " gives actual, and spread / U with the U of the sample."
         )
-        tables.append(
-            _table(results, "monte-carlo", caption, of_trials, in_columns, (note, *notes))
-        )
+        tables.append(_table(results, "monte-carlo", caption, of_trials, in_columns, (note,)))
     return tuple(tables)
 
 
@@ -170,15 +163,9 @@ def _entry(results: ReportedSweep, measure: Measure, cell: int, row: int | None)
         text = "-" if math.isnan(value) else percent(value).removesuffix(" %")
     else:
         text = number(measure.factor * value, DIGITS)
-    if (
-        measure.statistic in (*STATISTICS, "actual average")
-        and partly_open(results, measure.symbol)[row]
-        and not math.isnan(value)
-    ):
-        text += STAR
     return Entry(text, value, cell, measure.figure)
 
 
 def _is_open(results: ReportedSweep, measure: Measure, row: int) -> bool:
-    """Return whether a cell leaves all values of a measure undetermined."""
+    """Return whether a cell leaves some values of a measure undetermined."""
     return results.value(f"{symbol_column(measure.symbol)}_undetermined", row) > 0

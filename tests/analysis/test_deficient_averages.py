@@ -1,0 +1,130 @@
+"""A design that determines only some distances has no average of them, in any output."""
+
+from __future__ import annotations
+
+import io
+import math
+from pathlib import Path
+
+import ballplate as bp
+import numpy as np
+import pandas
+import pytest
+import yaml
+from ballplate.cli import main
+from ballplate.extensions.sweeps.report.results import best_and_worst, read_results
+from ballplate.extensions.sweeps.store import open_store
+from ballplate.results import planned_uncertainty
+from ballplate.simulator.estimation import linearise
+from ballplate.simulator.estimation.functions import displacements
+from ballplate.uncertainty import pairs_of
+from ballplate.uncertainty.kernel_quantities import evaluation_points
+
+# The first three points are in a plane that two of the positions determine, the last is not.
+POINTS = [[250, 250, 300], [500, 250, 300], [750, 750, 300], [900, 100, 900]]
+# Positions that are read: three that leave something undetermined, and three that do not.
+PART, WHOLE = (0, 1, 2), (0, 2, 4)
+
+
+def sections(read: tuple[int, ...]) -> dict[str, object]:
+    points = [[f"{x} mm" for x in point] for point in POINTS]
+    off = {f"positions[{k}].enabled": False for k in range(6) if k not in read}
+    return {"evaluation.points": points, "target_uncertainty": "5 um", **off}
+
+
+def design(read: tuple[int, ...]) -> bp.Experiment:
+    return bp.quickstart().with_(sections(read))
+
+
+def test_the_part_would_flatter() -> None:
+    """What is determined has a smaller average than all distances of the complete design."""
+    at = linearise(bp.lay_out(design(PART)))
+    pairs = np.stack(np.triu_indices(len(POINTS), 1), axis=1)
+    tile = pairs_of(displacements(at, evaluation_points(at.design)), pairs)
+    determined = tile.uncertainties[~tile.is_open]
+    assert 0 < len(determined) < len(pairs)
+    assert determined.mean() < bp.run(design(WHOLE))["U6"].average
+
+
+def test_numbers_of_a_deficient_design() -> None:
+    prediction = bp.run(design(PART))
+    for symbol, quantity in prediction.quantities.items():
+        if quantity.undetermined:
+            assert math.isnan(quantity.average) and math.isnan(quantity.maximum), symbol
+            assert not quantity.largest and not quantity.places and quantity.pair is None
+        else:
+            assert quantity.average > 0.0 and quantity.largest
+    lengths = prediction["U6"]
+    assert (lengths.undetermined, lengths.count) == (3, 6)
+    assert planned_uncertainty(design(PART)).quantities["U6"] == lengths
+    assert repr(prediction).endswith("U6 undetermined (3 of 6)>")
+    row = prediction.to_frame().set_index("symbol").loc["U6"]
+    assert math.isnan(row["average"]) and (row["undetermined"], row["count"]) == (3, 6)
+    table = pandas.read_csv(io.StringIO(prediction.to_csv())).set_index("symbol")
+    assert math.isnan(table.loc["U6", "average"]) and table.loc["U6", "undetermined"] == 3
+    data = prediction.to_dict()["quantities"]["U6"]
+    assert data["average"] is None and data["maximum"] is None and data["undetermined"] == 3
+    (line,) = [line for line in prediction.lines() if line.startswith("U6 ")]
+    assert line.split()[-5:] == ["-", "µm", "6", "(3", "undetermined)"]
+    assert prediction.assumptions is None
+
+
+def test_numbers_of_its_check() -> None:
+    checked = bp.check(design(PART))
+    frame = checked.to_frame()
+    assert math.isnan(frame["U6 average, µm"][0]) and frame["U6 undetermined"][0] == 3
+    assert any(line.endswith("; 3 of 6 distances undetermined") for line in checked.lines())
+    assert checked.to_dict()["lengths"]["average"] is None
+
+
+def test_the_smallest_is_that_of_the_complete_design() -> None:
+    designs = {"part": design(PART), "whole": design(WHOLE)}
+    for statistic in ("average", "maximum"):
+        values = {name: getattr(bp.run(one)["U6"], statistic) for name, one in designs.items()}
+        assert pandas.Series(values).idxmin() == "whole"
+        assert not values["part"] < values["whole"]
+
+
+def test_numbers_of_a_sweep(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """The case of the complete design is the best, in the frame, in text and in CSV."""
+    experiment = bp.quickstart().with_({"evaluation.points": sections(())["evaluation.points"]})
+    names = [position.name for position in experiment.positions]
+    always = [names[k] for k in set(PART) & set(WHOLE)]
+    others = [name for k, name in enumerate(names) if k not in (*PART, *WHOLE)]
+    written = yaml.safe_load(Path("designs/quickstart.yaml").read_text(encoding="utf-8"))
+    written["positions"] = [one for one in written["positions"] if one["name"] not in others]
+    written["evaluation"]["points"] = sections(())["evaluation.points"]
+    (tmp_path / "base.yaml").write_text(yaml.safe_dump(written), encoding="utf-8")
+    subsets = {"sizes": [3], "always": always}
+    settings = {
+        "title": "two designs",
+        "base": "base.yaml",
+        "axes": {"read": {"path": "positions", "subsets": subsets}},
+        "record": ["U6"],
+    }
+    path = tmp_path / "sweep.yaml"
+    path.write_text(yaml.safe_dump(settings), encoding="utf-8")
+    assert main(["sweep", str(path), "--workers", "1", "-q"]) == 0
+    capsys.readouterr()
+    store = str(path.with_suffix(".sqlite"))
+    frame = bp.stored(store).to_frame()
+    assert len(frame) == 2
+    is_part = frame["U6_undetermined"] > 0
+    assert is_part.sum() == 1 and (frame["U6_count"] == 6).all()
+    assert (frame["U6_average_m"].isna() == is_part).all()
+    assert (frame["U6_maximum_m"].isna() == is_part).all()
+    assert not is_part[frame["U6_average_m"].idxmin()]
+    opened = open_store(Path(store))
+    best = best_and_worst(read_results(opened, 1))[0]
+    opened.close()
+    assert not is_part[frame["cell"] == best].any()
+    assert main(["sweep", "--report", store, "--format", "csv", "-o", "-"]) == 0
+    rows = [line.split(",")[2:] for line in capsys.readouterr().out.splitlines()]
+    assert rows[1] == (["5", "0"] if is_part[0] else ["0", "5"])
+    for row in rows[2:4]:
+        assert [cell == "-" for cell in row] == is_part.tolist()
+
+
+def test_reach_of_a_deficient_design() -> None:
+    found = bp.reach(design(PART), "U6 average 5 um", ["repeatability"])
+    assert not found.present.is_met and found.present.undetermined == 3

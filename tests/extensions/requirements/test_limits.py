@@ -1,0 +1,174 @@
+"""What limits a design, and the unknowns tips, temperatures and hours."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import ballplate as bp
+import numpy as np
+import pytest
+from ballplate.extensions.requirements.answers import Answer
+from ballplate.extensions.requirements.goals import Judgement, judge, parse_goal
+from ballplate.extensions.requirements.root_search import (
+    Tried,
+    _scanned,
+    _Searched,
+    _Trials,
+    reach,
+)
+from ballplate.extensions.requirements.unknowns import NotVariableError, unknown
+from ballplate.results.checked_designs import predict
+from ballplate.simulator.experiment.loading import load
+
+from tests.extensions.requirements import wording
+from tests.planning.small_pool import TEXT
+from tests.reference.small_quickstart import small_quickstart
+
+STEEL = {"value": "11.5 um/m/K", "standard_uncertainty": "0 um/m/K"}
+
+
+def warm(u: str = "0.1 K") -> bp.Experiment:
+    measured = {"value": "20 degC", "standard_uncertainty": u, "sensor_uncertainty": u}
+    influence = {"kind": "temperature", "artefact_expansion": STEEL, "scale_expansion": STEEL}
+    influence |= {"artefact_temperature": measured, "scale_temperature": measured}
+    return small_quickstart(influences=[influence], **FEW)
+
+
+FEW: dict[str, Any] = {"evaluation": {"points": {"random": 12, "seed": 1}, "probe": "down"}}
+
+
+def average(experiment: bp.Experiment) -> float:
+    return predict(experiment).quantities["U6"].average
+
+
+def answered(experiment: bp.Experiment, limit: float, name: str) -> tuple[Answer, str]:
+    found = reach(experiment, parse_goal(f"U6 average {1e6 * limit:.12g} um"), (name,))  # type: ignore[arg-type]
+    return found.answers[0], found.limit
+
+
+def test_temperatures_are_named_where_they_limit() -> None:
+    """The goal is met with thermometers of a third of the uncertainty, and by nothing else."""
+    limit = 1.0005 * average(warm("0.03 K"))
+    for name in ("repeatability", "certificate", "tips", "repeats"):
+        found, limited = answered(warm(), limit, name)
+        assert found.status in ("none", "limited"), name
+        assert wording.LIMITED_BY_TEMPERATURES in limited and "would meet the goal" in limited
+    found, limited = answered(warm(), limit, "thermometers")
+    assert found.status == "found" and limited == ""
+    assert found.value == pytest.approx(0.03, rel=0.01)
+    assert average(warm(found.words)) <= limit
+    assert average(warm(f"{found.value + 1e-4:.4f} K")) > limit
+
+
+def test_nothing_is_named_where_the_goal_is_met() -> None:
+    _, limited = answered(warm(), 1.0, "repeatability")
+    assert limited == ""
+
+
+def test_tips_are_as_uncertain_as_the_goal_permits() -> None:
+    def with_tips(u: float) -> bp.Experiment:
+        experiment = small_quickstart(**FEW)
+        stated = np.full(3, u)
+        probes = {
+            name: probe if name == "down" else replace(probe, standard_uncertainty=stated)
+            for name, probe in experiment.probes.items()
+        }
+        return replace(experiment, probes=probes)
+
+    limit = 1.0002 * average(with_tips(0.4e-6))
+    found, _ = answered(small_quickstart(**FEW), limit, "tips")
+    assert found.status == "found" and found.present == "exact" and found.value is not None
+    assert found.value >= 0.4e-6
+    assert average(with_tips(found.value)) <= limit < average(with_tips(found.value + 1e-9))
+
+
+def test_what_is_not_stated_cannot_be_varied() -> None:
+    with pytest.raises(NotVariableError, match="temperatures"):
+        answered(small_quickstart(**FEW), 1e-7, "thermometers")
+    with pytest.raises(NotVariableError, match="pool"):
+        answered(small_quickstart(**FEW), 1e-7, "hours")
+
+
+def test_the_largest_size_that_fits_is_no_limit_of_the_design() -> None:
+    experiment = small_quickstart(**FEW)
+    found, _ = answered(experiment, 0.9 * average(experiment), "size")
+    assert found.status == "limited" and found.value == pytest.approx(0.75, rel=0.01)
+    assert "volume" in found.remarks[0]
+    result = bp.reach(experiment, f"U6 average {0.9e6 * average(experiment):.9g} um", "size")
+    assert any(f"more than {found.words}" in line for line in result.lines())
+
+
+def test_one_more_coefficient_with_the_fewest_balls() -> None:
+    experiment = small_quickstart(**FEW)
+    found, _ = answered(experiment, 1.3 * average(experiment), "balls")
+    fewest = experiment.with_({"artefacts.plate.balls": [int(n) for n in found.words.split(" x ")]})
+    more = fewest.with_(
+        {f"error_model.{key}_coefficients": n + 1 for key, n in (("position", 3), ("rotation", 2))}
+    )
+    lengths = predict(more).quantities["U6"]
+    (told,) = [one for one in found.remarks if "error model" in one]
+    ratio = lengths.average / average(fewest)
+    assert told.endswith("undetermined") if math.isnan(ratio) else f"{ratio:.2g} times" in told
+
+
+@pytest.mark.parametrize("place", range(60, 700, 37))
+def test_a_narrow_range_of_sizes_is_found(place: int) -> None:
+    """Of two better sizes the one that does is narrow, the other wide: steps of a stub."""
+    experiment = small_quickstart(**FEW)
+    sought = unknown("size", experiment, experiment.tree, None, None)
+    searched = _Searched(experiment.tree, experiment.builder, parse_goal("U6 average 1 um"))
+    steps = range(sought.first, sought.drawn + 1)
+    width = 0.06 * len(steps)
+    peak = sought.first + len(steps) * place // 800
+
+    class Stub(_Trials):
+        def _tried(self, step: int) -> Tried:
+            wide = 0.3 * abs(step - sought.drawn) / len(steps) + 0.5
+            narrow = abs(step - peak) / width
+            distance = min(wide, 0.2 + narrow)
+            return Tried(str(step), Judgement(distance <= 0.4, distance, "", 0), 0, "")
+
+        def is_right(self, step: int) -> bool:
+            return step in steps
+
+    trials = Stub(sought, searched)
+    steps_met = [step for step in steps if trials._tried(step).is_met]
+    assert steps_met
+    with pytest.MonkeyPatch.context() as patch:
+        answers: list[int] = []
+        patch.setattr(
+            "ballplate.extensions.requirements.root_search._told",
+            lambda trials, status, step, remarks: (
+                answers.append(step) or Answer("size", "size", status, remarks=tuple(remarks))
+            ),
+        )
+        found = _scanned(trials)
+    assert found.status == "found" and answers == [steps_met[0]]
+
+
+def test_the_hours_are_those_of_the_shortest_plan(tmp_path: Path) -> None:
+    path = tmp_path / "pool.yaml"
+    drawn = "{name: p, plane: z, level: 50 mm, corner: {x: 0 mm, y: 0 mm}, probes: [down]}"
+    drawn = drawn.replace("name: p", "name: p, artefact: plate")
+    path.write_text(f"{TEXT}\npositions:\n  - {drawn}\n", encoding="utf-8")
+    (experiment,) = load(path, planning=True)
+    best = bp.plan(experiment, hours=3.0).prediction.quantities["U6"].average
+    goal = parse_goal(f"U6 average {1.0000001e6 * best:.12g} um")
+    (found,) = reach(experiment, goal, ("hours",)).answers
+    assert found.status == "found" and found.value is not None
+    hours = found.value / 3600.0
+    assert hours <= 3.0 and found.words == f"{hours:g} h"
+    assert judge(goal, bp.plan(experiment, hours=hours).prediction).is_met
+    less = bp.plan(experiment, hours=hours - 0.25)
+    assert not judge(goal, less.prediction).is_met
+
+
+def test_a_pool_alone_is_no_design(tmp_path: Path) -> None:
+    path = tmp_path / "pool.yaml"
+    path.write_text(TEXT, encoding="utf-8")
+    (experiment,) = load(path, planning=True)
+    with pytest.raises(bp.ExperimentError, match="positions: missing"):
+        reach(experiment, parse_goal("U6 average 1 um"), ("hours",))
