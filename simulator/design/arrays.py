@@ -263,7 +263,7 @@ def ensure_rows(design: Design, readings: Readings, x: Array) -> None:
     :raises UnmatchedReadingsError: there are some.
     """
     if x.shape != (len(readings), design.dimension):
-        raise UnmatchedReadingsError(f"{len(x)} scale readings for {len(readings)} readings")
+        raise UnmatchedReadingsError("there is not one scale reading for each reading")
     of_ball, of_position = design.balls.artefact, design.positions.artefact
     if (of_ball[readings.ball] != of_position[readings.position]).any():
         raise UnmatchedReadingsError("readings of balls that are not in their positions")

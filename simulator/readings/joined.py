@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter, defaultdict
+from collections.abc import Iterator
 
 import numpy as np
 
@@ -19,21 +20,22 @@ def reading_keys(readings: Readings) -> list[ReadingKey]:
     return [(row[0], row[1], row[2]) for row in table.tolist()]
 
 
-def rows_of(design: Design, readings: Readings) -> Integers:
-    """Return the rows (m,) of a design's readings that single readings belong to, -1 for none.
+def rows_of(design: Design, source: Design, readings: Readings) -> Integers:
+    """Return the rows (m,) of a design's readings that single readings of another design belong
+    to, by names of position, artefact, ball and probe; -1 for none.
 
     The same ones in several groups are taken in the order of reading, further ones with the last.
     """
     planned = defaultdict(list)
-    rows = np.repeat(np.arange(len(design.readings)), design.readings.repeats)
-    for key, row in zip(reading_keys(design.readings.expanded()), rows.tolist(), strict=True):
-        planned[key].append(row)
-    taken: Counter[ReadingKey] = Counter()
+    rows = np.repeat(np.arange(len(design.readings)), design.readings.repeats).tolist()
+    for row, name in zip(rows, _names(design, design.readings.expanded()), strict=True):
+        planned[name].append(row)
+    taken: Counter[tuple[str, ...]] = Counter()
     result = []
-    for key in reading_keys(readings):
-        among = planned.get(key, [-1])
-        result.append(among[min(taken[key], len(among) - 1)])
-        taken[key] += 1
+    for name in _names(source, readings):
+        among = planned.get(name, [-1])
+        result.append(among[min(taken[name], len(among) - 1)])
+        taken[name] += 1
     return np.array(result, np.int64)
 
 
@@ -41,39 +43,19 @@ def joined(design: Design, source: Design, readings: Readings, x: Array) -> Arra
     """Return scale readings (m, d) of a design's m readings, the means of their repeats in metres,
     from single readings of another design, `source`, with scale readings `x` (rows, d).
 
-    Names of positions, artefacts, balls and probes match.
-
     :raises UnmatchedReadingsError: the two have different readings.
     """
     ensure_rows(source, readings, x)
-    rows = rows_of(design, _of_names(design, source, readings))
-    repeats = design.readings.repeats
-    if not np.array_equal(np.bincount(rows + 1, minlength=len(repeats) + 1)[1:], repeats) or (
-        len(rows) != repeats.sum()
-    ):
+    rows, repeats = rows_of(design, source, readings), design.readings.repeats
+    if not np.array_equal(np.bincount(rows + 1, minlength=len(repeats) + 1), [0, *repeats]):
         raise UnmatchedReadingsError("readings are not those of the design")
-    # About one of them, so that the mean of equal readings is that reading.
-    start, change = np.empty((2, len(repeats), x.shape[1]))
-    start[rows], change[:] = x, 0.0
-    np.add.at(change, rows, x - start[rows])
-    return start + change / repeats[:, None]
+    total = np.zeros((len(repeats), x.shape[1]))
+    np.add.at(total, rows, x)
+    return total / repeats[:, None]
 
 
-def _of_names(design: Design, source: Design, readings: Readings) -> Readings:
-    """Return readings of `source` as readings of `design`, with indices of the same names, -1
-    without any.
-    """
-    columns = []
-    for names, of, index in (
-        (_balls(design), _balls(source), readings.ball),
-        (design.positions.names, source.positions.names, readings.position),
-        (design.probes.names, source.probes.names, readings.probe),
-    ):
-        place = {name: k for k, name in enumerate(names)}
-        columns.append(np.array([place.get(name, -1) for name in of], np.int64)[index])
-    return Readings(*columns, readings.repeats)
-
-
-def _balls(design: Design) -> list[tuple[str, str]]:
-    artefacts = (design.artefacts.names[k] for k in design.balls.artefact.tolist())
-    return list(zip(artefacts, design.balls.names, strict=True))
+def _names(design: Design, readings: Readings) -> Iterator[tuple[str, ...]]:
+    positions = design.positions
+    for k, ball, probe in reading_keys(readings):
+        artefact = design.artefacts.names[positions.artefact[k]]
+        yield positions.names[k], artefact, design.balls.names[ball], design.probes.names[probe]

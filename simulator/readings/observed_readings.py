@@ -43,9 +43,6 @@ class ObservedReadings:
     certificate_doubts: tuple[str, ...] = ()
     redone: tuple[str, ...] = ()
 
-    def __post_init__(self) -> None:
-        ensure_rows(self.design, self.design.readings, self.x)
-
     @property
     def remarks(self) -> tuple[str, ...]:
         """Notes on tables that are no plain CSV files, and on unplanned and missing readings."""
@@ -90,7 +87,7 @@ def combine_standards(
     """
     on_plate = design.artefacts.is_plate[design.balls.artefact[readings.ball]]
     groups: dict[tuple[int, ReadingKey], list[int]] = {}
-    keys = list(zip(rows_of(design, readings).tolist(), reading_keys(readings), strict=True))
+    keys = list(zip(rows_of(design, design, readings), reading_keys(readings), strict=True))
     of_gauge = np.isin(readings.position, design.gauge_positions)
     for i in np.flatnonzero(~on_plate & ~of_gauge):
         groups.setdefault(keys[i], []).append(int(i))

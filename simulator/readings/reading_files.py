@@ -278,7 +278,7 @@ def _planned_uncertainty(design: Design, readings: Readings) -> Array | None:
     """
     if design.readings.uncertainty is None:
         return None
-    rows = rows_of(design, readings)
+    rows = rows_of(design, design, readings)
     planned = design.readings.uncertainty[rows]
     return np.where(rows[:, None] < 0, design.machine.repeatability, planned)
 

@@ -20,12 +20,12 @@ from ballplate.simulator.design.arrays import (
     reading_uncertainties,
 )
 from ballplate.simulator.design.objects import Balls
-from ballplate.simulator.estimation.gauss_newton import newton_step
+from ballplate.simulator.estimation.gauss_newton import estimate, newton_step
 from ballplate.simulator.estimation.linearisation import linearise
 from ballplate.simulator.inputs.yamltree import to_python, written
 from ballplate.simulator.readings.generate import exact_readings
 from ballplate.simulator.readings.joined import joined, reading_keys
-from ballplate.simulator.readings.observed_readings import ObservedReadings, observe
+from ballplate.simulator.readings.observed_readings import observe
 from ballplate.simulator.readings.simulated import on_stated_machine
 
 from tests.reference.small_quickstart import small_quickstart, small_sections
@@ -151,8 +151,8 @@ def test_nothing_is_estimated_from_rows_of_other_readings() -> None:
     for wrong in (x, x[: len(design.readings) - 1]):
         with pytest.raises(UnmatchedReadingsError):
             linearise(design, x=wrong)
-        with pytest.raises(UnmatchedReadingsError):
-            ObservedReadings(design, wrong, (), ())
+        with pytest.raises(ValueError):
+            estimate(design, wrong)
     with pytest.raises(UnmatchedReadingsError):
         observe(design, readings, x[1:])
     of_other = replace(design.readings, ball=np.zeros(len(design.readings), np.int64))
