@@ -20,10 +20,10 @@ def complete_fit(
     `moved` (d, m) is the noise of the plates' readings, `errors` (m,) those of the values of each
     type of observation, `ends` (d, m) the noise of the readings of the lengths' two ends.
     `GaussNewtonSettings` limits the iterations. Directions that the nominal design leaves
-    undetermined are held, as in all replicates.
+    undetermined are held, as in all replicates, and no others.
     """
     design, x = replicate_data(shared, moved, errors, ends)
-    held_spectrum = None if shared.drawn is None else shared.drawn.spectrum
+    held_spectrum = shared.spectrum if shared.drawn is None else shared.drawn.spectrum
     return gauss_newton(design, x, initial_state(design, x), held_spectrum=held_spectrum)
 
 

@@ -190,7 +190,8 @@ def _refined(shared: Reference, drawn: Draw, index: Integers) -> Estimates:
             if number == 0:
                 first = size
             else:
-                converged[chosen] |= size <= SMALLEST_STEP * first[chosen]
+                # One that is left to a separate estimate makes no step, and has not converged.
+                converged[chosen] |= active & (size <= SMALLEST_STEP * first[chosen])
                 # The negation includes NaN.
                 is_separate[chosen] |= ~(converged[chosen] | (size <= SLOWEST * previous[chosen]))
             previous[chosen] = size

@@ -252,6 +252,23 @@ def locations(design: Design, state: State, readings: Readings) -> Array:
     return turned + state.origins[readings.position]
 
 
+class UnmatchedReadingsError(ValueError):
+    """Scale readings that are not those of the readings they are joined to."""
+
+
+def ensure_rows(design: Design, readings: Readings, x: Array) -> None:
+    """Refuse scale readings without one row (d,) for each reading, and readings of balls that are
+    not in their positions.
+
+    :raises UnmatchedReadingsError: there are some.
+    """
+    if x.shape != (len(readings), design.dimension):
+        raise UnmatchedReadingsError("there is not one scale reading for each reading")
+    of_ball, of_position = design.balls.artefact, design.positions.artefact
+    if (of_ball[readings.ball] != of_position[readings.position]).any():
+        raise UnmatchedReadingsError("readings of balls that are not in their positions")
+
+
 def in_sequence(readings: Readings, influences: tuple[Influence, ...]) -> Readings:
     """Return all readings in the order of reading, with the further columns that influence
     quantities need.

@@ -22,7 +22,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..computing.threads import scipy_linalg, single_threaded
-from ..design.arrays import Design, Rows, State
+from ..design.arrays import Design, Rows, State, ensure_rows
 from ..design.observations.readings import reading_blocks, reading_weights
 from ..design.parameters import SharedLayout
 from ..machines.protocol import Array, Integers
@@ -125,7 +125,11 @@ def eliminate(design: Design, layout: SharedLayout, state: State, x: Array | Non
 
     `x` (readings, d) holds a scale reading for each of the design's readings, in order. Without it
     the machine is taken to read without error, as for planning.
+
+    :raises UnmatchedReadingsError: `x` has other rows.
     """
+    if x is not None:
+        ensure_rows(design, design.readings, x)
     if _differ(design, state):
         return _eliminate_graded(design, layout, state, x)
     return _eliminate_alike(design, layout, state, x)

@@ -8,16 +8,14 @@ from typing import Any
 
 import numpy as np
 
-from ..design.arrays import Design, Readings, in_sequence
+from ..design.arrays import Design, Readings, ensure_rows, in_sequence
 from ..design.observations.lengths import Lengths
 from ..estimation.spheres import fit_sphere
 from ..inputs.extensions import MissingExtensionError, service
 from ..inputs.settings import listing
 from ..inputs.yamltree import Mark
 from ..machines.protocol import Array, Integers
-
-# Indices of the position, the ball and the probe of a reading.
-ReadingKey = tuple[int, int, int]
+from .joined import ReadingKey, reading_keys, rows_of
 
 # Directions of a gauge within this (rad) of the planned ones are taken as planned.
 AS_PLANNED = 0.01
@@ -64,16 +62,13 @@ class ObservedReadings:
         return (*self.certificate_doubts, *self.offset_doubts, *doubts)
 
 
-def reading_keys(readings: Readings) -> list[ReadingKey]:
-    """Return position, ball and probe of each reading."""
-    table = np.stack([readings.position, readings.ball, readings.probe], axis=1)
-    return [(row[0], row[1], row[2]) for row in table.tolist()]
-
-
 def observe(design: Design, readings: Readings, x: Array) -> ObservedReadings:
     """Return readings of a design, one row per repeat, with scale readings `x` (readings, d), as if
     read from a file.
+
+    :raises UnmatchedReadingsError: `x` or `readings` are those of another design.
     """
+    ensure_rows(design, readings, x)
     return combine_standards(design, readings, x, (), (), ())
 
 
@@ -91,8 +86,8 @@ def combine_standards(
     since its ball may have moved.
     """
     on_plate = design.artefacts.is_plate[design.balls.artefact[readings.ball]]
-    groups: dict[ReadingKey, list[int]] = {}
-    keys = reading_keys(readings)
+    groups: dict[tuple[int, ReadingKey], list[int]] = {}
+    keys = list(zip(rows_of(design, design, readings), reading_keys(readings), strict=True))
     of_gauge = np.isin(readings.position, design.gauge_positions)
     for i in np.flatnonzero(~on_plate & ~of_gauge):
         groups.setdefault(keys[i], []).append(int(i))
@@ -103,13 +98,11 @@ def combine_standards(
     )
     first = np.array([members[0] for members in groups.values()], np.int64)
     repeats = np.array([len(members) for members in groups.values()], np.int64)
-    row = {key: len(plate) + i for i, key in enumerate(groups)}
-    planned = reading_keys(design.readings)
-
-    def moved(old: Integers) -> Integers:
-        return np.array([row.get(planned[i], -1) for i in old], np.int64)
-
-    ends = moved(design.of(Lengths).first), moved(design.of(Lengths).second)
+    # The last place is that of unplanned readings, and of none.
+    row = np.full(len(design.readings) + 1, -1)
+    row[[planned for planned, _ in groups]] = len(plate) + np.arange(len(groups))
+    row[-1] = -1
+    ends = row[design.of(Lengths).first], row[design.of(Lengths).second]
     present = ~design.of(Lengths).to_pivot & (ends[0] >= 0) & (ends[1] >= 0)
     lengths = replace(design.of(Lengths), first=ends[0], second=ends[1]).select(present)
     if len(carried):

@@ -20,7 +20,8 @@ from ..inputs.spreadsheets import CsvWriter
 from ..inputs.tables import FileRow
 from ..inputs.yamltree import GivenText, Mark
 from ..machines.protocol import Array, Integers
-from .observed_readings import ObservedReadings, ReadingKey, combine_standards, reading_keys
+from .joined import ReadingKey, reading_keys, rows_of
+from .observed_readings import ObservedReadings, combine_standards
 from .reading_sources import Source, source_rows
 
 AXES = ("x", "y", "z")
@@ -277,18 +278,9 @@ def _planned_uncertainty(design: Design, readings: Readings) -> Array | None:
     """
     if design.readings.uncertainty is None:
         return None
-    planned = design.readings.expanded()
-    assert planned.uncertainty is not None
-    of_key: dict[ReadingKey, list[Array]] = {}
-    for key, u in zip(reading_keys(planned), planned.uncertainty, strict=True):
-        of_key.setdefault(key, []).append(u)
-    matched: Counter[ReadingKey] = Counter()
-    uncertainties = []
-    for key in reading_keys(readings):
-        candidates = of_key.get(key, [design.machine.repeatability])
-        uncertainties.append(candidates[min(matched[key], len(candidates) - 1)])
-        matched[key] += 1
-    return np.array(uncertainties)
+    rows = rows_of(design, design, readings)
+    planned = design.readings.uncertainty[rows]
+    return np.where(rows[:, None] < 0, design.machine.repeatability, planned)
 
 
 def _compare(

@@ -14,7 +14,7 @@ from ballplate.simulator.estimation import holding, linearise, moved, newton_ste
 from ballplate.simulator.experiment import Experiment, lay_out, placed_only
 from ballplate.simulator.inputs import ExperimentError, yaml_text
 from ballplate.simulator.machines import Array, ErrorModel
-from ballplate.simulator.readings import simulated_readings
+from ballplate.simulator.readings import joined, simulated_readings
 from ballplate.uncertainty import Quantity, evaluation_points, uncertainties
 
 from .assumed import PredictionAssumption, assumptions_of
@@ -297,7 +297,7 @@ def _bias(experiment: Experiment, changed: Experiment) -> tuple[float, float]:
     """
     read, design = simulated_readings(changed, exact=True), lay_out(experiment)
     # One step is enough: errors of micrometres are linear to their last millionth part.
-    at = linearise(design, x=read.x)
+    at = linearise(design, x=joined(design, read.design, read.readings, read.x))
     shared, balls = newton_step(design, at.factor, at.spectrum)
     state = moved(at.state, at.layout, shared, balls)
     errors = _lengths(design, design.model, state) - _lengths(design, read.model, read.truth)

@@ -8,7 +8,7 @@ from pathlib import Path
 from ballplate.results import Fit, Prediction, fit, predict
 from ballplate.simulator.experiment import Experiment, lay_out, load
 from ballplate.simulator.inputs import hint, refused
-from ballplate.simulator.readings import ObservedReadings, exact_readings, on_stated_machine
+from ballplate.simulator.readings import exact_readings, observe, on_stated_machine
 from ballplate.uncertainty import Quantity
 
 from .published_quantities import tabulated_quantities
@@ -75,8 +75,8 @@ def tabulated(shipped: Shipped, label: str) -> dict[str, Quantity]:
 def fitted_exactly(experiment: Experiment) -> Fit:
     """Return the fit of readings without noise of the true machine, with uncertainties as given."""
     design = lay_out(experiment)
-    _, x = exact_readings(*on_stated_machine(experiment, design))
-    return fit(experiment, ObservedReadings(design, x, (), ()), sigma="given")
+    readings, x = exact_readings(*on_stated_machine(experiment, design))
+    return fit(experiment, observe(design, readings, x), sigma="given")
 
 
 def sums_of_squares(fit: Fit) -> list[float]:
