@@ -11,9 +11,10 @@ from ..inputs.messages import MORE_ERRORS, MOST_MESSAGES, ExperimentError, Messa
 from ..inputs.quantities import ANGLE_UNITS, LENGTH_UNITS
 from ..inputs.settings import hint, listing, shorten
 from ..inputs.tables import (
+    TableLine,
+    decimal_sign,
     header_cells,
     read_number,
-    split_cells,
     table_lines,
     wrong_count,
 )
@@ -54,28 +55,30 @@ def read_numbered_curves(
             f"{len(lines) - 1} points are too many; at most {MOST_POINTS} are possible: leave some"
             " of them out"
         )
-        raise refused(file, text, line=lines[0][0])
+        raise refused(file, text, line=lines[0].number)
     names_known = (*NAMES, *(f"{name}{BANDWIDTH}" for name in NAMES)) if bandwidths else NAMES
-    names, factors = _columns(Mark(file, lines[0][0], 1), lines[0][1], names_known)
+    names, factors = _columns(file, lines[0], names_known)
+    decimal = decimal_sign(lines[1:], range(len(names)))
     messages: list[Message] = []
     rows = []
-    for number, line in lines[1:]:
+    for line in lines[1:]:
+        number = line.number
         if len(messages) >= MOST_MESSAGES:
             messages.append(Message(file, number, 1, "", MORE_ERRORS))
             break
-        cells = split_cells(line)
+        cells = line.cells()
         if cells is None or len(cells) != len(names):
             messages.append(Message(file, number, 1, "", wrong_count(line, cells, len(names))))
             continue
         row = [
-            read_number(cell, name, factor, Mark(file, number, column), messages)
+            read_number(cell, name, factor, Mark(file, number, column), messages, decimal=decimal)
             for (column, cell), name, factor in zip(cells, names, factors, strict=True)
         ]
         rows.append((number, row))
     if messages:
         raise ExperimentError(messages)
     if len(rows) < 2:
-        raise refused(file, "a curve needs at least two points; add rows", line=lines[0][0])
+        raise refused(file, "a curve needs at least two points; add rows", line=lines[0].number)
     place = names.index(POSITION)
     rows.sort(key=lambda row: row[1][place])
     for (_, before), (number, after) in zip(rows, rows[1:], strict=False):
@@ -91,11 +94,14 @@ def read_numbered_curves(
     return curves, tuple(number for number, _ in rows)
 
 
-def _columns(mark: Mark, header: str, errors: tuple[str, ...]) -> tuple[list[str], list[Fraction]]:
+def _columns(
+    file: str, header: TableLine, errors: tuple[str, ...]
+) -> tuple[list[str], list[Fraction]]:
+    mark = Mark(file, header.number, 1)
     messages = []
     names = []
     factors = []
-    for place, cell, name, unit in header_cells(mark, header, EXAMPLE):
+    for place, cell, name, unit in header_cells(file, header, EXAMPLE):
         if name != POSITION and name not in errors:
             is_known = cell in (POSITION, *errors)
             remedy = (

@@ -239,7 +239,7 @@ def read_certificate(path: Path | GivenText, experiment: Experiment) -> Experime
             continue
         lines[k] = row
         try:
-            values[k] = PARSERS[values_known[k].unit](text)
+            values[k] = PARSERS[values_known[k].unit](text.replace(",", "."))
         except QuantityError as error:
             problems.append(row.mark.message("", str(error)))
             continue
