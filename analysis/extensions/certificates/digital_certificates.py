@@ -53,8 +53,9 @@ REGIONS = ("ellipsoidalRegion", "rectangularRegion", "measurementUncertaintyMult
 
 @dataclass(frozen=True)
 class DigitalValue:
-    """A length: what it may be called, by itself and by what it stands in, its value and standard
-    uncertainty (NaN without one) in metres, and faults of it, empty if nothing is.
+    """A length: what it may be called, by itself and by what it stands in (reference types too),
+    its value and standard uncertainty (NaN without one) in metres, and faults of it, empty if
+    nothing is.
 
     `factor` is the coverage factor that its uncertainty was divided by, 1 for a standard one.
     """
@@ -204,7 +205,8 @@ def _parts(
                     inner_part.text.split() for inner_part in child.all("quantity", "charsXMLList")
                 ]
                 beside = (*labels, *map(tuple, texts))
-            inner = list(_parts(child, (*contexts, *_names(child)), beside))
+            types = child.attributes.get("refType", "").split()
+            inner = list(_parts(child, (*contexts, *_names(child), *types), beside))
             if child.first("relativeUncertainty") is not None:
                 inner = [replace(part, is_relative=True) for part in inner]
             # All parts of a hybrid are one quantity in several units.

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Sequence
+from collections.abc import Sequence, Set
 from typing import TYPE_CHECKING, Any
 
 from ballplate.simulator.design import CertificateEntry, FileValues, References, value_name
@@ -27,6 +27,8 @@ IDLE = {
     "to",
     "and",
 }
+# Reference types of good practice: quantities of the same name that stand side by side.
+KIND = re.compile("[a-z]+_(?:(nominal|reference|measured)Value|measurement(Error)(?:_error)?)")
 
 
 def read_digital(
@@ -38,10 +40,12 @@ def read_digital(
 ) -> FileValues | None:
     """The wanted values in a digital certificate; None after reporting faults.
 
-    The result is the one that is named, or else the only one that has them all.
+    The result is the one that is named, or else the only one that has them all. Of quantities side
+    by side it is the one that is named, or else the measured one, or else the nominal one with the
+    error added.
     """
     # Loaded with a parser of XML, which few experiments need.
-    from .digital_certificates import RELATIVE, matrix_of, read_digital_certificate
+    from .digital_certificates import NO_LENGTH, RELATIVE, matrix_of, read_digital_certificate
 
     problems, place = references.problems, (*steps, "values")
     try:
@@ -58,13 +62,18 @@ def read_digital(
         text = f'{path.name}: {many} called "{shorten(name)}"; it has {labels}'
         problems.add((*steps, "result"), text)
         return None
-    forms = _forms(wanted)
-    by_result = [_matched(item, forms) for item in chosen]
+    forms, quantity = _forms(wanted), settings.quantity
+    by_result = [_matched(item, forms, quantity) for item in chosen]
     full = [k for k, matches in enumerate(by_result) if len(matches) == len(wanted)]
     if len(full) > 1:
         named = listing(chosen[k].label for k in full)
         text = f"{len(full)} results have these values: {named}; choose one with result:"
         problems.add(place, f"{path.name}: {text}")
+        return None
+    if quantity is not None and not any(by_result):
+        called = dict.fromkeys(_label(length) for item in chosen for length in item.lengths)
+        text = f'no quantity is called "{shorten(quantity)}" for these balls; it has'
+        problems.add((*steps, "quantity"), f"{path.name}: {text} {listing(called)}")
         return None
     best = full[0] if full else max(range(len(chosen)), key=lambda k: len(by_result[k]))
     result, matches = chosen[best], by_result[best]
@@ -73,28 +82,41 @@ def read_digital(
         problems.add(place, f"{path.name}: {text}; it has {labels}")
         return None
     before = len(problems.messages)
-    entries = []
+    entries, sources, kinds = [], [], set[str]()
     for k, names in enumerate(wanted):
-        values = [result.lengths[i] for i in matches[k]]
-        if len(values) > 1:
-            lines = listing(str(value.mark.line) for value in values)
-            text = f"{value_name(names, is_pair)} has several values, in lines {lines}"
-            problems.add_at(values[1].mark, place, text)
-        # Who states the uncertainty needs none of the file.
-        is_stated = values[0].problem == RELATIVE and settings.standard_uncertainty is not None
-        if values[0].problem and not is_stated:
-            text = f"{value_name(names, is_pair)} {values[0].problem}"
-            problems.add_at(values[0].mark, place, text)
-        entries.append(
-            CertificateEntry(names, values[0].value, values[0].uncertainty, values[0].mark, place)
-        )
+        candidates = [
+            i for i in matches[k] if not result.lengths[i].problem.startswith(NO_LENGTH)
+        ] or matches[k]
+        terms, source = _measured(result, candidates)
+        values = [result.lengths[i] for i in terms]
+        if not values:
+            called = listing(dict.fromkeys(_label(result.lengths[i]) for i in candidates))
+            lines = listing(str(result.lengths[i].mark.line) for i in candidates)
+            text = (
+                f"{value_name(names, is_pair)} has several values, in lines {lines}; choose those"
+                f" of one quantity with quantity: {called}"
+            )
+            problems.add_at(result.lengths[candidates[1]].mark, place, text)
+            return None
+        for value in values:
+            # Who states the uncertainty needs none of the file.
+            is_stated = value.problem == RELATIVE and settings.standard_uncertainty is not None
+            if value.problem and not is_stated:
+                text = f"{value_name(names, is_pair)} {value.problem}"
+                problems.add_at(value.mark, place, text)
+        length, u = sum(value.value for value in values), result.lengths[source].uncertainty
+        entries.append(CertificateEntry(names, length, u, values[0].mark, place))
+        sources.append(source)
+        beside = "" if source in terms else ", with uncertainties of errors"
+        kinds.add(" plus ".join(map(_kind, values)) + beside)
     if len(problems.messages) > before:
         return None
-    covariance = matrix_of(result, [matches[k][0] for k in range(len(wanted))])
+    covariance = matrix_of(result, sources)
     _tell(
         version,
         result,
-        [result.lengths[matches[k][0]] for k in range(len(wanted))],
+        [result.lengths[source] for source in sources],
+        kinds,
         settings,
         covariance is not None,
         place,
@@ -107,6 +129,7 @@ def _tell(
     version: str,
     result: DigitalResult,
     values: list[DigitalValue],
+    kinds: Set[str],
     settings: Any,
     correlated: bool,
     steps: Steps,
@@ -115,6 +138,7 @@ def _tell(
     """Say which result was taken, and the temperature that it is stated for."""
     factors = sorted({f"{value.factor:g}" for value in values if not math.isnan(value.uncertainty)})
     line = f"DCC {version}, result {result.label}: {len(values)} values"
+    line += f" ({listing(sorted(kinds))})" if any(kinds) else ""
     line += f", k = {listing(factors)}" if factors else ""
     line += ", with their covariance" if correlated else ""
     for name, degrees in result.temperatures:
@@ -127,6 +151,36 @@ def _tell(
             " used unchanged, as lengths at the reference temperature"
         )
         references.problems.doubt(steps, text)
+
+
+def _label(value: DigitalValue) -> str:
+    """How the quantity of a value is called: by a reference type, a name or an identifier."""
+    types = [context for context in value.contexts if KIND.fullmatch(context)]
+    return f'"{shorten((*types, *value.contexts[::-1], "without a name")[0])}"'
+
+
+def _kind(value: DigitalValue) -> str:
+    """The part of a reference type that says what a value is, empty without any."""
+    kinds = (KIND.fullmatch(context) for context in reversed(value.contexts))
+    return next((str(kind[kind.lastindex or 0]).lower() for kind in kinds if kind), "")
+
+
+def _measured(result: DigitalResult, places: list[int]) -> tuple[list[int], int]:
+    """Places of the lengths that are the measured one or add up to it, none if it is open which
+    are, and of the length with its uncertainty, which may be stated of the error only.
+    """
+    by_kind: dict[str, list[int]] = {}
+    for i in places:
+        by_kind.setdefault(_kind(result.lengths[i]), []).append(i)
+    measured, errors = (by_kind.get(kind, []) for kind in ("measured", "error"))
+    terms = places if len(places) == 1 else measured
+    if not measured and len(places) == 2 and len(errors) == 1 and "" not in by_kind:
+        terms = sorted(places, key=errors.__contains__)
+    elif len(terms) > 1:
+        terms = []
+    sources = [*terms[-1:], *errors[: len(errors) == 1], *terms[:1]]
+    of_length = (i for i in sources if not math.isnan(result.lengths[i].uncertainty))
+    return terms, next(of_length, (*sources, places[0])[0])
 
 
 def _nothing_found(
@@ -163,10 +217,14 @@ def _forms(wanted: Sequence[tuple[str, str]]) -> dict[tuple[str, ...], int]:
     return {words: k for words, k in forms.items() if k >= 0}
 
 
-def _matched(result: DigitalResult, forms: dict[tuple[str, ...], int]) -> dict[int, list[int]]:
-    """Places of the values of a result by what is wanted."""
+def _matched(
+    result: DigitalResult, forms: dict[tuple[str, ...], int], quantity: str | None
+) -> dict[int, list[int]]:
+    """Places of the values of a result, or of one quantity of it, by what is wanted."""
     matches: dict[int, list[int]] = {}
     for i, length in enumerate(result.lengths):
+        if quantity is not None and quantity not in (*length.names, *length.contexts):
+            continue
         texts = [*length.names, *length.contexts]
         texts += [f"{name} {about}" for name in length.names for about in length.contexts]
         tried = [_words(text) for text in texts]
