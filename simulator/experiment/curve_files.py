@@ -7,6 +7,8 @@ from __future__ import annotations
 from fractions import Fraction
 from pathlib import Path
 
+import numpy as np
+
 from ..inputs.messages import MORE_ERRORS, MOST_MESSAGES, ExperimentError, Message, refused
 from ..inputs.quantities import ANGLE_UNITS, LENGTH_UNITS
 from ..inputs.settings import hint, listing, shorten
@@ -21,6 +23,7 @@ from ..inputs.tables import (
 from ..inputs.yamltree import Mark
 from ..machines.curves import NAMES, Points
 from ..machines.error_names import AXIS_ERRORS, TRANSLATIONS
+from ..machines.protocol import Array, Integers
 
 POSITION = "position"
 EXAMPLE = "position_mm,EXX_um,EYX_um,EAX_urad"
@@ -40,9 +43,11 @@ def read_curves(path: Path) -> dict[str, Points]:
 
 def read_numbered_curves(
     path: Path, bandwidths: bool = False
-) -> tuple[dict[str, Points], tuple[int, ...]]:
-    """The same with the number of each point's line; with `bandwidths` columns such as
-    EXX_bandwidth_um are curves too.
+) -> tuple[dict[str, Points], tuple[int, ...], str]:
+    """The same with the number of each point's line, and a note on means; with `bandwidths` columns
+    such as EXX_bandwidth_um are curves too.
+
+    Positions that occur several times, as in runs there and back, have the mean of both directions.
 
     :raises ExperimentError: as `read_curves`.
     """
@@ -77,21 +82,50 @@ def read_numbered_curves(
         rows.append((number, row))
     if messages:
         raise ExperimentError(messages)
-    if len(rows) < 2:
+    table = np.array([row for _, row in rows]).reshape(-1, len(names))
+    positions, first, index = np.unique(
+        table[:, names.index(POSITION)], return_index=True, return_inverse=True
+    )
+    if len(positions) < 2:
         raise refused(file, "a curve needs at least two points; add rows", line=lines[0].number)
-    place = names.index(POSITION)
-    rows.sort(key=lambda row: row[1][place])
-    for (_, before), (number, after) in zip(rows, rows[1:], strict=False):
-        if after[place] == before[place]:
-            text = "this position is in the file twice; leave one of the rows out"
-            raise refused(file, text, line=number)
-    positions = tuple(row[place] for _, row in rows)
+    means, reversal = _means(table[:, names.index(POSITION)], index, table)
+    points = tuple(positions.tolist())
     curves = {
-        name: Points(positions, tuple(row[k] for _, row in rows))
+        name: Points(points, tuple(means[:, k].tolist()))
         for k, name in enumerate(names)
         if name != POSITION
     }
-    return curves, tuple(number for number, _ in rows)
+    note = ""
+    if len(points) < len(rows):
+        note = f"means of {len(rows)} values at {len(points)} positions"
+        sizes = (
+            f"{name} {1e6 * size:.3g} {'µrad' if AXIS_ERRORS[name].is_rotation else 'µm'}"
+            for name, size in zip(names, reversal.tolist(), strict=True)
+            if name in AXIS_ERRORS and size == size
+        )
+        if largest := listing(sizes):
+            note += f"; largest reversal values, which the means leave out: {largest}"
+    return curves, tuple(rows[k][0] for k in first.tolist()), note
+
+
+def _means(x: Array, index: Integers, table: Array) -> tuple[Array, Array]:
+    """Return the means of the rows (n, c) at each position by its `index` (n,), of both directions
+    if there are two, and their largest difference (c,), else NaN (ISO 230-2: reversal value).
+    """
+    step = np.diff(x)
+    before, after = np.r_[0.0, step], np.r_[step, 0.0]
+    # The first row of a run has gone a longer way back than to its next.
+    is_first = (before == 0) | (before * after < 0) & (abs(before) > 1.5 * abs(after))
+    place = np.sign(np.where(is_first, after, before)).astype(int), index
+    sums = np.zeros((3, index.max() + 1, table.shape[1]))
+    counts = np.zeros((*sums.shape[:2], 1))
+    np.add.at(sums, place, table)
+    np.add.at(counts, place, 1.0)
+    with np.errstate(invalid="ignore"):
+        forwards, backwards = sums[1] / counts[1], sums[-1] / counts[-1]
+    both = (forwards + backwards) / 2
+    means = np.where(np.isnan(both), sums.sum(axis=0) / counts.sum(axis=0), both)
+    return means, np.fmax.reduce(abs(forwards - backwards))
 
 
 def _columns(

@@ -108,7 +108,6 @@ def test_readings_of_a_measured_machine(tmp_path: Path) -> None:
         ("position_mm,EXX_um\n0,4,11\n9,\"5,3\"\n8.0,\n",
          ["x.csv:2:1: 3 columns instead of 2; if a comma is meant as the decimal point, write a point, as in 4.11",
           "x.csv:3:3: \"5,3\" has a decimal comma; write 5.3", "x.csv:4:5: no EXX; write a number"]),
-        ("position_mm,EXX_um\n0,1\n9,2\n0,2\n", ["x.csv:4:1: this position is in the file twice"]),
         ("position_mm,EXX_um\n0,1\n300,2\n", ["e.yaml:4:38: true_machine.files[0]: covers 0 mm to 300 mm, but"]),
         ("position_mm,EYY_um\n0,1\n900,2\n", ["e.yaml:4:45: true_machine.files[1]: EYY is in an earlier file"]),
     ],
