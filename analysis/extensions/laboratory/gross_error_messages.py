@@ -14,6 +14,7 @@ from ballplate.simulator.machines import Array
 from .common_causes import common_cause, mistaken_positions, words_of_mistaken
 from .gross_errors import WrongPosition, WrongReading, find_gross_errors
 from .length_ratios import LengthRatio, doubtful_lengths
+from .plate_sizes import words_of_size
 from .wrong_offsets import only_position, wrong_offsets
 
 
@@ -28,6 +29,10 @@ def refuse_gross_errors(
     :raises ExperimentError: gross errors; names all of them.
     """
     positions, readings = find_gross_errors(design, x)
+    if (positions or readings) and (size := words_of_size(design, x)):
+        if cause := common_cause(design, x, settings):
+            size = f"all positions fit {cause}: correct the unit"
+        raise marks[0].refused(size)
     mistakes = wrong_offsets(design, design.readings, x) if positions or readings else []
     if mistakes:
         causes = ", or if ".join(mistake.words(design) for mistake in mistakes)
