@@ -19,6 +19,7 @@ from ballplate.simulator.machines import (
     Combination,
     KinematicModel,
     MachineDescription,
+    Parameter,
     ParametricError,
     Points,
     PowerSeries,
@@ -130,14 +131,23 @@ class Volumetric:
         )
 
     @property
+    def numbers(self) -> list[tuple[Parameter, float]]:
+        """Errors that are no functions, with their values."""
+        every = zip(self.truth.model.parameters, self.truth.a.tolist(), strict=True)
+        names = {error.name for error in self.machine.errors}
+        return [(parameter, value) for parameter, value in every if parameter.function not in names]
+
+    @property
     def is_random(self) -> bool:
         """True if any error has a random part."""
         return bool(self.approach[1] or len(self.lasting[1]) or self.machine.probing)
 
-    def systematic(self, points: Array) -> Array:
-        """Return systematic errors (m, 3) at scale readings (m, 3)."""
+    def systematic(self, points: Array, a: Array | None = None) -> Array:
+        """Return systematic errors (m, 3) at scale readings (m, 3); with other parameters `a` than
+        those of the file, those by them.
+        """
         probe = np.broadcast_to(self.machine.probe, points.shape)
-        return self.truth.model.error(points, self.truth.a, probe) - probe
+        return self.truth.model.error(points, self.truth.a if a is None else a, probe) - probe
 
     def random_roots(self, points: Array) -> tuple[Array, Array]:
         """Return sensitivities times deviations: (m, 3, k) per approach, and (m, 3, l) lasting."""
@@ -230,6 +240,7 @@ class AlongAxis:
     """
 
     error: ParametricError
+    positions: Array
     values: Array | None
     deviation: Array | None
     measured: Points | None
@@ -244,12 +255,14 @@ class AlongAxis:
         return 0.0 if self.values is None else float(np.ptp(self.values))
 
 
-def along_axes(machine: MachineDescription) -> list[AlongAxis]:
-    """All parametric errors that the machine has."""
+def along_axes(machine: MachineDescription, count: int = ALONG) -> list[AlongAxis]:
+    """All parametric errors that the machine has, at a number of positions and the points of
+    tables.
+    """
     functions = reference_functions(machine)
     curves = []
     for error in machine.errors:
-        positions = np.linspace(machine.lower[error.axis], machine.upper[error.axis], ALONG)
+        positions = np.linspace(machine.lower[error.axis], machine.upper[error.axis], count)
         table = error.shape if isinstance(error.shape, Points) else None
         if table is not None:
             positions = np.union1d(
@@ -260,6 +273,7 @@ def along_axes(machine: MachineDescription) -> list[AlongAxis]:
         curves.append(
             AlongAxis(
                 error,
+                positions,
                 functions[error.name].values(t)[:, 0] if error.name in functions else None,
                 None if deviation is None else _deviations(deviation, positions),
                 table,
