@@ -87,7 +87,6 @@ if TYPE_CHECKING:
         header_cells,
         header_names,
         header_texts,
-        headings,
         read_number,
         read_table,
         table_lines,

@@ -453,11 +453,3 @@ def _columns(
     if messages:
         raise ExperimentError(messages)
     return names, factors
-
-
-def headings(text: str) -> set[str]:
-    """Return names of the columns in the first line that is no comment, without their units."""
-    lines = (line for line in text.splitlines() if line.strip() and line[:1] != "#")
-    line = next(lines, "")
-    cells = (cell.strip().strip('"') for cell in re.split("[,;\t]", line))
-    return {re.sub(r"_(?:m|mm|um|µm|nm|in)$", "", cell) for cell in cells}

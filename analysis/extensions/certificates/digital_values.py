@@ -169,18 +169,15 @@ def _measured(result: DigitalResult, places: list[int]) -> tuple[list[int], int]
     """Places of the lengths that are the measured one or add up to it, none if it is open which
     are, and of the length with its uncertainty, which may be stated of the error only.
     """
-    by_kind: dict[str, list[int]] = {}
-    for i in places:
-        by_kind.setdefault(_kind(result.lengths[i]), []).append(i)
-    measured, errors = (by_kind.get(kind, []) for kind in ("measured", "error"))
-    terms = places if len(places) == 1 else measured
-    if not measured and len(places) == 2 and len(errors) == 1 and "" not in by_kind:
+    kinds = {i: _kind(result.lengths[i]) for i in places}
+    errors = [i for i in places if kinds[i] == "error"]
+    terms = [i for i in places if kinds[i] == "measured"] if len(places) > 1 else places
+    if not terms and len(places) == 2 and len(errors) == 1 and all(kinds.values()):
         terms = sorted(places, key=errors.__contains__)
-    elif len(terms) > 1:
-        terms = []
-    sources = [*terms[-1:], *errors[: len(errors) == 1], *terms[:1]]
-    of_length = (i for i in sources if not math.isnan(result.lengths[i].uncertainty))
-    return terms, next(of_length, (*sources, places[0])[0])
+    elif len(terms) != 1:
+        return [], places[0]
+    sources = [terms[-1], *(errors if len(errors) == 1 else ()), terms[0]]
+    return terms, next((i for i in sources if result.lengths[i].uncertainty >= 0.0), sources[0])
 
 
 def _nothing_found(

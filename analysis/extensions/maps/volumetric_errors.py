@@ -7,7 +7,8 @@ parts are standard deviations.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Literal
 
@@ -37,6 +38,9 @@ from .realisations import Draws, Realisations
 
 # Points of a grid or a line: each takes half a kilobyte.
 MOST_POINTS = 200_000
+
+# The name of random errors that are of no axis.
+PROBING = "probing"
 
 # Points along an axis at which a parametric error is told.
 ALONG = 101
@@ -74,9 +78,12 @@ class LengthErrors:
 
 @dataclass(frozen=True)
 class Volumetric:
-    """A machine with what its errors are computed by, made once."""
+    """A machine with what its errors are computed by, made once; errors other than `only` one are
+    zero.
+    """
 
     machine: MachineDescription
+    only: str = ""
 
     @property
     def volume(self) -> Volume:
@@ -86,7 +93,18 @@ class Volumetric:
     @cached_property
     def truth(self) -> TrueMachine:
         """The systematic errors as an error model."""
-        return true_volumetric(self.machine)
+        truth = true_volumetric(self.machine)
+        return replace(truth, a=truth.a * self._counted(truth.model.parameters))
+
+    def _counted(self, parameters: Sequence[Parameter]) -> Array:
+        return np.array([self.only in ("", one.function) for one in parameters], float)
+
+    @property
+    def errors_by_name(self) -> dict[str, str]:
+        """The meanings of all errors by their names."""
+        random = *self.approach[0].parameters, *self.lasting[0].parameters
+        meanings = {one.function: one.meaning for one in (*self.truth.model.parameters, *random)}
+        return meanings | ({PROBING: "in each co-ordinate"} if self.machine.probing else {})
 
     @cached_property
     def approach(self) -> tuple[VolumetricModel, tuple[float | Points, ...]]:
@@ -142,12 +160,10 @@ class Volumetric:
         """True if any error has a random part."""
         return bool(self.approach[1] or len(self.lasting[1]) or self.machine.probing)
 
-    def systematic(self, points: Array, a: Array | None = None) -> Array:
-        """Return systematic errors (m, 3) at scale readings (m, 3); with other parameters `a` than
-        those of the file, those by them.
-        """
+    def systematic(self, points: Array) -> Array:
+        """Return systematic errors (m, 3) at scale readings (m, 3)."""
         probe = np.broadcast_to(self.machine.probe, points.shape)
-        return self.truth.model.error(points, self.truth.a if a is None else a, probe) - probe
+        return self.truth.model.error(points, self.truth.a, probe) - probe
 
     def random_roots(self, points: Array) -> tuple[Array, Array]:
         """Return sensitivities times deviations: (m, 3, k) per approach, and (m, 3, l) lasting."""
@@ -158,11 +174,14 @@ class Volumetric:
             zip(model.chain.functions, deviations, strict=True)
         ):
             columns[:, :, k] *= _deviations(deviation, points[:, function.axis])[:, None]
-        probing = np.broadcast_to(self.machine.probing * np.eye(3), (len(points), 3, 3))
+        columns *= self._counted(model.parameters)
+        size = self.machine.probing * (self.only in ("", PROBING))
+        probing = np.broadcast_to(size * np.eye(3), (len(points), 3, 3))
         lasting, sizes = self.lasting
         return (
             np.concatenate([columns, probing], axis=2),
-            lasting.jacobian(points, np.zeros(len(sizes)), probe) * sizes,
+            lasting.jacobian(points, np.zeros(len(sizes)), probe)
+            * (sizes * self._counted(lasting.parameters)),
         )
 
     def errors(self, points: Array) -> VolumetricErrors:
