@@ -297,6 +297,21 @@ def test_lengths_with_each_quantity_by_itself(tmp_path: Path) -> None:
     np.testing.assert_allclose(one.values, VALUES, rtol=1e-15)
 
 
+def test_nominal_values_never_stand_in_for_unread_ones(tmp_path: Path) -> None:
+    """A measured value or an error in a unit that is none of length."""
+    odd = ("basic_measuredValue", MM, "\\kelvin", IN_MM)
+    assert "is no length" in problems_of(tmp_path, side_by_side(NOMINALS, odd))
+    assert "is no length" in problems_of(tmp_path, side_by_side(NOMINALS, RELATIVE_ERRORS))
+    wrong = ("basic_measuredValue", ["six", *MM[1:]], MILLI, IN_MM)
+    assert '"six" is not a number' in problems_of(tmp_path, side_by_side(NOMINALS, wrong))
+
+
+def problems_of(folder: Path, text: str) -> str:
+    with pytest.raises(ExperimentError) as caught:
+        found(folder, text, standard_uncertainty="1 um")
+    return str(caught.value)
+
+
 def test_other_quantities_are_chosen_by_a_key(tmp_path: Path) -> None:
     other = ("x_before", [f"{float(v) + 1:.4f}" for v in MM], MILLI, IN_MM)
     text = side_by_side(("x_after", MM, MILLI, IN_MM), other, REFERENCES)

@@ -51,6 +51,9 @@ UNCERTAINTIES = (
 REGIONS = ("ellipsoidalRegion", "rectangularRegion", "measurementUncertaintyMultivariate")
 
 
+NO_LENGTH = "is no length"
+
+
 @dataclass(frozen=True)
 class DigitalValue:
     """A length: what it may be called, by itself and by what it stands in (reference types too),
@@ -67,6 +70,11 @@ class DigitalValue:
     uncertainty: float
     factor: float
     problem: str = ""
+
+    @property
+    def is_length(self) -> bool:
+        """True if its unit is one of length."""
+        return not self.problem.startswith(NO_LENGTH)
 
 
 @dataclass(frozen=True, eq=False)
@@ -214,7 +222,6 @@ def _parts(
             yield from (in_metres or inner)[:1] if child.name == "hybrid" else inner
 
 
-NO_LENGTH = "is no length"
 RELATIVE = (
     "has only a relative uncertainty, which may be standard or expanded;"
     " state standard uncertainties in a CSV file"

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Sequence, Set
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ballplate.simulator.design import CertificateEntry, FileValues, References, value_name
@@ -45,7 +47,7 @@ def read_digital(
     error added.
     """
     # Loaded with a parser of XML, which few experiments need.
-    from .digital_certificates import NO_LENGTH, RELATIVE, matrix_of, read_digital_certificate
+    from .digital_certificates import RELATIVE, matrix_of, read_digital_certificate
 
     problems, place = references.problems, (*steps, "values")
     try:
@@ -54,12 +56,56 @@ def read_digital(
     except ExperimentError as error:
         problems.take(error, place)
         return None
+    found = _chosen_result(settings, results, wanted, is_pair, steps, references)
+    if found is None:
+        return None
+    result, matches = found
+    before, values, sources = len(problems.messages), [], []
+    for k, names in enumerate(wanted):
+        called = value_name(names, is_pair)
+        measured = _measured(result, matches[k])
+        if measured is None:
+            some = [result.lengths[i] for i in matches[k]]
+            lines = listing(str(value.mark.line) for value in some)
+            text = f"{called} has several values, in lines {lines}; choose those of one quantity"
+            text += f" with quantity: {listing(dict.fromkeys(map(_label, some)))}"
+            problems.add_at(some[1].mark, place, text)
+            return None
+        value, source = measured
+        # Who states the uncertainty needs none of the file.
+        is_stated = value.problem == RELATIVE and settings.standard_uncertainty is not None
+        if value.problem and not is_stated:
+            problems.add_at(value.mark, place, f"{called} {value.problem}")
+        values.append(value)
+        sources.append(source)
+    if len(problems.messages) > before:
+        return None
+    covariance = matrix_of(result, sources)
+    _tell(version, result, values, settings, covariance is not None, place, references)
+    entries = [
+        CertificateEntry(names, value.value, value.uncertainty, value.mark, place)
+        for names, value in zip(wanted, values, strict=True)
+    ]
+    return FileValues(entries, covariance)
+
+
+def _chosen_result(
+    settings: Any,
+    results: Sequence[DigitalResult],
+    wanted: Sequence[tuple[str, str]],
+    is_pair: bool,
+    steps: Steps,
+    references: References,
+) -> tuple[DigitalResult, dict[int, list[int]]] | None:
+    """The result with all wanted values, and the places of these; None after reporting faults."""
+    problems, place = references.problems, (*steps, "values")
+    name_of_file = Path(settings.values).name
     labels = listing(result.label for result in results)
     name = settings.result
     chosen = [result for result in results if name is None or result.is_called(name)]
     if not chosen or name is not None and len(chosen) > 1:
         many = "several results are" if chosen else "no result is"
-        text = f'{path.name}: {many} called "{shorten(name)}"; it has {labels}'
+        text = f'{name_of_file}: {many} called "{shorten(name)}"; it has {labels}'
         problems.add((*steps, "result"), text)
         return None
     forms, quantity = _forms(wanted), settings.quantity
@@ -68,77 +114,35 @@ def read_digital(
     if len(full) > 1:
         named = listing(chosen[k].label for k in full)
         text = f"{len(full)} results have these values: {named}; choose one with result:"
-        problems.add(place, f"{path.name}: {text}")
+        problems.add(place, f"{name_of_file}: {text}")
         return None
     if quantity is not None and not any(by_result):
         called = dict.fromkeys(_label(length) for item in chosen for length in item.lengths)
         text = f'no quantity is called "{shorten(quantity)}" for these balls; it has'
-        problems.add((*steps, "quantity"), f"{path.name}: {text} {listing(called)}")
+        problems.add((*steps, "quantity"), f"{name_of_file}: {text} {listing(called)}")
         return None
     best = full[0] if full else max(range(len(chosen)), key=lambda k: len(by_result[k]))
-    result, matches = chosen[best], by_result[best]
     if not full:
-        text = _nothing_found(result, matches, wanted, is_pair)
-        problems.add(place, f"{path.name}: {text}; it has {labels}")
+        text = _nothing_found(chosen[best], by_result[best], wanted, is_pair)
+        problems.add(place, f"{name_of_file}: {text}; it has {labels}")
         return None
-    before = len(problems.messages)
-    entries, sources, kinds = [], [], set[str]()
-    for k, names in enumerate(wanted):
-        candidates = [
-            i for i in matches[k] if not result.lengths[i].problem.startswith(NO_LENGTH)
-        ] or matches[k]
-        terms, source = _measured(result, candidates)
-        values = [result.lengths[i] for i in terms]
-        if not values:
-            called = listing(dict.fromkeys(_label(result.lengths[i]) for i in candidates))
-            lines = listing(str(result.lengths[i].mark.line) for i in candidates)
-            text = (
-                f"{value_name(names, is_pair)} has several values, in lines {lines}; choose those"
-                f" of one quantity with quantity: {called}"
-            )
-            problems.add_at(result.lengths[candidates[1]].mark, place, text)
-            return None
-        for value in values:
-            # Who states the uncertainty needs none of the file.
-            is_stated = value.problem == RELATIVE and settings.standard_uncertainty is not None
-            if value.problem and not is_stated:
-                text = f"{value_name(names, is_pair)} {value.problem}"
-                problems.add_at(value.mark, place, text)
-        length, u = sum(value.value for value in values), result.lengths[source].uncertainty
-        entries.append(CertificateEntry(names, length, u, values[0].mark, place))
-        sources.append(source)
-        beside = "" if source in terms else ", with uncertainties of errors"
-        kinds.add(" plus ".join(map(_kind, values)) + beside)
-    if len(problems.messages) > before:
-        return None
-    covariance = matrix_of(result, sources)
-    _tell(
-        version,
-        result,
-        [result.lengths[source] for source in sources],
-        kinds,
-        settings,
-        covariance is not None,
-        place,
-        references,
-    )
-    return FileValues(entries, covariance)
+    return chosen[best], by_result[best]
 
 
 def _tell(
     version: str,
     result: DigitalResult,
     values: list[DigitalValue],
-    kinds: Set[str],
     settings: Any,
     correlated: bool,
     steps: Steps,
     references: References,
 ) -> None:
-    """Say which result was taken, and the temperature that it is stated for."""
+    """Say which result was taken, and which values, and the temperature they are stated for."""
     factors = sorted({f"{value.factor:g}" for value in values if not math.isnan(value.uncertainty)})
     line = f"DCC {version}, result {result.label}: {len(values)} values"
-    line += f" ({listing(sorted(kinds))})" if any(kinds) else ""
+    kinds = listing(sorted({*filter(None, (value.names[0] for value in values))}))
+    line += f" ({kinds})" if kinds else ""
     line += f", k = {listing(factors)}" if factors else ""
     line += ", with their covariance" if correlated else ""
     for name, degrees in result.temperatures:
@@ -165,19 +169,28 @@ def _kind(value: DigitalValue) -> str:
     return next((str(kind[kind.lastindex or 0]).lower() for kind in kinds if kind), "")
 
 
-def _measured(result: DigitalResult, places: list[int]) -> tuple[list[int], int]:
-    """Places of the lengths that are the measured one or add up to it, none if it is open which
-    are, and of the length with its uncertainty, which may be stated of the error only.
+def _measured(result: DigitalResult, places: list[int]) -> tuple[DigitalValue, int] | None:
+    """The measured one of lengths, or the nominal one with the error added, named by what it is,
+    and the place of its uncertainty, which may be stated of the error only; None if it is open.
     """
     kinds = {i: _kind(result.lengths[i]) for i in places}
+    of_lengths = [i for i in places if kinds[i] or result.lengths[i].is_length]
+    places = of_lengths or places
     errors = [i for i in places if kinds[i] == "error"]
     terms = [i for i in places if kinds[i] == "measured"] if len(places) > 1 else places
     if not terms and len(places) == 2 and len(errors) == 1 and all(kinds.values()):
         terms = sorted(places, key=errors.__contains__)
     elif len(terms) != 1:
-        return [], places[0]
+        return None
     sources = [terms[-1], *(errors if len(errors) == 1 else ()), terms[0]]
-    return terms, next((i for i in sources if result.lengths[i].uncertainty >= 0.0), sources[0])
+    lengths = [result.lengths[i] for i in terms]
+    source = next((i for i in sources if result.lengths[i].uncertainty >= 0.0), sources[0])
+    name = " plus ".join(kinds[i] for i in terms)
+    name += "" if source in terms else ", with uncertainties of errors"
+    problem = next((length.problem for length in lengths if length.problem), "")
+    value = sum(length.value for length in lengths)
+    of_source = replace(result.lengths[source], value=value, names=(name,), problem=problem)
+    return replace(of_source, mark=lengths[0].mark), source
 
 
 def _nothing_found(
