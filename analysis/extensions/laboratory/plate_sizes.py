@@ -8,6 +8,8 @@ from ballplate.simulator.geometry import AXIS_NAMES, fit_motion
 from ballplate.simulator.inputs import listing
 from ballplate.simulator.machines import Array
 
+from .length_ratios import IMPOSSIBLE
+
 # Another size explains readings if it leaves no more than this share of their misfit, and if
 # factors of all positions agree, and their axes are square, to this.
 EXPLAINED = 0.1
@@ -34,6 +36,8 @@ def words_of_size(design: Design, x: Array) -> str:
         if not len(factors) or not (abs(factors / factors[0] - 1.0) < AGREEMENT).all():
             continue
         factor, name = np.median(factors, axis=0), design.artefacts.names[artefact]
+        if (abs(factor - 1.0) < IMPOSSIBLE).all():
+            continue
         parts = [f"{value:#.3g} times as large" for value in factor.tolist()]
         if np.ptp(factor) > AGREEMENT * factor.min():
             parts = [f"{text} in {AXIS_NAMES[k]}" for text, k in zip(parts, axes, strict=True)]

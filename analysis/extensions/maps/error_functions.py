@@ -134,7 +134,8 @@ def _named(
 
     :raises ValueError: there is none of a name.
     """
-    known = dict.fromkeys([*others, *(error.name for error in (*curves, *numbers))])
+    every = [*others, *(curve.name for curve in curves), *(error.name for error in numbers)]
+    known = dict.fromkeys(every)
     for name in names:
         if name not in known:
             raise ValueError(f'the {source} has no error "{name}"; {hint(name, known)}')

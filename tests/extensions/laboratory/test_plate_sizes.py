@@ -93,6 +93,19 @@ def test_positions_alone(tmp_path: Path, count: int) -> None:
     assert "plate 2.00 times as large" in refusal(tmp_path, stated, read(tmp_path, true))
 
 
+def test_a_size_that_scales_would_explain_is_doubted(tmp_path: Path) -> None:
+    """Nothing is far from its place, and the scales of the machine would be off by 5 %."""
+    table = read(tmp_path, tree((3, 3), (200, 200), ["p"]))
+    path = tmp_path / "stated.yaml"
+    for size, doubted in ((190, True), (201, False)):
+        path.write_text(yaml.safe_dump(tree((3, 3), (size, size), ["p"])), encoding="utf-8")
+        told = " ".join(bp.fit(path, table).warnings)
+        assert (
+            "all positions fit a plate 1.05 times as large: is its size right?" in told
+        ) == doubted
+        assert ("times as large" in told) == doubted
+
+
 def test_another_plate_is_as_stated(tmp_path: Path) -> None:
     true = tree((3, 3), (200, 200), ["p"])
     true["artefacts"]["large"] = {"kind": "grid", "balls": [3, 3], "size": ["500 mm", "500 mm"]}
