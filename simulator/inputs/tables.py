@@ -126,13 +126,15 @@ def read_table(
     absent: float = 0.0,
     units: Units = MappingProxyType({}),
     empty: Collection[str] = (),
+    decimal: str = "",
 ) -> tuple[FileRow, ...]:
     """Return the rows of a table whose first line names the columns.
 
     ``texts`` are required columns of text, ``lengths`` required columns of lengths with a unit such
     as ``x_mm``, and ``optional`` length columns, by default ``absent``. Columns of ``units`` have
     units of their own. ``defaults`` are texts of missing columns; empty cells of columns ``empty``
-    are NaN. Empty lines and lines that begin with # are skipped. ``problems``, if given, collects
+    are NaN. ``decimal`` is the decimal sign, by default detected. Empty lines and lines that begin
+    with # are skipped. ``problems``, if given, collects
     messages about rows, whose invalid lengths are then NaN.
 
     :raises ExperimentError: the file cannot be read, a column is missing or unknown, a cell is not
@@ -147,7 +149,8 @@ def read_table(
     columns, factors = _columns(file, lines[0], texts, lengths, optional, defaults, example, units)
     _refuse_unfilled(file, columns, lengths, lines)
     count, names = len(columns), (*lengths, *optional)
-    decimal = decimal_sign(lines[1:], [k for k, name in enumerate(columns) if name in factors])
+    lengths_at = [k for k, name in enumerate(columns) if name in factors]
+    decimal = decimal or decimal_sign(lines[1:], lengths_at)
     columns += [name for name in defaults if name not in columns]
     constants = [defaults[name] for name in columns[count:]]
     rows = []

@@ -211,7 +211,9 @@ def plain_rows(
     try:
         return tuple(
             read_table(
-                table.text, list(ROLES), axes, further, errors, defaults, np.nan, units, empty
+                *(table.text, list(ROLES), axes, further, errors, defaults, np.nan, units, empty),
+                # What a comma means in readings is asked where it may be a sign of thousands.
+                decimal=".",
             )
         )
     except ExperimentError as error:

@@ -33,7 +33,7 @@ def words_of_size(design: Design, x: Array) -> str:
             ]
         )
         # Comparisons with NaN are false.
-        if not len(factors) or not (abs(factors / factors[0] - 1.0) < AGREEMENT).all():
+        if not len(factors) or not (abs(factors - factors[0]) < AGREEMENT * factors[0]).all():
             continue
         factor, name = np.median(factors, axis=0), design.artefacts.names[artefact]
         if (abs(factor - 1.0) < IMPOSSIBLE).all():
@@ -66,5 +66,5 @@ def _factors(nominal: Array, drawn: Array, places: Array) -> list[Array]:
     rotation, origin = fit_motion(nominal, places)
     misfit, left = places - nominal @ rotation.T - origin, drawn @ changed - seen
     is_explained = (left**2).sum() < EXPLAINED**2 * (misfit**2).sum()
-    is_square = (abs(square / np.outer(factor, factor) - np.eye(rank)) < AGREEMENT).all()
+    is_square = (abs(square - np.diag(factor**2)) < AGREEMENT * np.outer(factor, factor)).all()
     return [np.where(is_explained and is_square, factor, np.nan)]
