@@ -171,7 +171,7 @@ SHIPPED = (
             ),
             "map --curves": Command(
                 "curves_command",
-                "parametric errors of a map file along their axes, with their uncertainties",
+                "parametric errors of a machine file or map along their axes, with uncertainties",
             ),
             "map --convert": Command(
                 "convert_command",

@@ -212,16 +212,18 @@ def check_true_machine(sections: Sections, machine: Machine | None, references: 
 
 def _read_curves(truth: CurvesSettings, machine: Machine | None, references: References) -> None:
     """Let the true machine have the curves of its files, or report its faults."""
-    from .curve_files import read_curves
+    from .curve_files import read_numbered_curves
 
     problems, curves = references.problems, dict[str, Points]()
     for i, file in enumerate(truth.files):
         steps = ("true_machine", "files", i)
         try:
-            found = read_curves(references.file(file))
+            found, _, note = read_numbered_curves(references.file(file))
         except ExperimentError as error:
             problems.take(error, steps)
             continue
+        if note:
+            problems.note(steps, f"{file}: {note}")
         twice = [name for name in found if name in curves]
         if twice:
             problems.add(

@@ -7,19 +7,23 @@ from __future__ import annotations
 from fractions import Fraction
 from pathlib import Path
 
+import numpy as np
+
 from ..inputs.messages import MORE_ERRORS, MOST_MESSAGES, ExperimentError, Message, refused
 from ..inputs.quantities import ANGLE_UNITS, LENGTH_UNITS
 from ..inputs.settings import hint, listing, shorten
 from ..inputs.tables import (
+    TableLine,
+    decimal_sign,
     header_cells,
     read_number,
-    split_cells,
     table_lines,
     wrong_count,
 )
 from ..inputs.yamltree import Mark
 from ..machines.curves import NAMES, Points
 from ..machines.error_names import AXIS_ERRORS, TRANSLATIONS
+from ..machines.protocol import Array, Integers
 
 POSITION = "position"
 EXAMPLE = "position_mm,EXX_um,EYX_um,EAX_urad"
@@ -39,9 +43,11 @@ def read_curves(path: Path) -> dict[str, Points]:
 
 def read_numbered_curves(
     path: Path, bandwidths: bool = False
-) -> tuple[dict[str, Points], tuple[int, ...]]:
-    """The same with the number of each point's line; with `bandwidths` columns such as
-    EXX_bandwidth_um are curves too.
+) -> tuple[dict[str, Points], tuple[int, ...], str]:
+    """The same with the number of each point's line, and a note on means; with `bandwidths` columns
+    such as EXX_bandwidth_um are curves too.
+
+    Positions that occur several times, as in runs there and back, have the mean of both directions.
 
     :raises ExperimentError: as `read_curves`.
     """
@@ -54,48 +60,82 @@ def read_numbered_curves(
             f"{len(lines) - 1} points are too many; at most {MOST_POINTS} are possible: leave some"
             " of them out"
         )
-        raise refused(file, text, line=lines[0][0])
+        raise refused(file, text, line=lines[0].number)
     names_known = (*NAMES, *(f"{name}{BANDWIDTH}" for name in NAMES)) if bandwidths else NAMES
-    names, factors = _columns(Mark(file, lines[0][0], 1), lines[0][1], names_known)
+    names, factors = _columns(file, lines[0], names_known)
+    decimal = decimal_sign(lines[1:], range(len(names)))
     messages: list[Message] = []
     rows = []
-    for number, line in lines[1:]:
+    for line in lines[1:]:
+        number = line.number
         if len(messages) >= MOST_MESSAGES:
             messages.append(Message(file, number, 1, "", MORE_ERRORS))
             break
-        cells = split_cells(line)
+        cells = line.cells()
         if cells is None or len(cells) != len(names):
             messages.append(Message(file, number, 1, "", wrong_count(line, cells, len(names))))
             continue
         row = [
-            read_number(cell, name, factor, Mark(file, number, column), messages)
+            read_number(cell, name, factor, Mark(file, number, column), messages, decimal=decimal)
             for (column, cell), name, factor in zip(cells, names, factors, strict=True)
         ]
         rows.append((number, row))
     if messages:
         raise ExperimentError(messages)
-    if len(rows) < 2:
-        raise refused(file, "a curve needs at least two points; add rows", line=lines[0][0])
-    place = names.index(POSITION)
-    rows.sort(key=lambda row: row[1][place])
-    for (_, before), (number, after) in zip(rows, rows[1:], strict=False):
-        if after[place] == before[place]:
-            text = "this position is in the file twice; leave one of the rows out"
-            raise refused(file, text, line=number)
-    positions = tuple(row[place] for _, row in rows)
+    table = np.array([row for _, row in rows]).reshape(-1, len(names))
+    positions, first, index = np.unique(
+        table[:, names.index(POSITION)], return_index=True, return_inverse=True
+    )
+    if len(positions) < 2:
+        raise refused(file, "a curve needs at least two points; add rows", line=lines[0].number)
+    means, reversal = _means(table[:, names.index(POSITION)], index, table)
+    points = tuple(positions.tolist())
     curves = {
-        name: Points(positions, tuple(row[k] for _, row in rows))
+        name: Points(points, tuple(means[:, k].tolist()))
         for k, name in enumerate(names)
         if name != POSITION
     }
-    return curves, tuple(number for number, _ in rows)
+    note = ""
+    if len(points) < len(rows):
+        note = f"means of {len(rows)} values at {len(points)} positions"
+        sizes = (
+            f"{name} {1e6 * size:.3g} {'µrad' if AXIS_ERRORS[name].is_rotation else 'µm'}"
+            for name, size in zip(names, reversal.tolist(), strict=True)
+            if name in AXIS_ERRORS and size == size
+        )
+        if largest := listing(sizes):
+            note += f"; largest reversal values, which the means leave out: {largest}"
+    return curves, tuple(rows[k][0] for k in first.tolist()), note
 
 
-def _columns(mark: Mark, header: str, errors: tuple[str, ...]) -> tuple[list[str], list[Fraction]]:
+def _means(x: Array, index: Integers, table: Array) -> tuple[Array, Array]:
+    """Return the means of the rows (n, c) at each position by its `index` (n,), of both directions
+    if there are two, and their largest difference (c,), else NaN (ISO 230-2: reversal value).
+    """
+    step = np.diff(x)
+    before, after = np.r_[0.0, step], np.r_[step, 0.0]
+    # The first row of a run has gone a longer way back than to its next.
+    is_first = (before == 0) | (before * after < 0) & (abs(before) > 1.5 * abs(after))
+    place = np.sign(np.where(is_first, after, before)).astype(int), index
+    sums = np.zeros((3, index.max() + 1, table.shape[1]))
+    counts = np.zeros((*sums.shape[:2], 1))
+    np.add.at(sums, place, table)
+    np.add.at(counts, place, 1.0)
+    with np.errstate(invalid="ignore"):
+        forwards, backwards = sums[1] / counts[1], sums[-1] / counts[-1]
+    both = (forwards + backwards) / 2
+    means = np.where(np.isnan(both), sums.sum(axis=0) / counts.sum(axis=0), both)
+    return means, np.fmax.reduce(abs(forwards - backwards))
+
+
+def _columns(
+    file: str, header: TableLine, errors: tuple[str, ...]
+) -> tuple[list[str], list[Fraction]]:
+    mark = Mark(file, header.number, 1)
     messages = []
     names = []
     factors = []
-    for place, cell, name, unit in header_cells(mark, header, EXAMPLE):
+    for place, cell, name, unit in header_cells(file, header, EXAMPLE):
         if name != POSITION and name not in errors:
             is_known = cell in (POSITION, *errors)
             remedy = (

@@ -37,7 +37,7 @@ MARGIN, WIDEST = 0.05, 0.25
 class ErrorTable:
     """A measured error: its points and bandwidth along the axis, and the content of comments.
 
-    `line` has the positions of other axes by name.
+    `line` has the positions of other axes by name; `note` is about means of several runs.
     """
 
     points: Points
@@ -46,6 +46,7 @@ class ErrorTable:
     probe: Three
     criterion: Criterion | None
     on_table: bool = False
+    note: str = ""
 
 
 class LineError(ValueError):
@@ -131,8 +132,9 @@ def read_error_table(path: Path, name: str, axis: tuple[float, float] | None = N
         mark = stated_values["line"][0]
         messages.append(mark.message("", f"the line runs along {along}; leave it out"))
     curves: dict[str, Points] = {}
+    note = ""
     try:
-        curves, numbers = read_numbered_curves(path, bandwidths=True)
+        curves, numbers, note = read_numbered_curves(path, bandwidths=True)
         if axis is not None:
             messages += _range(str(path), next(iter(curves.values())).positions, numbers, axis)
     except ExperimentError as error:
@@ -166,6 +168,7 @@ def read_error_table(path: Path, name: str, axis: tuple[float, float] | None = N
         values.get("probe", (0.0, 0.0, 0.0)),
         values.get("straightness"),
         "straightedge" in stated_values,
+        note,
     )
 
 

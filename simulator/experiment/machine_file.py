@@ -298,10 +298,13 @@ def _table(
     trust: Trust,
 ) -> ErrorTable | None:
     try:
-        return read_error_table(trust.file(source.parent, file), name, ends)
+        table = read_error_table(trust.file(source.parent, file), name, ends)
     except ExperimentError as error:
         problems.take(error, steps)
         return None
+    if table.note:
+        problems.doubt(steps, f"{file}: {table.note}")
+    return table
 
 
 def _read_tables(root: Mapping, source: Path, problems: Problems, trust: Trust) -> None:

@@ -14,7 +14,7 @@ from .number_arrays import Array
 from .quantities import LENGTH_UNITS, plain_unit
 from .settings import hint, shorten
 from .spreadsheets import text_of_cell
-from .tables import split_cells, table_lines, wrong_count, wrong_number
+from .tables import decimal_sign, pointed, table_lines, wrong_count, wrong_number
 from .yamltree import Mark
 
 MOST_NAMES = 2000
@@ -83,8 +83,8 @@ def read_matrix(path: Path) -> NamedMatrix:
     if not lines:
         text = "the file is empty; its first line should be covariance_um2 and the names of values"
         raise refused(file, text, line=1)
-    head = Mark(file, lines[0][0], 1)
-    cells = split_cells(lines[0][1])
+    head = Mark(file, lines[0].number, 1)
+    cells = lines[0].cells()
     if cells is None or len(cells) < 2:
         text = "the first line should be covariance_um2, or correlation, and the names of values"
         raise head.refused(text)
@@ -101,10 +101,11 @@ def read_matrix(path: Path) -> NamedMatrix:
         raise ExperimentError([*messages, head.message("", text)])
     values, rounding = np.zeros((len(names), len(names))), np.zeros((len(names), len(names)))
     marks = []
-    for k, (number, line) in enumerate(lines[1:]):
-        mark = Mark(file, number, 1)
+    decimal = decimal_sign(lines[1:], range(1, len(cells)))
+    for k, line in enumerate(lines[1:]):
+        mark = Mark(file, line.number, 1)
         marks.append(mark)
-        row = split_cells(line)
+        row = line.cells()
         if row is None or len(row) != len(cells):
             messages.append(mark.message("", wrong_count(line, row, len(cells))))
             continue
@@ -113,12 +114,13 @@ def read_matrix(path: Path) -> NamedMatrix:
             text = f'row "{shorten(name)}", but column {k + 1} is "{shorten(names[k])}"'
             messages.append(mark.message("", f"{text}; name rows and columns in the same order"))
         for j, (column, cell) in enumerate(row[1:]):
-            entry = _number(cell)
+            number = pointed(cell, decimal)
+            entry = _number(number)
             if not math.isfinite(entry):
-                place = Mark(file, number, column)
+                place = Mark(file, line.number, column)
                 text = wrong_number(cell, names[j]) or f'"{shorten(cell)}" is not a number'
                 messages.append(place.message("", text))
-            values[k, j], rounding[k, j] = entry, half_digit(cell)
+            values[k, j], rounding[k, j] = entry, half_digit(number)
         if len(messages) > MOST_MESSAGES:
             break
     if messages:

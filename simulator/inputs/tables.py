@@ -1,4 +1,8 @@
-"""CSV tables: columns by name, lengths with the unit as a suffix of the column's name."""
+"""CSV tables: columns by name, lengths with the unit as a suffix of the column's name.
+
+Columns are separated by commas, semicolons or tabs; decimals have a point, or a comma where none of
+the table has a point.
+"""
 
 from __future__ import annotations
 
@@ -10,6 +14,7 @@ from fractions import Fraction
 from itertools import islice, pairwise
 from pathlib import Path
 from types import MappingProxyType
+from typing import NamedTuple
 
 from .messages import MORE_ERRORS, MOST_MESSAGES, ExperimentError, Message, refused
 from .quantities import (
@@ -25,7 +30,18 @@ from .settings import hint, listing, shorten
 from .spreadsheets import text_of_cell
 from .yamltree import GivenText, Mark, read_text
 
-CELL = re.compile(r'(?:\s*"((?:[^"]|"")*)"\s*|([^,"]*))(,|$)')
+SEPARATORS = {",": "commas", ";": "semicolons", "\t": "tabs"}
+# A cell, quoted or plain, and what separates it from the next.
+CELLS = {
+    sign: re.compile(
+        rf'(?:(?:(?!{sign})\s)*"((?:[^"]|"")*)"(?:(?!{sign})\s)*|([^{sign}"]*))({sign}|$)'
+    )
+    for sign in SEPARATORS
+}
+SEPARATOR = re.compile(r'(?:"[^"]*"|[^",;\t])*([,;\t])')
+# How spreadsheets say which sign separates the columns.
+SEPARATOR_LINE = re.compile(r"sep=(?:[,;]|\t)?")
+DECIMALS = re.compile(r"[+-]?[0-9]*([.,])[0-9]*(?:[eE][+-]?[0-9]+)?")
 MOST_ROWS = 1_000_000
 # Far more than there are names for.
 MOST_COLUMNS = 1000
@@ -42,18 +58,62 @@ class FileRow:
     lengths: tuple[float, ...]
 
 
-def table_lines(path: Path | GivenText) -> list[tuple[int, str]]:
-    """Return lines of a CSV file with their numbers, without empty lines and comments.
+class TableLine(NamedTuple):
+    """A line of a table: its number, its text, and the sign that separates its cells."""
+
+    number: int
+    text: str
+    separator: str
+
+    def cells(self) -> list[tuple[int, str]] | None:
+        """Return the cells with their columns, from 1; None if a quotation mark has no partner."""
+        cells, start = [], 0
+        while True:
+            match = CELLS[self.separator].match(self.text, start)
+            if match is None:
+                return None
+            quoted, plain, separator = match.groups()
+            text = plain.strip() if quoted is None else quoted.replace('""', '"')
+            blank = len(match[0]) - len(match[0].lstrip())
+            cells.append((match.start() + (blank if text else 0) + 1, text))
+            if not separator:
+                return cells
+            start = match.end()
+
+
+def table_lines(path: Path | GivenText) -> list[TableLine]:
+    """Return lines of a CSV file without empty lines and comments. The first sign that separates
+    columns of the first line, a comma, a semicolon or a tab, is that of all lines.
 
     :raises ExperimentError: the file cannot be read.
     """
     return list(_lines(path))
 
 
-def _lines(path: Path | GivenText) -> Iterator[tuple[int, str]]:
+def _lines(path: Path | GivenText) -> Iterator[TableLine]:
+    separator = ""
     for number, line in enumerate(read_text(path).splitlines(), start=1):
-        if line.strip() and not line.lstrip().startswith("#"):
-            yield number, line
+        if not line.strip() or line.lstrip().startswith("#") or SEPARATOR_LINE.fullmatch(line):
+            continue
+        if not separator:
+            sign = SEPARATOR.match(line)
+            separator = sign[1] if sign else ","
+        yield TableLine(number, line, separator)
+
+
+def decimal_sign(lines: Sequence[TableLine], columns: Collection[int]) -> str:
+    """Return the decimal sign of the numbers in the `columns` (indices) of a table: a comma if some
+    have one, and none has a point.
+    """
+    if not any(line.separator != "," or '"' in line.text for line in lines):
+        return "."
+    signs = {
+        match[1]
+        for line in lines
+        for k, (_, cell) in enumerate(line.cells() or ())
+        if k in columns and (match := DECIMALS.fullmatch(cell))
+    }
+    return "," if signs == {","} else "."
 
 
 def read_table(
@@ -66,13 +126,15 @@ def read_table(
     absent: float = 0.0,
     units: Units = MappingProxyType({}),
     empty: Collection[str] = (),
+    decimal: str = "",
 ) -> tuple[FileRow, ...]:
-    """Return the rows of a comma-separated file whose first line names the columns.
+    """Return the rows of a table whose first line names the columns.
 
     ``texts`` are required columns of text, ``lengths`` required columns of lengths with a unit such
     as ``x_mm``, and ``optional`` length columns, by default ``absent``. Columns of ``units`` have
     units of their own. ``defaults`` are texts of missing columns; empty cells of columns ``empty``
-    are NaN. Empty lines and lines that begin with # are skipped. ``problems``, if given, collects
+    are NaN. ``decimal`` is the decimal sign, by default detected. Empty lines and lines that begin
+    with # are skipped. ``problems``, if given, collects
     messages about rows, whose invalid lengths are then NaN.
 
     :raises ExperimentError: the file cannot be read, a column is missing or unknown, a cell is not
@@ -84,17 +146,17 @@ def read_table(
     example = ",".join([*texts, *(f"{name}_mm" for name in lengths)])
     if not lines:
         raise refused(file, f"the file is empty; its first line should be {example}", line=1)
-    columns, factors = _columns(
-        Mark(file, lines[0][0], 1), lines[0][1], texts, lengths, optional, defaults, example, units
-    )
+    columns, factors = _columns(file, lines[0], texts, lengths, optional, defaults, example, units)
     _refuse_unfilled(file, columns, lengths, lines)
     count, names = len(columns), (*lengths, *optional)
+    lengths_at = [k for k, name in enumerate(columns) if name in factors]
+    decimal = decimal or decimal_sign(lines[1:], lengths_at)
     columns += [name for name in defaults if name not in columns]
     constants = [defaults[name] for name in columns[count:]]
     rows = []
-    plain = _PlainRows.create(columns, factors, texts, names, constants, absent)
-    for number, line in islice(lines, 1, MOST_ROWS + 1):
-        mark = Mark(file, number, 1)
+    plain = _PlainRows.create(columns, factors, texts, names, constants, absent, decimal)
+    for line in islice(lines, 1, MOST_ROWS + 1):
+        mark = Mark(file, line.number, 1)
         if len(messages) >= MOST_MESSAGES:
             messages.append(mark.message("", MORE_ERRORS))
             break
@@ -102,32 +164,38 @@ def read_table(
         if row is not None:
             rows.append(row)
             continue
-        cells = split_cells(line)
+        cells = line.cells()
         if cells is None or len(cells) != count:
             messages.append(mark.message("", wrong_count(line, cells, count)))
             continue
         by_name = dict(zip(columns, [*cells, *((1, text) for text in constants)], strict=True))
         for name in texts:
             if not by_name[name][1]:
-                cell_mark = Mark(file, number, by_name[name][0])
+                cell_mark = Mark(file, line.number, by_name[name][0])
                 messages.append(cell_mark.message("", f"no {name}; write its name"))
         filled = {name: cell for name, cell in by_name.items() if cell[1] or name not in empty}
         values = tuple(
             math.nan
             if name in by_name and name not in filled
-            else _length_of(mark, filled.get(name), name, factors, absent, messages)
+            else _length_of(mark, filled.get(name), name, factors, absent, messages, decimal)
             for name in names
         )
         rows.append(FileRow(mark, tuple(text_of_cell(by_name[name][1]) for name in texts), values))
     if len(lines) == 1:
         messages.append(
             Message(
-                file, lines[0][0], 1, "", "no rows below the names of the columns; add at least one"
+                file,
+                lines[0].number,
+                1,
+                "",
+                "no rows below the names of the columns; add at least one",
             )
         )
     if len(lines) > MOST_ROWS + 1:
         messages.append(
-            Message(file, lines[MOST_ROWS][0], 1, "", f"more than {MOST_ROWS} rows; leave some out")
+            Message(
+                file, lines[MOST_ROWS].number, 1, "", f"more than {MOST_ROWS} rows; leave some out"
+            )
         )
     if messages and (problems is None or not rows):
         raise ExperimentError(messages)
@@ -135,14 +203,14 @@ def read_table(
 
 
 def _refuse_unfilled(
-    file: str, columns: Sequence[str], lengths: Sequence[str], lines: Sequence[tuple[int, str]]
+    file: str, columns: Sequence[str], lengths: Sequence[str], lines: Sequence[TableLine]
 ) -> None:
     """Refuse a table without any length, in one message instead of one per cell.
 
     :raises ExperimentError: all required lengths are empty, in all rows.
     """
     required = [columns.index(name) for name in lengths]
-    rows = (split_cells(line) for _, line in lines[1:])
+    rows = (line.cells() for line in lines[1:])
     if (
         len(lines) > 1
         and required
@@ -155,7 +223,7 @@ def _refuse_unfilled(
     ):
         text = f"nothing is filled in: {listing(lengths)} are empty in all {len(lines) - 1} rows"
         text += "; enter values, and remove rows without any"
-        raise refused(file, text, line=lines[1][0])
+        raise refused(file, text, line=lines[1].number)
 
 
 def _length_of(
@@ -165,11 +233,12 @@ def _length_of(
     factors: Mapping[str, Fraction],
     absent: float,
     messages: list[Message],
+    decimal: str,
 ) -> float:
     if cell is None:
         return absent
     cell_mark = Mark(mark.file, mark.line, cell[0])
-    return read_number(cell[1], name, factors[name], cell_mark, messages)
+    return read_number(cell[1], name, factors[name], cell_mark, messages, decimal=decimal)
 
 
 @dataclass(frozen=True)
@@ -177,11 +246,12 @@ class _PlainRows:
     """Reader of lines without quotation marks and errors, in a fraction of the time.
 
     ``texts`` and ``lengths`` are indices of columns, the latter -1 for columns that are ``absent``
-    and with the unit's `power_of_ten`. ``constants`` are texts of missing columns. ``cache`` shares
-    the texts of rows: few differ.
+    and with the unit's `power_of_ten`. ``constants`` are texts of missing columns, ``decimal`` is
+    the decimal sign. ``cache`` shares the texts of rows: few differ.
     """
 
     count: int
+    decimal: str
     constants: list[str]
     absent: float
     texts: tuple[int, ...]
@@ -197,6 +267,7 @@ class _PlainRows:
         lengths: Sequence[str],
         constants: list[str],
         absent: float,
+        decimal: str,
     ) -> _PlainRows:
         by_name = {name: i for i, name in enumerate(columns)}
         powers = [
@@ -205,19 +276,19 @@ class _PlainRows:
         ]
         indices = tuple(by_name[name] for name in texts)
         count = len(columns) - len(constants)
-        return cls(count, constants, absent, indices, tuple(powers), {})
+        return cls(count, decimal, constants, absent, indices, tuple(powers), {})
 
-    def row(self, mark: Mark, line: str) -> FileRow | None:
+    def row(self, mark: Mark, line: TableLine) -> FileRow | None:
         """Return the row of a line; None if it needs the thorough reader."""
-        if '"' in line:
+        if '"' in line.text:
             return None
-        cells = [cell.strip() for cell in line.split(",")]
+        cells = [cell.strip() for cell in line.text.split(line.separator)]
         if len(cells) != self.count:
             return None
         cells += self.constants
         lengths = []
         for i, power in self.lengths:
-            value = self.absent if i < 0 else plain_number(cells[i], power)
+            value = self.absent if i < 0 else plain_number(pointed(cells[i], self.decimal), power)
             if value is None:
                 return None
             lengths.append(value)
@@ -232,35 +303,45 @@ class _PlainRows:
         return FileRow(mark, texts, tuple(lengths))
 
 
-def header_cells(mark: Mark, header: str, example: str) -> Iterator[tuple[Mark, str, str, str]]:
+def pointed(cell: str, decimal: str) -> str:
+    """Return a number with a decimal point; other cells unchanged."""
+    return cell.replace(decimal, ".") if "." not in cell else cell
+
+
+def header_cells(
+    file: str, header: TableLine, example: str
+) -> Iterator[tuple[Mark, str, str, str]]:
     """Yield mark, text, name and unit of each cell of a first line.
 
-    :raises ExperimentError: there are more than a thousand, or they are separated by semicolons or
-        tabs.
+    :raises ExperimentError: there are more than a thousand.
     """
-    count = header.count(",") + 1
+    count = header.text.count(header.separator) + 1
     if count > MOST_COLUMNS:
         text = f"{count} columns are too many; the first line should be {example}"
-        raise mark.refused(text)
-    if "," not in header and re.search("[;\t]", header):
-        text = f"the columns are not separated by commas; write {example}"
-        raise mark.refused(text)
-    for column, cell in split_cells(header) or []:
+        raise Mark(file, header.number, 1).refused(text)
+    for column, cell in header.cells() or []:
         name, _, unit = cell.rpartition("_")
-        yield Mark(mark.file, mark.line, column), cell, name, plain_unit(unit)
+        yield Mark(file, header.number, column), cell, name, plain_unit(unit)
 
 
-def header_texts(path: Path | GivenText) -> set[str]:
-    """Return the texts of the first line's cells of a comma-separated file; may be empty.
+def header_line(path: Path | GivenText) -> TableLine:
+    """Return the first line of a table, empty without any.
 
     :raises ExperimentError: the file cannot be read.
     """
-    line = next((line for line in _lines(path)), (0, ""))[1]
-    return {cell for _, cell in split_cells(line) or []}
+    return next(_lines(path), TableLine(0, "", ","))
+
+
+def header_texts(path: Path | GivenText) -> set[str]:
+    """Return the texts of the first line's cells of a table; may be empty.
+
+    :raises ExperimentError: the file cannot be read.
+    """
+    return {cell for _, cell in header_line(path).cells() or []}
 
 
 def header_names(path: Path | GivenText) -> set[str]:
-    """Return names of the columns of a comma-separated file, without their units; may be empty.
+    """Return names of the columns of a table, without their units; may be empty.
 
     :raises ExperimentError: the file cannot be read.
     """
@@ -274,10 +355,11 @@ def read_number(
     mark: Mark,
     messages: list[Message],
     kind: str = "length",
+    decimal: str = ".",
 ) -> float:
     """Return the number in a cell, times its column's factor; NaN after adding a message."""
     try:
-        return metres_or_radians(cell, factor, kind)
+        return metres_or_radians(pointed(cell, decimal), factor, kind)
     except QuantityError as error:
         messages.append(mark.message("", wrong_number(cell, name) or str(error)))
         return math.nan
@@ -287,38 +369,40 @@ def wrong_number(cell: str, name: str) -> str:
     """Return the fault of a cell that is nearly a number, or an empty text."""
     if not cell:
         return f"no {name}; write a number, or remove the line"
-    if re.fullmatch(r"[+-]?[0-9]+,[0-9]+(?:[eE][+-]?[0-9]+)?", cell):
+    if (match := DECIMALS.fullmatch(cell)) and match[1] == ",":
         return f'"{cell}" has a decimal comma; write {cell.replace(",", ".")}'
     return (
-        f'"{shorten(cell)}" is not a number; separate the columns by commas'
+        f'"{shorten(cell)}" is not a number; separate all columns by the same sign'
         if re.search("[;\t]", cell)
         else ""
     )
 
 
-def wrong_count(line: str, cells: list[tuple[int, str]] | None, expected: int) -> str:
+def wrong_count(line: TableLine, cells: list[tuple[int, str]] | None, expected: int) -> str:
     """Return the fault of a line with more or fewer cells than columns."""
+    separator = SEPARATORS[line.separator]
+    advice = f"write one line per row, its columns separated by {separator}"
     if cells is None:
-        return "a quotation mark too many; write one line per row, its columns separated by commas"
+        return f"a quotation mark too many; {advice}"
     fact = f"{len(cells)} columns instead of {expected}"
     halves = [
         f"{whole}.{decimals}"
         for (_, whole), (_, decimals) in pairwise(cells)
         if re.fullmatch(r"[+-]?[0-9]+", whole) and re.fullmatch(r"[0-9]+", decimals)
     ]
-    if len(cells) > expected and halves:
+    if line.separator == "," and len(cells) > expected and halves:
         return (
             f"{fact}; if a comma is meant as the decimal point, write a point, as in"
             f" {shorten(halves[-1])}"
         )
-    if len(cells) == 1 and re.search("[;\t]", line):
-        return f"{fact}; separate them by commas"
-    return f"{fact}; write one line per row, its columns separated by commas"
+    if len(cells) == 1 and re.search("[,;\t]", line.text):
+        return f"{fact}; separate them by {separator}"
+    return f"{fact}; {advice}"
 
 
 def _columns(
-    mark: Mark,
-    header: str,
+    file: str,
+    header: TableLine,
     texts: Sequence[str],
     lengths: Sequence[str],
     optional: Sequence[str],
@@ -330,7 +414,7 @@ def _columns(
     messages = []
     names = []
     factors = {}
-    for cell_mark, cell, name, unit in header_cells(mark, header, example):
+    for cell_mark, cell, name, unit in header_cells(file, header, example):
         its_units = units.get(name, LENGTH_UNITS)
         if cell in texts:
             name = cell
@@ -365,36 +449,10 @@ def _columns(
     missing = [name for name in (*texts, *lengths) if name not in (*names, *defaults)]
     if missing:
         messages.append(
-            mark.message(
+            Mark(file, header.number, 1).message(
                 "", f"no column for {listing(missing)}; the first line should be {example}"
             )
         )
     if messages:
         raise ExperimentError(messages)
     return names, factors
-
-
-def split_cells(line: str) -> list[tuple[int, str]] | None:
-    """Return the cells of a line with their columns, from 1; None if a quotation mark has no
-    partner.
-    """
-    cells, start = [], 0
-    while True:
-        match = CELL.match(line, start)
-        if match is None:
-            return None
-        quoted, plain, separator = match.groups()
-        text = plain.strip() if quoted is None else quoted.replace('""', '"')
-        blank = len(match[0]) - len(match[0].lstrip())
-        cells.append((match.start() + (blank if text else 0) + 1, text))
-        if not separator:
-            return cells
-        start = match.end()
-
-
-def headings(text: str) -> set[str]:
-    """Return names of the columns in the first line that is no comment, without their units."""
-    lines = (line for line in text.splitlines() if line.strip() and line[:1] != "#")
-    line = next(lines, "")
-    cells = (cell.strip().strip('"') for cell in re.split("[,;\t]", line))
-    return {re.sub(r"_(?:m|mm|um|µm|nm|in)$", "", cell) for cell in cells}

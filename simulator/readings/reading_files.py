@@ -15,6 +15,7 @@ from ..design.observations.readings import expected_readings
 from ..experiment.readings_section import ReadingsSettings, no_settings
 from ..inputs.extensions import optional_service, service
 from ..inputs.messages import MORE_ERRORS, MOST_MESSAGES, ExperimentError, Message, refused
+from ..inputs.quantities import LENGTH_UNITS
 from ..inputs.settings import hint, listing, number_of
 from ..inputs.spreadsheets import CsvWriter
 from ..inputs.tables import FileRow
@@ -66,7 +67,8 @@ def read_readings(
     tables is detected, or stated by the `settings`, as are the points that co-ordinates refer to.
     The column probe is optional for a single probe, as is a column u, with a unit as in u_um: the
     standard uncertainty of each co-ordinate of a reading, by default that planned or, for an
-    unplanned reading, the machine's repeatability. Influence quantities have further columns. A
+    unplanned reading, the machine's repeatability; u_x, u_y and u_z are those of single
+    co-ordinates. Influence quantities have further columns. A
     reading may occur as often as planned; an unplanned one, once. Without `every_ball`, some balls
     may be unread. `thinned` selects rows and describes omitted ones (`redone`).
 
@@ -81,7 +83,8 @@ def read_readings(
     stated_coordinates = settings.coordinates
     sources = [source] if isinstance(source, Path | GivenText) else list(source)
     messages: list[Message] = []
-    units = {name: unit for kind in design.influences for name, unit in kind.columns.items()}
+    beside_units = {name: unit for kind in design.influences for name, unit in kind.columns.items()}
+    units = dict.fromkeys([f"u_{axis}" for axis in AXES[:d]], LENGTH_UNITS) | beside_units
     empty = AXES[:d] if design.positions.across is not None else ()
 
     def is_possible(x: Array) -> bool:
@@ -93,23 +96,31 @@ def read_readings(
     rows, redone = thinned(table.rows, design) if thinned else (table.rows, ())
     index, unknown = _indices(rows, design)
     lengths = np.array([row.lengths for row in rows])
-    has_uncertainty = not np.isnan(lengths[:, d]).all()
+    coordinates, of_axes = lengths[:, :d], lengths[:, d + 1 : 2 * d + 1]
+    uncertainty = np.where(np.isnan(of_axes), lengths[:, d, None], of_axes)
+    has_uncertainty = not np.isnan(uncertainty).all()
+    # What is not read has none.
+    uncertainty = np.where(np.isnan(coordinates), design.machine.repeatability, uncertainty)
     if has_uncertainty:
         text = "a standard uncertainty must be above zero; correct it, or leave the column out"
-        zero = [row.mark for row in rows if row.lengths[d] <= 0.0]
-        messages += [mark.message("", text) for mark in zero[:MOST_MESSAGES]]
-    for k, name in enumerate(("standard uncertainty", *units), start=d):
-        blank = np.isnan(lengths[:, k])
-        if blank.any() and not blank.all():
+        zero = np.flatnonzero((uncertainty <= 0.0).any(axis=1))[:MOST_MESSAGES].tolist()
+        messages += [rows[i].mark.message("", text) for i in zero]
+    if not np.isnan(of_axes).all() and settings.coordinates == "part":
+        text = "u_x, u_y and u_z are along the machine's axes, and co-ordinates are those of a part"
+        messages.append(rows[0].mark.message("", f"{text}; state one u for all axes"))
+    beside_columns = lengths[:, 2 * d + 1 :].T
+    columns = (uncertainty.sum(axis=1) if has_uncertainty else np.zeros(len(rows)), *beside_columns)
+    for name, column in zip(("standard uncertainty", *beside_units), columns, strict=True):
+        blank = np.isnan(column)
+        if blank.any() and (name not in beside_units or not blank.all()):
             text = f"no {name}, and other rows have one; write it, or leave the column out"
             without = [rows[i].mark for i in np.flatnonzero(blank)[:MOST_MESSAGES].tolist()]
             messages += [mark.message("", text) for mark in without]
     if messages or unknown:
         raise ExperimentError(sorted([*messages, *unknown]))
-    coordinates, stated_uncertainty = lengths[:, :d], lengths[:, d]
     beside = None
     if design.influences:
-        beside = dict(zip(units, lengths[:, d + 1 :].T, strict=True))
+        beside = dict(zip(beside_units, beside_columns, strict=True))
     readings = Readings(index[:, 0], index[:, 1], index[:, 2], np.ones(len(rows), np.int64))
     x = coordinates
     are_scale_readings = settings.coordinates in (None, "scale readings")
@@ -119,12 +130,8 @@ def read_readings(
     x = _where_not_read(rows, x, design, readings)
     if settings.coordinates != "part":
         _refuse_far_outside(rows, x if empty else coordinates, design)
-    uncertainty = (
-        np.repeat(stated_uncertainty[:, None], d, axis=1)
-        if has_uncertainty
-        else _planned_uncertainty(design, readings)
-    )
-    readings = replace(readings, uncertainty=uncertainty, beside=beside)
+    weights = uncertainty if has_uncertainty else _planned_uncertainty(design, readings)
+    readings = replace(readings, uncertainty=weights, beside=beside)
     readings = in_sequence(readings, design.influences)
     marks = tuple(row.mark for row in rows)
     swapped = ()
@@ -141,7 +148,7 @@ def read_readings(
     table_notes, doubt = (*table.notes, *swapped), tuple[str, ...]()
     checks = optional_service("ReadingChecks")
     if checks is not None:
-        uncertainties = stated_uncertainty if has_uncertainty else None
+        uncertainties = uncertainty.max(axis=1) if has_uncertainty else None
         doubt += checks.doubts_about_table(
             design, readings, coordinates, uncertainties, settings, rows[0].mark
         )

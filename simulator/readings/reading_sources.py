@@ -20,7 +20,7 @@ from ..inputs.extensions import optional_service
 from ..inputs.messages import ExperimentError, Message, refused
 from ..inputs.quantities import Units
 from ..inputs.settings import number_of
-from ..inputs.tables import FileRow, header_names, header_texts, read_table
+from ..inputs.tables import FileRow, header_line, header_names, header_texts, read_table
 from ..inputs.yamltree import GivenText, read_bytes
 from ..machines.protocol import Array
 
@@ -181,7 +181,8 @@ def is_plain(table: SourceText, settings: ReadingsSettings, axes: Sequence[str])
     """Return whether a table may be a plain CSV file; stated columns or formats exclude it."""
     layout = (settings.columns, settings.separator, settings.decimal, settings.header)
     has_axes = table.encoding in ("", "UTF-8") and header_names(table.text) & set(axes)
-    return bool(has_axes) and layout == (None,) * 4 and not settings.fill_down
+    is_usual = layout == (None,) * 4 and not settings.fill_down
+    return bool(has_axes) and is_usual and header_line(table.text).separator == ","
 
 
 def _has_plain_columns(
@@ -210,7 +211,9 @@ def plain_rows(
     try:
         return tuple(
             read_table(
-                table.text, list(ROLES), axes, further, errors, defaults, np.nan, units, empty
+                *(table.text, list(ROLES), axes, further, errors, defaults, np.nan, units, empty),
+                # What a comma means in readings is asked where it may be a sign of thousands.
+                decimal=".",
             )
         )
     except ExperimentError as error:

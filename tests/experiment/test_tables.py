@@ -27,7 +27,10 @@ def test_units_quotes_and_comments(table: Path) -> None:
     [
         ("", [":1:1: the file is empty; its first line should be ball,x_mm"]),
         ("ball,x_mm\n", [":1:1: no rows below the names of the columns; add at least one"]),
-        ("ball;x_mm\na;1\n", [":1:1: the columns are not separated by commas; write ball,x_mm"]),
+        ("ball|x_mm\na|1\n", [
+            ':1:1: unknown column "ball|x_mm"; did you mean "x_mm"?',
+            ":1:1: no column for ball, x; the first line should be ball,x_mm",
+        ]),
         ("ball,x\na,1\n", [':1:6: the column "x" has no unit; write for example x_mm']),
         ("ball,x_MM\na,1\n", [':1:6: unknown unit in the column "x_MM"; did you mean "mm"?']),
         ("bal,x_mm\na,1\n", [

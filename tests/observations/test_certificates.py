@@ -216,6 +216,123 @@ def test_a_result_is_chosen_by_name_id_or_kind(tmp_path: Path) -> None:
     assert wording.NO_RESULT_IS_CALLED in refusal(tmp_path, text, result="Later")
 
 
+NOMINAL, ERRORS_UM = ["600"] * 4, [f"{1e3 * (float(v) - 600):.4f}" for v in MM]
+# What a list of the good practice's form has: reference type, values, unit, uncertainties in it.
+NAMED = dcc.quantity(CHARACTERS.format(names=" ".join(LABELS)))
+MILLI, MICRO = "\\milli\\metre", "\\micro\\metre"
+NOMINALS = ("basic_nominalValue", NOMINAL, MILLI, [])
+MEASURED = ("basic_measuredValue", MM, MILLI, IN_MM)
+UNSURE = ("basic_measuredValue", MM, MILLI, [])
+ERRORS = ("basic_measurementError", ERRORS_UM, MICRO, U)
+ERRORS_LATER = ("basic_measurementError_error x_last", ERRORS_UM, MICRO, U)
+REFERENCES = ("basic_referenceValue", NOMINAL, MILLI, IN_MM)
+RELATIVE_ERRORS = ("basic_measurementError", ["1e-6"] * 4, "\\one", [])
+GRADES = ("basic_conformity", ["1"] * 4, "\\one", [])
+
+Side = tuple[str, list[str], str, list[str]]
+
+
+def side_by_side(*sides: Side) -> str:
+    """Quantities of a list, told apart by their reference types; texts beside them name values."""
+    data = "".join(
+        dcc.quantity(dcc.spaced([], values, unit, u)).replace(
+            "<dcc:quantity>", f'<dcc:quantity refType="{kind}">'
+        )
+        for kind, values, unit, u in sides
+    )
+    return dcc.certificate(dcc.result(f"<dcc:list>{NAMED}{data}</dcc:list>"))
+
+
+SIDES_TOLD = {
+    "nominal, measured": ((NOMINALS, MEASURED), "(measured), k = 2"),
+    "nominal, measured, error": ((NOMINALS, MEASURED, ERRORS), "(measured), k = 2"),
+    "reference, measured, error": ((REFERENCES, MEASURED, ERRORS), "(measured), k = 2"),
+    "in another order": ((GRADES, ERRORS, MEASURED, NOMINALS), "(measured), k = 2"),
+    "a relative error": ((NOMINALS, MEASURED, RELATIVE_ERRORS), "(measured), k = 2"),
+    "the error's uncertainty": (
+        (NOMINALS, UNSURE, ERRORS),
+        "(measured, with uncertainties of errors), k = 2",
+    ),
+    "nominal and error": ((NOMINALS, ERRORS), "(nominal plus error), k = 2"),
+    "error and nominal": ((ERRORS_LATER, NOMINALS), "(nominal plus error), k = 2"),
+    "reference and error": ((REFERENCES, ERRORS), "(reference plus error), k = 2"),
+    "measured alone": ((MEASURED,), "(measured), k = 2"),
+    "two lists": ((("x_first", MM, MILLI, IN_MM), GRADES), "4 values, k = 2"),
+}
+
+
+@pytest.mark.parametrize("name", SIDES_TOLD)
+def test_of_quantities_side_by_side_the_measured_ones_are_read(tmp_path: Path, name: str) -> None:
+    sides, expected = SIDES_TOLD[name]
+    one = found(tmp_path, side_by_side(*sides))
+    np.testing.assert_allclose(one.values, VALUES, rtol=0, atol=1e-12)
+    np.testing.assert_allclose(one.standard_uncertainties, STANDARD, rtol=1e-9)
+    (note,) = written(tmp_path, item(values="c.xml")).notes
+    assert expected in note
+
+
+def test_the_covariance_of_errors_is_that_of_lengths(tmp_path: Path) -> None:
+    region = dcc.region(MATRIX, SQUARED, "ellipsoidalRegionXMLList")
+    text = side_by_side(NOMINALS, ERRORS)
+    at = text.rindex("</si:realListXMLList>")
+    one = found(tmp_path, text[:at] + region + text[at:])
+    np.testing.assert_allclose(covariance_of(one), COVARIANCE, rtol=0, atol=1e-26)
+
+
+def test_lengths_with_each_quantity_by_itself(tmp_path: Path) -> None:
+    """A list for each distance, which names it, in place of one list of each quantity."""
+    data = "".join(
+        f"<dcc:list>{dcc.named(name)}"
+        + "".join(
+            dcc.quantity(content).replace("<dcc:quantity>", f'<dcc:quantity refType="{kind}">')
+            for kind, content in (
+                ("basic_nominalValue", dcc.real("", "600", MILLI)),
+                ("basic_measuredValue", dcc.real("", mm, MILLI, dcc.expanded(u))),
+            )
+        )
+        + "</dcc:list>"
+        for name, mm, u in zip(LABELS, MM, IN_MM, strict=True)
+    )
+    one = found(tmp_path, dcc.certificate(dcc.result(data)))
+    np.testing.assert_allclose(one.values, VALUES, rtol=1e-15)
+
+
+def test_nominal_values_never_stand_in_for_unread_ones(tmp_path: Path) -> None:
+    """A measured value or an error in a unit that is none of length."""
+    odd = ("basic_measuredValue", MM, "\\kelvin", IN_MM)
+    assert "is no length" in problems_of(tmp_path, side_by_side(NOMINALS, odd))
+    assert "is no length" in problems_of(tmp_path, side_by_side(NOMINALS, RELATIVE_ERRORS))
+    wrong = ("basic_measuredValue", ["six", *MM[1:]], MILLI, IN_MM)
+    assert '"six" is not a number' in problems_of(tmp_path, side_by_side(NOMINALS, wrong))
+
+
+def problems_of(folder: Path, text: str) -> str:
+    with pytest.raises(ExperimentError) as caught:
+        found(folder, text, standard_uncertainty="1 um")
+    return str(caught.value)
+
+
+def test_other_quantities_are_chosen_by_a_key(tmp_path: Path) -> None:
+    other = ("x_before", [f"{float(v) + 1:.4f}" for v in MM], MILLI, IN_MM)
+    text = side_by_side(("x_after", MM, MILLI, IN_MM), other, REFERENCES)
+    words = refusal(tmp_path, text)
+    assert "r1c1–r1c3 has several values, in lines " in words.splitlines()[0]
+    assert '"x_after", "x_before", "basic_referenceValue"' in words
+    for name, offset in (("x_after", 0.0), ("x_before", 1e-3)):
+        one = found(tmp_path, text, quantity=name)
+        np.testing.assert_allclose(one.values, VALUES + offset, rtol=1e-14)
+    nominal = found(tmp_path, side_by_side(NOMINALS, MEASURED), quantity="basic_nominalValue",
+                    standard_uncertainty="1 um")  # fmt: skip
+    np.testing.assert_array_equal(nominal.values, 0.6)
+    # Nominal, reference and error: of which of the two it is the error is not stated.
+    several = side_by_side(NOMINALS, REFERENCES, ERRORS)
+    assert "choose those of one quantity" in refusal(tmp_path, several)
+    wrong = refusal(tmp_path, text, quantity="x_later")
+    assert 'no quantity is called "x_later"' in wrong and '"x_after", "x_before"' in wrong
+    with pytest.raises(ExperimentError, match="applies only to values in a DCC"):
+        written(tmp_path, item(standard_uncertainty="1 um", quantity="x_after"))
+
+
 def refusal(folder: Path, text: str, **more: Any) -> str:
     """The one message about a certificate."""
     with pytest.raises(ExperimentError) as caught:

@@ -38,7 +38,7 @@ from ballplate.simulator.inputs import (
     Message,
     QuantityError,
     format_path,
-    headings,
+    header_names,
     hint,
     length_text,
     listing,
@@ -239,7 +239,7 @@ def read_certificate(path: Path | GivenText, experiment: Experiment) -> Experime
             continue
         lines[k] = row
         try:
-            values[k] = PARSERS[values_known[k].unit](text)
+            values[k] = PARSERS[values_known[k].unit](text.replace(",", "."))
         except QuantityError as error:
             problems.append(row.mark.message("", str(error)))
             continue
@@ -303,7 +303,7 @@ def _unknown(row: FileRow, values_known: list[CertifiedValue]) -> str:
 
 def is_calibration_table(source: GivenText) -> bool:
     """True if a table has the certified values of one calibration, which name no item."""
-    names = headings(source.text)
+    names = header_names(source)
     of_pairs = names >= {"first", "second", "value"}
     return "item" not in names and (of_pairs or names >= {"ball", "x", "y"})
 

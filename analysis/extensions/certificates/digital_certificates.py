@@ -51,10 +51,14 @@ UNCERTAINTIES = (
 REGIONS = ("ellipsoidalRegion", "rectangularRegion", "measurementUncertaintyMultivariate")
 
 
+NO_LENGTH = "is no length"
+
+
 @dataclass(frozen=True)
 class DigitalValue:
-    """A length: what it may be called, by itself and by what it stands in, its value and standard
-    uncertainty (NaN without one) in metres, and faults of it, empty if nothing is.
+    """A length: what it may be called, by itself and by what it stands in (reference types too),
+    its value and standard uncertainty (NaN without one) in metres, and faults of it, empty if
+    nothing is.
 
     `factor` is the coverage factor that its uncertainty was divided by, 1 for a standard one.
     """
@@ -66,6 +70,11 @@ class DigitalValue:
     uncertainty: float
     factor: float
     problem: str = ""
+
+    @property
+    def is_length(self) -> bool:
+        """True if its unit is one of length."""
+        return not self.problem.startswith(NO_LENGTH)
 
 
 @dataclass(frozen=True, eq=False)
@@ -204,7 +213,8 @@ def _parts(
                     inner_part.text.split() for inner_part in child.all("quantity", "charsXMLList")
                 ]
                 beside = (*labels, *map(tuple, texts))
-            inner = list(_parts(child, (*contexts, *_names(child)), beside))
+            types = child.attributes.get("refType", "").split()
+            inner = list(_parts(child, (*contexts, *_names(child), *types), beside))
             if child.first("relativeUncertainty") is not None:
                 inner = [replace(part, is_relative=True) for part in inner]
             # All parts of a hybrid are one quantity in several units.
@@ -212,7 +222,6 @@ def _parts(
             yield from (in_metres or inner)[:1] if child.name == "hybrid" else inner
 
 
-NO_LENGTH = "is no length"
 RELATIVE = (
     "has only a relative uncertainty, which may be standard or expanded;"
     " state standard uncertainties in a CSV file"

@@ -333,6 +333,9 @@ class _Reader:
             names = quoted(headings.unused)
             warm = any("temp" in cell.casefold() for cell in headings.unused)
             parts.append(f"not used: {names}{f' ({TEMPERATURES})' if warm else ''}")
+        if form.others:
+            counts = (f'"{shorten(name)}" ({count})' for name, count in form.others)
+            parts.append(f"rows of no axis, left out: {listing(counts, 8)}")
         if form.empty:
             parts.append(f"without co-ordinates, left out: line{_numbers(form.empty)}")
         return f"{self.source}: read as: {', '.join(parts)}"

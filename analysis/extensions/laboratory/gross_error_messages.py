@@ -14,7 +14,13 @@ from ballplate.simulator.machines import Array
 from .common_causes import common_cause, mistaken_positions, words_of_mistaken
 from .gross_errors import WrongPosition, WrongReading, find_gross_errors
 from .length_ratios import LengthRatio, doubtful_lengths
+from .plate_sizes import words_of_size
 from .wrong_offsets import only_position, wrong_offsets
+
+COMMON_CAUSE = (
+    "the readings of most positions do not fit; all do {}: correct the columns, the unit or the"
+    " readings section; otherwise correct the names of balls"
+)
 
 
 def refuse_gross_errors(
@@ -28,6 +34,9 @@ def refuse_gross_errors(
     :raises ExperimentError: gross errors; names all of them.
     """
     positions, readings = find_gross_errors(design, x)
+    if (positions or readings) and (size := words_of_size(design, x)):
+        cause = common_cause(design, x, settings)
+        raise marks[0].refused(COMMON_CAUSE.format(cause) if cause else size)
     mistakes = wrong_offsets(design, design.readings, x) if positions or readings else []
     if mistakes:
         causes = ", or if ".join(mistake.words(design) for mistake in mistakes)
@@ -48,11 +57,7 @@ def refuse_gross_errors(
     if 2 * len(positions) > len(np.unique(design.readings.position)) > 1:
         cause = common_cause(design, x, settings)
         if cause:
-            text = (
-                f"the readings of most positions do not fit; all do {cause}: correct the columns,"
-                " the unit or the readings section; otherwise correct the names of balls"
-            )
-            raise marks[0].refused(text)
+            raise marks[0].refused(COMMON_CAUSE.format(cause))
     messages = [_of_position(design, wrong, marks) for wrong in positions]
     handled = set()
     for wrong in readings:

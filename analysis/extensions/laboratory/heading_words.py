@@ -147,7 +147,7 @@ def unit_of_further(cell: str, name: str) -> str | None:
     )
     if match is None or folded(match[1]) not in names:
         return None
-    return match[2].replace("°", "deg")
+    return plain_unit(match[2]).replace("°", "deg")
 
 
 def is_clock(unit: str, units: Mapping[str, Fraction]) -> bool:

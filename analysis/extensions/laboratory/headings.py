@@ -146,6 +146,9 @@ def read_headings(cells: Sequence[str], words: Vocabulary) -> Headings | None:
             if (unit := unit_of_further(cell, name)) is not None
         }
         if (i := _only(name, list(units_found), cells)) is not None:
+            if name.startswith("u_") and cells[i].lstrip().startswith("U"):
+                text = f'"{shorten(cells[i])}" does not say which uncertainty it is; call it'
+                raise HeadingError(f"{text} {name}_um if it is a standard one, or something else")
             unit = units_found[i]
             is_time = is_clock(unit, units)
             if not is_time and unit not in units:

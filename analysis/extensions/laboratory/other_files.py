@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 
-from ballplate.simulator.inputs import GivenText, headings
+from ballplate.simulator.inputs import GivenText, header_names
 
 from .formats.registered import recognised
 from .formats.report import Format
@@ -15,7 +15,7 @@ CERTIFICATE = frozenset(("item", "first", "second", "value"))
 
 def what_it_is(source: GivenText) -> str:
     """Return a description of a file without readings, and its use; empty if unknown."""
-    names = headings(source.text)
+    names = header_names(source)
     if names >= POINTS:
         return (
             "this is a table of the nominal centres of balls, as ballplate sheet --points writes"

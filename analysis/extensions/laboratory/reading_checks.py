@@ -22,6 +22,7 @@ from .gross_error_messages import (
 )
 from .implausible_temperatures import doubts_about_temperatures
 from .offsets_applied import doubt_about_offsets, said_of
+from .plate_sizes import words_of_size
 
 
 def doubts_about_table(
@@ -54,6 +55,7 @@ def doubts_about_readings(design: Design, x: Array, marks: Sequence[Mark]) -> tu
     return (
         *doubts_about_poses(design, x),
         *doubts_about_lengths(design, x),
+        *filter(None, (words_of_size(design, x),)),
         *of_volume,
         *doubts_about_temperatures(design, marks),
     )

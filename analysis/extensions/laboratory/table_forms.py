@@ -60,7 +60,8 @@ class Form:
     `units` are those of a line of units below the headings, by place. `empty` are the lines without
     any co-ordinate, `wrong` what keeps rows from being read so, by line. `above` are the lines
     above the headings, `blank` the lines and columns of names without an entry. `filled` counts
-    names that are those above, `between` says what is between thousands.
+    names that are those above, `between` says what is between thousands, `others` counts rows of
+    other characteristics than axes.
     """
 
     separator: str
@@ -75,6 +76,7 @@ class Form:
     blank: tuple[tuple[int, int], ...]
     filled: int
     between: str = ""
+    others: tuple[tuple[str, int], ...] = ()
 
     @cached_property
     def units_of_rows(self) -> frozenset[str]:
@@ -259,7 +261,7 @@ def _form(cells_below: Form, decimal: str, words: Vocabulary, is_stated: bool) -
     """
     headings = cells_below.headings
     places = headings.axes
-    joined, wrong_axes = joined_axes(cells_below.rows, headings, words.axes)
+    joined, wrong_axes, others = joined_axes(cells_below.rows, headings, words.axes)
     joined, between = without_thousands(joined, places, DECIMALS[decimal], is_stated)
     rows: list[Row] = []
     empty: list[int] = []
@@ -280,7 +282,13 @@ def _form(cells_below: Form, decimal: str, words: Vocabulary, is_stated: bool) -
     wrong += [(line_number, text) for line_number in remarks if line_number < last]
     empty = sorted((*empty, *(line_number for line_number in remarks if line_number > last)))
     return replace(
-        cells_below, decimal=decimal, rows=rows, empty=empty, wrong=sorted(wrong), between=between
+        cells_below,
+        decimal=decimal,
+        rows=rows,
+        empty=empty,
+        wrong=sorted(wrong),
+        between=between,
+        others=tuple(others.items()),
     )
 
 

@@ -1,4 +1,4 @@
-"""`ballplate map --curves`: the error functions of a fitted machine, with their bands."""
+"""`ballplate map --curves`: the error functions of a machine, with their bands."""
 
 from __future__ import annotations
 
@@ -24,8 +24,8 @@ if TYPE_CHECKING:
 
 DESCRIPTION = (
     "Print every error function of a map file (fit -o) along its axis with its expanded"
-    " uncertainty,"
-    " the squareness errors as angles, and other numbers of the error model. Errors are the"
+    " uncertainty, or of a machine file with its random part, the squareness errors as angles, and"
+    " other numbers of the error model. Errors are the"
     " position of the tip minus the position that the scales indicate."
 )
 
@@ -34,7 +34,7 @@ MOST_POSITIONS = 10_000
 
 
 def add_options(parser: ArgumentParser) -> None:
-    parser.add_argument("file", metavar="MAP", type=Path, help=FITTED)
+    parser.add_argument("file", metavar="FILE", type=Path, help=f"machine file, {FITTED}")
     parser.add_argument(
         "--error",
         metavar="NAME",
@@ -60,12 +60,16 @@ def _points(text: str) -> int:
 
 def run(options: Namespace) -> int:
     """Print the curves."""
-    from .error_curves_result import error_curves
+    from .error_curves_result import error_curves, machine_curves
     from .error_functions import POSITIONS
+    from .fit_files import kind_of_file
 
-    fitted = fitted_map(options.file)
+    file, chosen = options.file, (options.error, options.points or POSITIONS)
     try:
-        curves = error_curves(fitted, options.file.stem, options.error, options.points or POSITIONS)
+        if kind_of_file(file) == "machine":
+            curves = machine_curves(file, *chosen)
+        else:
+            curves = error_curves(fitted_map(file), file.stem, *chosen)
     except ValueError as error:
         raise UsageError(error) from None
     show_errors(options, curves)

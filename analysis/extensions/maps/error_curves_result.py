@@ -1,10 +1,10 @@
-"""Error functions of a fitted machine with their bands, as they show themselves."""
+"""Error functions of a machine, fitted or described by a file, as they show themselves."""
 
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from pathlib import Path
 
 import numpy as np
 from ballplate.presentation import (
@@ -18,7 +18,9 @@ from ballplate.presentation import (
     table_csv,
     table_lines,
 )
+from ballplate.simulator.experiment import load_machine
 from ballplate.simulator.geometry import AXIS_NAMES
+from ballplate.simulator.inputs import Message
 from ballplate.simulator.maps import FittedMap
 
 from .error_functions import (
@@ -27,12 +29,12 @@ from .error_functions import (
     EstimatedNumber,
     FunctionCurve,
     error_functions,
+    stated_functions,
 )
 from .fitted_errors_result import map_cautions
 from .fitted_tables import UNDETERMINED, expanded, head_lines, map_data
-
-if TYPE_CHECKING:
-    pass
+from .volumetric_errors import Volumetric
+from .volumetric_tables import CONVENTION
 
 ARCSECOND = np.pi / 180.0 / 3600.0
 
@@ -42,20 +44,29 @@ MOST_LINES = 12
 
 @dataclass(frozen=True, eq=False, repr=False)
 class ErrorCurves(Result):
-    """The error functions of a fitted machine, its squareness errors and its other numbers."""
+    """The error functions of a machine, its squareness errors and its other numbers.
+
+    `band` names what stands beside values: U, expanded uncertainties of the estimates of a map, of
+    the coverage factor `k`, or standard deviations of the random part that a machine file states.
+    `head` are lines of text about the machine, and `about` is the same as data.
+    """
 
     label: str
-    fitted: FittedMap
+    name: str
     functions: ErrorFunctions
+    k: float
+    band: str
+    head: tuple[str, ...]
+    about: Data
+    cautions: tuple[str, ...]
 
     @property
     def title(self) -> str:
-        return self.fitted.title
+        return self.name
 
     @property
-    def k(self) -> float:
-        """The coverage factor of expanded uncertainties."""
-        return self.fitted.coverage_factor
+    def warnings(self) -> tuple[str, ...]:
+        return self.cautions
 
     def headline(self) -> str:
         names = dict.fromkeys(curve.name for curve in self.functions.curves)
@@ -65,18 +76,19 @@ class ErrorCurves(Result):
         return f"{words}, {len(open_)} functions undetermined" if open_ else words
 
     def lines(self) -> list[str]:
-        functions, lines = self.functions, head_lines(self.label, self.fitted)
+        functions, lines = self.functions, [*self.head]
         lines[-1] += ", at each position separately"
         if functions.curves:
-            lines += ["", *_curve_table(functions.curves, self.k)]
+            lines += ["", *_curve_table(functions.curves, self.k, self.band)]
         if functions.squareness:
-            lines += ["", *_angle_table(functions.squareness, self.k)]
+            lines += ["", *_angle_table(functions.squareness, self.k, self.band)]
         if functions.numbers:
-            lines += ["", *_number_table(functions.numbers, self.k)]
+            lines += ["", *_number_table(functions.numbers, self.k, self.band)]
         return lines
 
     def data(self) -> Data:
-        data = map_data(self.label, self.fitted)
+        key = "expanded_uncertainty" if self.band == "U" else self.band
+        data = {**self.about}
         data["functions"] = [
             {
                 "error": curve.name,
@@ -85,19 +97,19 @@ class ErrorCurves(Result):
                 "axis": None if curve.axis is None else AXIS_NAMES[curve.axis],
                 "position": curve.positions,
                 "value": curve.values,
-                "expanded_uncertainty": self.k * curve.uncertainties,
+                key: self.k * curve.uncertainties,
             }
             for curve in self.functions.curves
         ]
-        for key in ("squareness", "numbers"):
-            data[key] = [
+        for part in ("squareness", "numbers"):
+            data[part] = [
                 {
                     "error": error.name,
                     **picked(error, "meaning", "unit", "value"),
-                    "expanded_uncertainty": self.k * error.standard_uncertainty,
+                    key: self.k * error.standard_uncertainty,
                     "source": error.source,
                 }
-                for error in getattr(self.functions, key)
+                for error in getattr(self.functions, part)
             ]
         return data | {"warnings": self.warnings}
 
@@ -137,15 +149,11 @@ class ErrorCurves(Result):
                 row["position"] * (1.0 if row["error"] in fractions else 1e3)
             ),
             "value": lambda row: 1e6 * row["value"],
-            "U": lambda row: 1e6 * row["U"],
+            self.band: lambda row: 1e6 * row["U"],
             "k": lambda row: f"{row['k']:g}",
             "unit": lambda row: ascii_units(SHOWN[row["unit"]]),
         }
         return table_csv(columns, self.rows())
-
-    @property
-    def warnings(self) -> tuple[str, ...]:
-        return map_cautions(self.fitted)
 
 
 def error_curves(
@@ -155,7 +163,31 @@ def error_curves(
 
     :raises ValueError: there is none of a name.
     """
-    return ErrorCurves(label, fitted, error_functions(fitted, names, positions))
+    functions = error_functions(fitted, names, positions)
+    head, cautions = tuple(head_lines(label, fitted)), map_cautions(fitted)
+    about = map_data(label, fitted)
+    return ErrorCurves(
+        *(label, fitted.title, functions, fitted.coverage_factor, "U", head, about, cautions)
+    )
+
+
+def machine_curves(
+    file: Path, names: Collection[str] = (), positions: int = POSITIONS
+) -> ErrorCurves:
+    """Return the error functions that a machine file states, at its reference point, with the
+    standard deviations of their random parts.
+
+    :raises ExperimentError: the file is wrong.
+    :raises ValueError: there is none of a name.
+    """
+    doubts: list[Message] = []
+    built = Volumetric(load_machine(file, doubts))
+    title, functions = built.machine.title, stated_functions(built, names, positions)
+    head = (f"{file.stem}: {title}", CONVENTION, "random: one standard deviation")
+    about = {"machine": title, "convention": CONVENTION}
+    return ErrorCurves(
+        file.stem, title, functions, 1.0, "random", head, about, tuple(map(str, doubts))
+    )
 
 
 def _row(
@@ -165,9 +197,10 @@ def _row(
     return dict(zip(keys, (name, line, position, value, u, k, unit), strict=True))
 
 
-def _curve_table(curves: Sequence[FunctionCurve], k: float) -> list[str]:
-    """Return one row per curve: range of positions, least and largest value, largest U."""
-    heads = ["error", "", "along", "from, mm", "to, mm", "least", "largest", "largest U", "unit"]
+def _curve_table(curves: Sequence[FunctionCurve], k: float, band: str) -> list[str]:
+    """Return one row per curve: range of positions, least and largest value, largest band."""
+    heads = ["error", "", "along", "from, mm", "to, mm", "least", "largest"]
+    heads += [f"largest {band}", "unit"]
     rows, line_counts, omitted = [heads], dict[str, int](), 0
     for curve in curves:
         line_counts[curve.name] = line_counts.get(curve.name, 0) + 1
@@ -195,26 +228,26 @@ def _curve_table(curves: Sequence[FunctionCurve], k: float) -> list[str]:
     return [*aligned(rows, right), *more]
 
 
-def _angle_table(numbers: Sequence[EstimatedNumber], k: float) -> list[str]:
+def _angle_table(numbers: Sequence[EstimatedNumber], k: float, band: str) -> list[str]:
     """Squareness errors as angles in two units."""
     columns = [
         ("squareness", "name"),
         ("", "meaning"),
         ("µrad", ("value", "standard_uncertainty")),
-        ("U", (lambda estimate: k * estimate.standard_uncertainty, expanded)),
+        (band, (lambda estimate: k * estimate.standard_uncertainty, expanded)),
         ("arcsec", ("value", "standard_uncertainty")),
-        ("U", (lambda estimate: k * estimate.standard_uncertainty / (1e6 * ARCSECOND), expanded)),
+        (band, (lambda estimate: k * estimate.standard_uncertainty / (1e6 * ARCSECOND), expanded)),
         ("", "source"),
     ]
     return table_lines(columns, numbers, unknown=UNDETERMINED)
 
 
-def _number_table(numbers: Sequence[EstimatedNumber], k: float) -> list[str]:
+def _number_table(numbers: Sequence[EstimatedNumber], k: float, band: str) -> list[str]:
     columns = {
         "error": "name",
         "": "meaning",
         "value": ("value", "standard_uncertainty"),
-        "U": (lambda estimate: k * estimate.standard_uncertainty, expanded),
+        band: (lambda estimate: k * estimate.standard_uncertainty, expanded),
         "unit": "unit",
     }
     return table_lines(columns, numbers, unknown=UNDETERMINED)

@@ -1,22 +1,32 @@
-"""Error functions of a fitted machine along their axes, squareness errors, and other numbers, with
-their uncertainties.
+"""Error functions of a machine along their axes, squareness errors, and other numbers, with the
+uncertainties of a fit or the random parts that a machine file states.
 """
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Collection, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from ballplate.simulator.computing import single_threaded
 from ballplate.simulator.inputs import hint
-from ballplate.simulator.machines import SQUARENESS_ERRORS, Array, HasLines, SquarenessError, Unit
+from ballplate.simulator.machines import (
+    SQUARENESS_ERRORS,
+    Array,
+    HasLines,
+    SquarenessError,
+    Unit,
+    meaning,
+)
 from ballplate.simulator.maps import FittedMap
+
+from .volumetric_errors import Volumetric, along_axes
 
 # Positions along each line.
 POSITIONS = 41
 
 OF_MODEL = "a parameter of the model"
+OF_FILE = "stated, at the reference point"
 OF_ENDS = "from the ends of the volume's edges at its lower corner"
 
 
@@ -82,27 +92,58 @@ def error_functions(
         curves += own_curves
         numbers += [] if own_curves else _numbers(fitted, name)
     own_names = {error.name for error in numbers}
-    square = [error for error in numbers if error.name in SQUARENESS_ERRORS]
-    square += [end for end in _by_ends(fitted) if end.name not in own_names]
-    other_numbers = [error for error in numbers if error.name not in SQUARENESS_ERRORS]
-    known_names = [
-        *functions,
-        *(error.name for error in square),
-        *(error.name for error in other_numbers),
+    numbers += [end for end in _by_ends(fitted) if end.name not in own_names]
+    return _named("map", curves, numbers, names, functions)
+
+
+def stated_functions(
+    built: Volumetric, names: Collection[str] = (), positions: int = POSITIONS
+) -> ErrorFunctions:
+    """Return the errors that a machine file states, zero where only their random part is stated.
+
+    :raises ValueError: there is none of a name.
+    """
+    curves = []
+    for along in along_axes(built.machine, positions):
+        error, none = along.error, np.zeros(len(along.positions))
+        values = none if along.values is None else along.values
+        deviation = none if along.deviation is None else along.deviation
+        description = error.name, meaning(error.name), along.unit, "", error.axis
+        curves.append(FunctionCurve(*description, along.positions, values, deviation))
+    lasting, sizes = built.lasting
+    deviations = dict(zip((field.name for field in lasting.fields), sizes.tolist(), strict=True))
+    numbers = [
+        EstimatedNumber(
+            *(parameter.name, parameter.meaning, parameter.unit, value),
+            deviations.get(parameter.name, 0.0),
+            OF_FILE,
+        )
+        for parameter, value in built.numbers
     ]
+    return _named("machine", curves, numbers, names)
+
+
+def _named(
+    source: str,
+    curves: Sequence[FunctionCurve],
+    numbers: Sequence[EstimatedNumber],
+    names: Collection[str],
+    others: Iterable[str] = (),
+) -> ErrorFunctions:
+    """Return all errors, or those of the names, numbers of squareness separately.
+
+    :raises ValueError: there is none of a name.
+    """
+    every = [*others, *(curve.name for curve in curves), *(error.name for error in numbers)]
+    known = dict.fromkeys(every)
     for name in names:
-        if name not in known_names:
-            raise ValueError(
-                f'the map has no error "{name}"; {hint(name, dict.fromkeys(known_names))}'
-            )
-
-    def chosen(some: Sequence[EstimatedNumber]) -> tuple[EstimatedNumber, ...]:
-        return tuple(error for error in some if not names or error.name in names)
-
+        if name not in known:
+            raise ValueError(f'the {source} has no error "{name}"; {hint(name, known)}')
+    chosen = [error for error in numbers if not names or error.name in names]
     return ErrorFunctions(
         tuple(curve for curve in curves if not names or curve.name in names),
-        chosen(square),
-        chosen(other_numbers),
+        tuple(error for error in chosen if error.name in SQUARENESS_ERRORS),
+        tuple(error for error in chosen if error.name not in SQUARENESS_ERRORS),
     )
 
 

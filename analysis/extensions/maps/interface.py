@@ -169,8 +169,8 @@ def map(
     two points; `plane` the co-ordinate of the axis across it. `points` is their number along a
     line, a table as for the command, or co-ordinates (m, d) in metres. For a map, `probe` names the
     probe, and `tasks` of an experiment add lengths. `draw` is the number of realisations of the
-    random part, or of the covariance of a map, from a `seed`. `budget` prints the contributions of
-    parametric errors, always present in the `budget` of the result.
+    random part, or of the covariance of a map, from a `seed`. `budget` adds the contributions of
+    parametric errors.
 
     >>> import ballplate as bp
     >>> bp.map("designs/park/machines/npl-like.yaml", line="y = 300 mm, z = 200 mm", points=3)
@@ -230,20 +230,26 @@ def curves(
     """Return the error functions of a map, or some of them, at a number of positions along each
     line, with expanded uncertainties; squareness errors as angles; other numbers of the model.
 
-    `fitted` is a fit, its `to_map()`, or the path of a map file.
+    `fitted` is a fit, its `to_map()`, or the path of a map file, or of a machine file, whose errors
+    have standard deviations of their random part.
 
     >>> import ballplate as bp
     >>> bp.curves(bp.fit(bp.quickstart(), bp.simulate(bp.quickstart())).to_map())
     <ErrorCurves of map: 18 error functions, 3 squareness errors>
     """
-    from .error_curves_result import error_curves
+    from ballplate.simulator.experiment import is_map_file
+
+    from .error_curves_result import error_curves, machine_curves
     from .map_files_of_machines import map_of_source
 
     ensure_whole(2, 10_000, points=points)
     names = (errors,) if isinstance(errors, str) else tuple(errors)
     for name in names:
         ensure_type(str, "the name of a parametric error, such as EXX", errors=name)
-    return error_curves(*map_of_source(map_or_path("fitted", fitted)), names, points)
+    source = map_or_path("fitted", fitted)
+    if isinstance(source, Path) and not is_map_file(source):
+        return machine_curves(source, names, points)
+    return error_curves(*map_of_source(source), names, points)
 
 
 def adjust(

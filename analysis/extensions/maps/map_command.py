@@ -57,7 +57,7 @@ def add_options(parser: ArgumentParser) -> None:
     parser.add_argument(
         "--budget",
         action="store_true",
-        help="of a map file: what each parametric error contributes to errors and uncertainties",
+        help="what each parametric error contributes to errors and uncertainties",
     )
     add_picture(
         parser,

@@ -44,9 +44,7 @@ def map_errors(
             raise ValueError("a machine file states its own probe; leave the probe out")
         if tasks:
             raise ValueError("tasks are measured by a map of a fit; leave them out")
-        if with_budget:
-            raise ValueError("a budget is that of a map of a fit; leave it out")
-        return machine_errors(source, asked, draws)
+        return machine_errors(source, asked, draws, with_budget)
     fitted, label = map_of_source(source)
     lengths = [tasks_of_experiment(fitted, task) for task in tasks]
     wanted = reduce(Tasks.beside, lengths) if lengths else None

@@ -7,7 +7,8 @@ parts are standard deviations.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Literal
 
@@ -19,6 +20,7 @@ from ballplate.simulator.machines import (
     Combination,
     KinematicModel,
     MachineDescription,
+    Parameter,
     ParametricError,
     Points,
     PowerSeries,
@@ -36,6 +38,9 @@ from .realisations import Draws, Realisations
 
 # Points of a grid or a line: each takes half a kilobyte.
 MOST_POINTS = 200_000
+
+# The name of random errors that are of no axis.
+PROBING = "probing"
 
 # Points along an axis at which a parametric error is told.
 ALONG = 101
@@ -73,9 +78,12 @@ class LengthErrors:
 
 @dataclass(frozen=True)
 class Volumetric:
-    """A machine with what its errors are computed by, made once."""
+    """A machine with what its errors are computed by, made once; errors other than `only` one are
+    zero.
+    """
 
     machine: MachineDescription
+    only: str = ""
 
     @property
     def volume(self) -> Volume:
@@ -85,7 +93,18 @@ class Volumetric:
     @cached_property
     def truth(self) -> TrueMachine:
         """The systematic errors as an error model."""
-        return true_volumetric(self.machine)
+        truth = true_volumetric(self.machine)
+        return replace(truth, a=truth.a * self._counted(truth.model.parameters))
+
+    def _counted(self, parameters: Sequence[Parameter]) -> Array:
+        return np.array([self.only in ("", one.function) for one in parameters], float)
+
+    @property
+    def errors_by_name(self) -> dict[str, str]:
+        """The meanings of all errors by their names."""
+        random = *self.approach[0].parameters, *self.lasting[0].parameters
+        meanings = {one.function: one.meaning for one in (*self.truth.model.parameters, *random)}
+        return meanings | ({PROBING: "in each co-ordinate"} if self.machine.probing else {})
 
     @cached_property
     def approach(self) -> tuple[VolumetricModel, tuple[float | Points, ...]]:
@@ -130,6 +149,13 @@ class Volumetric:
         )
 
     @property
+    def numbers(self) -> list[tuple[Parameter, float]]:
+        """Errors that are no functions, with their values."""
+        every = zip(self.truth.model.parameters, self.truth.a.tolist(), strict=True)
+        names = {error.name for error in self.machine.errors}
+        return [(parameter, value) for parameter, value in every if parameter.function not in names]
+
+    @property
     def is_random(self) -> bool:
         """True if any error has a random part."""
         return bool(self.approach[1] or len(self.lasting[1]) or self.machine.probing)
@@ -148,11 +174,14 @@ class Volumetric:
             zip(model.chain.functions, deviations, strict=True)
         ):
             columns[:, :, k] *= _deviations(deviation, points[:, function.axis])[:, None]
-        probing = np.broadcast_to(self.machine.probing * np.eye(3), (len(points), 3, 3))
+        columns *= self._counted(model.parameters)
+        size = self.machine.probing * (self.only in ("", PROBING))
+        probing = np.broadcast_to(size * np.eye(3), (len(points), 3, 3))
         lasting, sizes = self.lasting
         return (
             np.concatenate([columns, probing], axis=2),
-            lasting.jacobian(points, np.zeros(len(sizes)), probe) * sizes,
+            lasting.jacobian(points, np.zeros(len(sizes)), probe)
+            * (sizes * self._counted(lasting.parameters)),
         )
 
     def errors(self, points: Array) -> VolumetricErrors:
@@ -230,6 +259,7 @@ class AlongAxis:
     """
 
     error: ParametricError
+    positions: Array
     values: Array | None
     deviation: Array | None
     measured: Points | None
@@ -244,12 +274,14 @@ class AlongAxis:
         return 0.0 if self.values is None else float(np.ptp(self.values))
 
 
-def along_axes(machine: MachineDescription) -> list[AlongAxis]:
-    """All parametric errors that the machine has."""
+def along_axes(machine: MachineDescription, count: int = ALONG) -> list[AlongAxis]:
+    """All parametric errors that the machine has, at a number of positions and the points of
+    tables.
+    """
     functions = reference_functions(machine)
     curves = []
     for error in machine.errors:
-        positions = np.linspace(machine.lower[error.axis], machine.upper[error.axis], ALONG)
+        positions = np.linspace(machine.lower[error.axis], machine.upper[error.axis], count)
         table = error.shape if isinstance(error.shape, Points) else None
         if table is not None:
             positions = np.union1d(
@@ -260,6 +292,7 @@ def along_axes(machine: MachineDescription) -> list[AlongAxis]:
         curves.append(
             AlongAxis(
                 error,
+                positions,
                 functions[error.name].values(t)[:, 0] if error.name in functions else None,
                 None if deviation is None else _deviations(deviation, positions),
                 table,

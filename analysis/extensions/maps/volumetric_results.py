@@ -12,11 +12,14 @@ from ballplate.presentation import (
     MainTable,
     Result,
     given,
+    records,
+    table_lines,
 )
 from ballplate.simulator.experiment import load_machine
 from ballplate.simulator.inputs import Message
 
 from .fitted_tables import realisation_lines
+from .machine_budget import NOTE, machine_budget
 from .map_places import MapPlaces, PlacesAsked, map_places
 from .realisations import Draws, Realisations
 from .volumetric_errors import (
@@ -45,7 +48,8 @@ if TYPE_CHECKING:
 @dataclass(frozen=True, eq=False, repr=False)
 class MachineErrors(Result):
     """Volumetric errors of the machine of a file at `places`: `errors` at points, and those of
-    `lengths`; `realisations` are optional draws of the random part.
+    `lengths`; `realisations` are optional draws of the random part, `budget` the optional columns
+    of what each error contributes.
 
     `doubts` are improbable statements of the file.
     """
@@ -57,6 +61,7 @@ class MachineErrors(Result):
     errors: VolumetricErrors
     lengths: LengthErrors
     realisations: Realisations | None = None
+    budget: Data | None = None
 
     @property
     def title(self) -> str:
@@ -73,7 +78,7 @@ class MachineErrors(Result):
     def lines(self) -> list[str]:
         diagonals = diagonal_lines(self.lengths)
         points = error_lines(self.errors)
-        return [*machine_lines(self.machine), "", *diagonals, "", *points, *self._drawn()]
+        return [*machine_lines(self.machine), "", *diagonals, "", *points, *self._more()]
 
     def data(self) -> Data:
         return {
@@ -82,14 +87,23 @@ class MachineErrors(Result):
                 {"diagonal": k, **row} for k, row in enumerate(length_data(self.lengths), 1)
             ],
             self.places.kind: error_data(self.errors),
-            **given(realisations=self.realisations and self.realisations.to_dict()),
+            **self._more_data(),
         }
 
-    def _drawn(self) -> list[str]:
-        """Return requested realisations as lines of text."""
-        if self.realisations is None:
-            return []
-        return ["", *realisation_lines(self.realisations, self.places.names)]
+    def _more(self) -> list[str]:
+        """Return the budget and realisations, if requested, as lines of text."""
+        lines = []
+        if self.budget is not None:
+            lines += ["", *table_lines(self.budget), NOTE]
+        if self.realisations is not None:
+            lines += ["", *realisation_lines(self.realisations, self.places.names)]
+        return lines
+
+    def _more_data(self) -> Data:
+        """Return the same in metres."""
+        keys = ("error", "meaning", "rms", "random_rms", "length_error", "random_length_error")
+        budget = self.budget and records(**dict(zip(keys, self.budget.values(), strict=True)))
+        return given(realisations=self.realisations and self.realisations.to_dict(), budget=budget)
 
     def columns(self) -> MainTable:
         """One row for each point, in metres."""
@@ -125,22 +139,24 @@ class ErrorsOnLine(MachineErrors):
     """Errors along a line, and that of its length."""
 
     def lines(self) -> list[str]:
-        return [*error_lines(self.errors), length_line(self.lengths), *self._drawn()]
+        return [*error_lines(self.errors), length_line(self.lengths), *self._more()]
 
     def data(self) -> Data:
         return {
             **machine_data(self.machine),
             "length": length_data(self.lengths)[0],
             "line": error_data(self.errors),
-            **given(realisations=self.realisations and self.realisations.to_dict()),
+            **self._more_data(),
         }
 
     def plot(self, path: str | Path | None = None) -> Figure:
         return draw_line(self.errors, path)
 
 
-def machine_errors(file: Path, asked: PlacesAsked, draws: Draws | None = None) -> MachineErrors:
-    """Return errors of a machine file at requested locations.
+def machine_errors(
+    file: Path, asked: PlacesAsked, draws: Draws | None = None, with_budget: bool = False
+) -> MachineErrors:
+    """Return errors of a machine file at requested locations, with the budget if requested.
 
     :raises ExperimentError: the file is wrong.
     :raises ValueError: what does not go together, or is not in the machine.
@@ -160,4 +176,5 @@ def machine_errors(file: Path, asked: PlacesAsked, draws: Draws | None = None) -
         built.errors(places.points),
         built.lengths(places.starts, places.ends),
         None if draws is None else drawn_machine_errors(built, places, draws),
+        machine_budget(built, places) if with_budget else None,
     )

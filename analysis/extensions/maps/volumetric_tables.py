@@ -82,7 +82,7 @@ def machine_lines(built: Volumetric) -> list[str]:
             number(1e6 * value),
             "ppm" if parameter.unit == "1" else SHOWN[parameter.unit],
         ]
-        for parameter, value in _numbers(built)
+        for parameter, value in built.numbers
     ]
     lines += ["", *aligned(other_rows, [False, False, False, True, False])] if other_rows else []
     return [*lines, *(["", RANDOM] if built.is_random else [])]
@@ -121,13 +121,6 @@ def _stated_as(along: AlongAxis) -> str:
 def _meaning_text(parameter: Parameter) -> str:
     is_droop = parameter.name in ("phi1", "phi2")
     return parameter.meaning + (", over the whole axis" if is_droop else "")
-
-
-def _numbers(built: Volumetric) -> list[tuple[Parameter, float]]:
-    """Errors that are no functions, with their values."""
-    every = zip(built.truth.model.parameters, built.truth.a.tolist(), strict=True)
-    names = {error.name for error in built.machine.errors}
-    return [(parameter, value) for parameter, value in every if parameter.function not in names]
 
 
 def diagonal_lines(errors: LengthErrors) -> list[str]:
@@ -236,7 +229,7 @@ def machine_data(built: Volumetric) -> Data:
                 "unit": parameter.unit,
                 "meaning": _meaning_text(parameter),
             }
-            for parameter, value in _numbers(built)
+            for parameter, value in built.numbers
         },
     }
 

@@ -23,6 +23,8 @@ from ballplate.simulator.inputs import (
     Mark,
     Message,
     QuantityError,
+    TableLine,
+    decimal_sign,
     exact_number,
     header_cells,
     hint,
@@ -30,7 +32,6 @@ from ballplate.simulator.inputs import (
     read_number,
     refused,
     shorten,
-    split_cells,
     table_lines,
     wrong_count,
 )
@@ -117,7 +118,7 @@ def read_points(path: Path, x: str | None = None, y: str | None = None) -> Curve
     lines = table_lines(path)
     if not lines:
         raise refused(file, f"the file is empty; its first line should be {EXAMPLE}")
-    header = _Header(Mark(file, lines[0][0], 1), lines[0][1])
+    header = _Header(file, lines[0])
     x_column, y_column, profile = header.choose(x, y)
     wanted = [*([] if x_column is None else [x_column]), y_column, *profile]
     if UNCERTAINTY in header.columns:
@@ -127,18 +128,20 @@ def read_points(path: Path, x: str | None = None, y: str | None = None) -> Curve
                 f"the uncertainty is an {wanted[-1].kind} and {y_column.name} a {y_column.kind};"
                 " correct the unit"
             )
-            raise refused(file, text, line=lines[0][0])
+            raise refused(file, text, line=lines[0].number)
     messages: list[Message] = []
     values: list[list[float]] = []
     names: list[str] = []
     features = []
     normals = []
     names_seen: dict[str, int] = {}
-    for number, line in lines[1:]:
+    decimal = decimal_sign(lines[1:], [header.index(column) for column in wanted])
+    for line in lines[1:]:
+        number = line.number
         if len(messages) >= MOST_MESSAGES or len(values) > MOST_POINTS:
             break
         mark = Mark(file, number, 1)
-        cells = split_cells(line)
+        cells = line.cells()
         if cells is None or len(cells) != len(header.order):
             messages.append(mark.message("", wrong_count(line, cells, len(header.order))))
             continue
@@ -146,7 +149,9 @@ def read_points(path: Path, x: str | None = None, y: str | None = None) -> Curve
         for column in wanted:
             start, cell = cells[header.index(column)]
             place, factor = Mark(file, number, start), header.factors[column.name]
-            row.append(read_number(cell, column.name, factor, place, messages, column.kind))
+            row.append(
+                read_number(cell, column.name, factor, place, messages, column.kind, decimal)
+            )
             if column.name == UNCERTAINTY and row[-1] <= 0:
                 text = f'"{cell}" is not a standard uncertainty; give one above zero'
                 messages.append(place.message("", text))
@@ -170,16 +175,20 @@ def read_points(path: Path, x: str | None = None, y: str | None = None) -> Curve
         names.append(name)
         features.append(cells[header.texts[FEATURE]][1] if FEATURE in header.texts else "")
     if len(messages) >= MOST_MESSAGES:
-        messages.append(Message(file, lines[0][0], 1, "", MORE_ERRORS))
+        messages.append(Message(file, lines[0].number, 1, "", MORE_ERRORS))
     if len(lines) == 1:
         messages.append(
             Message(
-                file, lines[0][0], 1, "", "no rows below the names of the columns; add at least one"
+                file,
+                lines[0].number,
+                1,
+                "",
+                "no rows below the names of the columns; add at least one",
             )
         )
     if len(values) > MOST_POINTS or len(lines) > MOST_ROWS:
         messages.append(
-            Message(file, lines[0][0], 1, "", f"more than {MOST_POINTS} points; leave some out")
+            Message(file, lines[0].number, 1, "", f"more than {MOST_POINTS} points; leave some out")
         )
     if messages:
         raise ExperimentError(messages)
@@ -203,7 +212,7 @@ def _direction(cells: Sequence[str]) -> list[float]:
 
     :raises QuantityError: no numbers, or both zero.
     """
-    parts = [float(exact_number(cell)) for cell in cells]
+    parts = [float(exact_number(cell.replace(",", "."))) for cell in cells]
     length = math.hypot(*parts)
     if not 0 < length < math.inf:
         raise QuantityError(
@@ -249,9 +258,9 @@ def choose_points(points: CurvePoints, text: str, file: str) -> list[int]:
 class _Header:
     """The first line: columns with a unit by their names, and where texts are."""
 
-    def __init__(self, mark: Mark, line: str) -> None:
-        self.mark = mark
-        cells = list(header_cells(mark, line, EXAMPLE))
+    def __init__(self, file: str, line: TableLine) -> None:
+        self.mark = mark = Mark(file, line.number, 1)
+        cells = list(header_cells(file, line, EXAMPLE))
         self.order = [cell for _, cell, _, _ in cells]
         self.columns: dict[str, Column] = {}
         self.factors: dict[str, Fraction] = {}

@@ -11,8 +11,7 @@ import numpy as np
 
 from ...inputs.messages import ExperimentError, Steps
 from ...inputs.settings import shorten
-from ...inputs.tables import FileRow, header_cells, read_table, table_lines
-from ...inputs.yamltree import Mark
+from ...inputs.tables import FileRow, TableLine, header_cells, read_table, table_lines
 from ...machines.protocol import Array
 from ..lookup import References
 
@@ -88,11 +87,10 @@ def is_right_factor(text: str, extra: dict[str, float], columns_of_row: list[str
     return text == NO_FACTOR or any(not math.isnan(extra[name]) for name in names)
 
 
-def _refuse_unclear(lines: list[tuple[int, str]], file: str) -> None:
+def _refuse_unclear(lines: list[TableLine], file: str) -> None:
     if not lines:
         return
-    mark = Mark(file, lines[0][0], 1)
-    for place, cell, _, unit in header_cells(mark, lines[0][1], "ball_1,ball_2,distance_mm"):
+    for place, cell, _, unit in header_cells(file, lines[0], "ball_1,ball_2,distance_mm"):
         if UNCLEAR.fullmatch(cell):
             text = (
                 f'"{shorten(cell)}" does not say which uncertainty it is; call it'
@@ -105,7 +103,7 @@ def _factor(text: str, common: float | None) -> float | None:
     if text == NO_FACTOR:
         return common
     try:
-        return float(text)
+        return float(text.replace(",", "."))
     except ValueError:
         return math.nan
 

@@ -44,6 +44,13 @@ class CertificateSettings(Settings):
     result: Text | None = Field(
         None, description="name, id or refType of the result of a DCC (XML) that is meant"
     )
+    quantity: Text | None = Field(
+        None,
+        description=(
+            "name, id or refType of the quantity of a DCC (XML) that is meant, such as"
+            " basic_referenceValue; default: measured values, or nominal ones plus errors"
+        ),
+    )
     coverage_factor: float | None = Field(
         None, gt=0, description="k of the expanded uncertainties of a CSV file without a column k"
     )
@@ -110,6 +117,7 @@ def check_keys(settings: Any, steps: Steps, references: References) -> bool:
     digital = is_digital(settings.values)
     for key, fits, instead in (
         ("result", digital, "applies only to values in a DCC (XML)"),
+        ("quantity", digital, "applies only to values in a DCC (XML)"),
         ("coverage_factor", of_file and not digital, "applies only to values in a CSV file"),
         *((key, not digital, OWN_COVARIANCE) for key in JOINT_KEYS),
     ):

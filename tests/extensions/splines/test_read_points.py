@@ -95,7 +95,7 @@ def test_rows_with_mistakes_are_told_all_at_once(write: Path) -> None:
             None,
             "data.csv: the file is empty; its first line should be position_mm,error_um",
         ),
-        ("position_mm;error_um\n", None, None, "the columns are not separated by commas"),
+        ("position_mm|error_um\n", None, None, "there is an error but no abscissa"),
         (
             "position,error_um\n1,2\n",
             None,
@@ -136,8 +136,8 @@ def test_files_that_cannot_be_used(
     assert len(found) == 1 and message in found[0]
 
 
-def test_decimal_commas_and_semicolons_are_told(write: Path) -> None:
-    assert told(write, 'position_mm,error_um\n10,2\n30,4,11\n40,"5,3"\n50;6\n60,7;8\n') == [
+def test_decimals_and_separators_of_two_kinds_are_told(write: Path) -> None:
+    assert told(write, 'position_mm,error_um\n10,2.0\n30,4,11\n40,"5,3"\n50;6\n60,7;8\n') == [
         (wording.COLUMNS_INSTEAD_OF_IF_A_COMMA),
         'data.csv:4:4: "5,3" has a decimal comma; write 5.3',
         wording.COLUMNS_INSTEAD_OF_SEPARATE_THEM,

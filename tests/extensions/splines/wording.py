@@ -27,7 +27,7 @@ IS_BEYOND_WHAT_CAN_BE_COMPUTED = (
     'data.csv:7:7: "1e30" is beyond what can be computed with; write 0, or a length of '
     "1e-18 m to 1e+06 m"
 )
-IS_NOT_A = 'data.csv:6:4: "7;8" is not a number; separate the columns by commas'
+IS_NOT_A = 'data.csv:6:4: "7;8" is not a number; separate all columns by the same sign'
 IS_NOT_A_NUMBER = 'data.csv:3:5: "x" is not a number; write for example "500.0003"'
 IS_NOT_A_NUMBER_WRITE = 'data.csv:3:7: "a" is not a number; write for example "500.0003"'
 IS_NOT_A_STANDARD = 'data.csv:6:7: "0" is not a standard uncertainty; give one above zero'
