@@ -114,7 +114,7 @@ class ImportedReadings:
 @dataclass(frozen=True)
 class ImportSettings:
     """Options for reports: the experiment that names features, the rule of the names, the format,
-    metres per unit for files without a unit, and a flag for centres of circles.
+    metres per unit for files without a unit, a flag for centres of circles, and the encoding.
     """
 
     design: Design | None = None
@@ -122,6 +122,7 @@ class ImportSettings:
     form: str | None = None
     unit: Fraction | None = None
     circles: bool = False
+    encoding: str | None = None
 
     @property
     def kinds(self) -> set[str]:
@@ -170,7 +171,8 @@ def report_readings(
         reading.
     """
     taken_reports = [
-        _taken(read_report(path, settings.form, settings.unit), path, settings) for path in paths
+        _taken(read_report(path, settings.form, settings.unit, settings.encoding), path, settings)
+        for path in paths
     ]
     fits = [fit for taken in taken_reports for _, _, fit in taken.features if fit is not None]
     freedom = sum(fit.degrees_of_freedom for fit in fits)

@@ -58,6 +58,11 @@ OF_FEATURES = {
     **dict.fromkeys(("stylus", "taster"), "stylus"),
     **dict.fromkeys(("alignment", "koordinatensystem"), "alignment"),
 }
+# Headings that only Calypso writes: those that many programs have do not tell whose a report is.
+OF_CALYPSO = re.compile(
+    "planid|partnb|idsymbol|featureid|featuresigma|warninglimitcf|natuppertolid|natlowertolid|"
+    "groupname|fftphi|geotype|numpoints|apexangle"
+)
 # Alignments that are the machine's own system.
 OF_MACHINE = ("gerät", "geraet", "machine", "cmm", "gerätekoordinatensystem", "device")
 KINDS = {
@@ -117,15 +122,19 @@ def _table(text: Text) -> _Table | None:
 
 
 def recognises(beginning: str) -> bool:
-    """True if a text has headings of Calypso within its first lines: those of a table with a
-    characteristic to a row, or one with a feature to a row and its kind.
+    """True if a text has headings of Calypso within its first lines, among them two that other
+    programs do not have, or those of a printed table of characteristics and the program's name.
     """
     table = _table(Text("", tuple(beginning.splitlines()), (), False))
     if table is None:
         return False
-    if table.is_of_features:
-        return "\t" in table.separator and {"type", "symbol"} & table.columns.keys() != set()
-    return bool({"nominal", "deviation"} & table.columns.keys())
+    cells = _cells(table.text.lines[table.start - 1], table.separator)
+    own = [cell for cell in cells if OF_CALYPSO.fullmatch(re.sub("[^a-z]", "", cell.casefold()))]
+    return len(own) >= 2 or (
+        not table.is_of_features
+        and {"nominal", "deviation"} <= table.columns.keys()
+        and "calypso" in beginning.casefold()
+    )
 
 
 @dataclass
