@@ -203,6 +203,8 @@ class _Reader:
             if column is not None:
                 if column.constant is not None:
                     texts[role] = column.constant
+            elif f"{{{role}}}" in (self.settings.names or ""):
+                continue
             elif role in above:
                 texts[role] = above[role]
                 notes.append(f'{role} "{shorten(above[role])}" above the headings')

@@ -61,6 +61,8 @@ def read_report(
     rule = stated.names if name is None else check_rule(name)
     unit_name = unit or stated.unit
     factor = None if unit_name is None else LENGTH_UNITS[plain_unit(unit_name)]
-    settings = ImportSettings(design, rule, form, factor, circles, stated.encoding)
+    settings = ImportSettings(
+        *(design, rule, form, factor, circles, stated.encoding), stated.probes or {}
+    )
     imported = report_readings([Path(path) for path in paths], settings)
     return ReadReport(Path(paths[0]).stem, imported)

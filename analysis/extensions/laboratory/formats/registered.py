@@ -9,7 +9,6 @@ from pathlib import Path
 
 from ballplate.simulator.inputs import (
     GivenText,
-    hint,
     listing,
     read_bytes,
     refused,
@@ -72,10 +71,7 @@ def read_report(
     text = text_and_encoding(content, file, encoding)[0]
     report_format = recognised(text)
     if name is not None:
-        chosen = {known_format.name: known_format for known_format in FORMATS}
-        if name not in chosen:
-            raise refused(file, f'no format "{name}"; {hint(name, chosen)}')
-        report_format = chosen[name]
+        report_format = {known_format.name: known_format for known_format in FORMATS}[name]
     if report_format is not None:
         if encoding is not None and report_format is not QIF:
             content = text.encode("utf-8", "surrogatepass")
