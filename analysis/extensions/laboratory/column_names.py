@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
+from pathlib import Path
 
 from ballplate.simulator.design import Design
 from ballplate.simulator.experiment import ReadingsSettings
@@ -28,14 +30,16 @@ def with_stated_names(
         settings.probes or {},
     )
     rows, diameters, told = table.rows, table.diameters, table.told
-    if rule is not None and not set(names) <= set(design.balls.names):
-        parts_read = named(names, rule, design, file, others).parts
+    if rule is not None:
+        parts_read: Sequence[Parts | None] = [{} for _ in names]
+        if not set(names) <= set(design.balls.names):
+            parts_read = named(names, rule, design, file, others).parts
+            left = [name for name, parts in zip(names, parts_read, strict=True) if parts is None]
+            more = f"; left out, of another form ({len(left)}): {quoted(left, 5)}" if left else ""
+            told += (f"{file}: names are read as {rule}{more}",)
         kept = [k for k, parts in enumerate(parts_read) if parts is not None]
-        rows = tuple(_with_parts(rows[k], parts_read[k] or {}) for k in kept)
+        rows = tuple(_with_parts(rows[k], parts_read[k] or {}, Path(file).stem) for k in kept)
         diameters = tuple(diameters[k] for k in kept if diameters)
-        left = [name for name, parts in zip(names, parts_read, strict=True) if parts is None]
-        more = f"; left out, of another form ({len(left)}): {quoted(left, 5)}" if left else ""
-        told += (f"{file}: names are read as {rule}{more}",)
     if others:
         probes = known_texts("probe", design, others)
         rows = tuple(
@@ -45,8 +49,9 @@ def with_stated_names(
     return replace(table, rows=rows, diameters=diameters, told=told)
 
 
-def _with_parts(row: FileRow, parts: Parts) -> FileRow:
-    """Return a row with the names that are in that of its ball.
+def _with_parts(row: FileRow, parts: Parts, stem: str) -> FileRow:
+    """Return a row with the names that are in that of its ball; its position is otherwise that of
+    its column, or of the file's name.
 
     :raises ExperimentError: a column of the table states another name.
     """
@@ -56,4 +61,4 @@ def _with_parts(row: FileRow, parts: Parts) -> FileRow:
         if role != "ball" and text and fold(text) != fold(texts[role]):
             problem = f'the name "{shorten(row.texts[1])}" has the {role} {texts[role]}, and its'
             raise row.mark.refused(f'{problem} column "{shorten(text)}"; state one of them')
-    return replace(row, texts=tuple(texts.values()))
+    return replace(row, texts=(texts["position"] or stem, texts["ball"], texts["probe"]))

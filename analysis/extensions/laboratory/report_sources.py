@@ -49,6 +49,7 @@ def report_rows(
             *(design, settings.names, form.name, unit),
             of_holes,
             settings.encoding if is_file else None,
+            settings.probes or {},
         ),
     )
     rows = tuple(_row(reading, design.dimension, len(further)) for reading in imported.readings)
