@@ -24,13 +24,16 @@ def with_stated_names(
 
     :raises ExperimentError: no name is of the rule, or a column states another name.
     """
-    names, rule, others = (
-        [row.texts[1] for row in table.rows],
-        settings.names,
-        settings.probes or {},
-    )
+    rule, others = settings.names, settings.probes or {}
     rows, diameters, told = table.rows, table.diameters, table.told
+    if others:
+        probes = known_texts("probe", design, others)
+        rows = tuple(
+            replace(row, texts=(*row.texts[:2], probes.get(fold(row.texts[2]), row.texts[2])))
+            for row in rows
+        )
     if rule is not None:
+        names = [row.texts[1] for row in rows]
         parts_read: Sequence[Parts | None] = [{} for _ in names]
         if not set(names) <= set(design.balls.names):
             parts_read = named(names, rule, design, file, others).parts
@@ -40,12 +43,6 @@ def with_stated_names(
         kept = [k for k, parts in enumerate(parts_read) if parts is not None]
         rows = tuple(_with_parts(rows[k], parts_read[k] or {}, Path(file).stem) for k in kept)
         diameters = tuple(diameters[k] for k in kept if diameters)
-    if others:
-        probes = known_texts("probe", design, others)
-        rows = tuple(
-            replace(row, texts=(*row.texts[:2], probes.get(fold(row.texts[2]), row.texts[2])))
-            for row in rows
-        )
     return replace(table, rows=rows, diameters=diameters, told=told)
 
 
@@ -56,9 +53,11 @@ def _with_parts(row: FileRow, parts: Parts, stem: str) -> FileRow:
     :raises ExperimentError: a column of the table states another name.
     """
     found = {**parts, "position": f"{parts.get('position', '')} {parts.get('run', '')}".strip()}
-    texts = {role: found.get(role) or text for role, text in zip(TEXTS, row.texts, strict=True)}
+    texts = []
     for role, text in zip(TEXTS, row.texts, strict=True):
-        if role != "ball" and text and fold(text) != fold(texts[role]):
-            problem = f'the name "{shorten(row.texts[1])}" has the {role} {texts[role]}, and its'
-            raise row.mark.refused(f'{problem} column "{shorten(text)}"; state one of them')
-    return replace(row, texts=(texts["position"] or stem, texts["ball"], texts["probe"]))
+        part = found.get(role, "")
+        if role != "ball" and text and part and fold(text) != fold(part):
+            problem = f'the name "{shorten(row.texts[1])}" has the {role} {part}, and its column'
+            raise row.mark.refused(f'{problem} "{shorten(text)}"; state one of them')
+        texts.append(part or text)
+    return replace(row, texts=(texts[0] or stem, *texts[1:]))
