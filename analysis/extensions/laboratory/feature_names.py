@@ -9,6 +9,7 @@ from __future__ import annotations
 import re
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import product
 
 from ballplate.simulator.design import Design
 from ballplate.simulator.experiment import PLACE
@@ -96,11 +97,9 @@ def named(
     return Named(rule, tuple(ways[0] if ways else None for ways in parts))
 
 
-def _patterns(
-    rule: str, tables: Mapping[str, Collection[str]], between: str = ""
-) -> list[re.Pattern[str]]:
+def _patterns(rule: str, tables: Mapping[str, Collection[str]]) -> list[re.Pattern[str]]:
     """Return patterns of names by a rule, of the shortest and of the longest parts; parts are of
-    the folded texts in `tables`, where they have any, and `between` is there between pieces.
+    the folded texts in `tables`, where they have any.
     """
     patterns = []
     for lazy in ("?", ""):
@@ -116,7 +115,7 @@ def _patterns(
                 for text in texts
             ]
             pieces[i] = f"(?P<{pieces[i]}>{'|'.join(spelt) or f'.+{lazy}'})"
-        patterns.append(re.compile(between.join(pieces), re.IGNORECASE if tables else 0))
+        patterns.append(re.compile("".join(pieces), re.IGNORECASE if tables else 0))
     return patterns
 
 
@@ -152,7 +151,11 @@ def known_texts(
         [design.balls.names[b] for b in design.balls.of(k)]
         for k in range(len(design.artefacts.names))
     ]
-    lists = {"position": [design.positions.names], "probe": [design.probes.names], "ball": balls}
+    lists: dict[str, Sequence[Sequence[str]]] = {
+        "position": [design.positions.names],
+        "probe": [design.probes.names],
+        "ball": balls,
+    }
     texts: dict[str, str] = {}
     for names in lists[place]:
         for number, name in enumerate(names, start=1):
@@ -225,15 +228,24 @@ def _parted(
     """Return the parts of names by a rule, with those of an experiment for their `texts`; None for
     a name of no way or of several.
     """
-    # Beside what is left open, signs tell where a name ends.
-    signs = ("_", "") if "*" in rule or "{run}" in rule else ("", "_?")
-    patterns = _patterns(re.sub(r"(?:[^\w{}*]|_)+", signs[0], rule).strip("_"), texts, signs[1])
+    patterns = _patterns(re.sub(r"(?:[^\w{}*]|_)+", "_", rule).strip("_"), texts)
     read: list[Parts | None] = []
     for name in names:
         ways = _split(re.sub(r"[\W_]+", "_", name).strip("_"), patterns)
         way = ways[0] if len(ways) == 1 else {}
         read.append({p: texts[p][fold(way[p])] if p in texts else way[p] for p in way} or None)
     return tuple(read)
+
+
+def _lookup(rule: str, texts: Mapping[str, Mapping[str, str]]) -> dict[str, Parts | None]:
+    """Return the parts of all names by a rule, folded; None for ambiguous ones."""
+    places = PLACE.findall(rule)
+    parts_by_name: dict[str, Parts | None] = {}
+    for written in product(*(texts[place] for place in places)):
+        parts = {place: texts[place][text] for place, text in zip(places, written, strict=True)}
+        key = fold(rule.format(**dict(zip(places, written, strict=True))))
+        parts_by_name[key] = None if parts_by_name.get(key, parts) != parts else parts
+    return parts_by_name
 
 
 def _has(rule: str, places: Sequence[str]) -> bool:
@@ -260,7 +272,11 @@ def _fitting(
         beginning = fold(re.split(r"[{*]", rule)[0])
         if not any(fold(name).startswith(beginning) for name in names):
             continue
-        parts = _parted(names, rule, texts)
+        if "*" in rule or "{run}" in rule:
+            parts = _parted(names, rule, texts)
+        else:
+            lookup = _lookup(rule, texts)
+            parts = tuple(lookup.get(fold(name)) for name in names)
         count = sum(part is not None for part in parts)
         if count > best:
             fitting, best = [], count

@@ -180,7 +180,7 @@ def read_headings(cells: Sequence[str], words: Vocabulary) -> Headings | None:
 
 def _nominal(parsed: Sequence[tuple[str, str | None]], words: Vocabulary) -> tuple[int, ...]:
     """Return the columns of nominal co-ordinates, if there is one of each axis."""
-    columns = {}
+    columns: dict[str, int] = {}
     for i, (name, _) in enumerate(parsed):
         parts = name.split()
         axes = [part for part in parts if part in words.axes]

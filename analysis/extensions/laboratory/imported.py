@@ -238,6 +238,7 @@ def _repeated(readings: Sequence[ImportedReading]) -> list[str]:
     ]
 
 
+# In one piece: names, runs and the file's name together say which position a feature is of.
 def _taken(report: Report, path: Path | GivenText, settings: ImportSettings) -> _Taken:
     """The features of a report that are readings."""
     runs, told_by = runs_of(
@@ -276,7 +277,8 @@ def _taken(report: Report, path: Path | GivenText, settings: ImportSettings) -> 
         try:
             position = position_of_file(stem, settings.design, str(path))
         except ExperimentError:
-            apart = bool(told_by) and settings.design.positions.across is None
+            design = settings.design
+            apart = bool(told_by) and design is not None and design.positions.across is None
             if not apart:
                 raise
     apart |= settings.design is None

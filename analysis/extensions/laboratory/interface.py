@@ -56,7 +56,7 @@ def read_report(
     ensure_one_of(("mm", "cm", "m", "in"), unit=unit)
     ensure_type(bool, "True or False", circles=circles)
     loaded = None if experiment is None else experiment_of(experiment)
-    stated = ReadingsSettings() if loaded is None else loaded.readings
+    stated = ReadingsSettings.model_construct() if loaded is None else loaded.readings
     design = None if loaded is None else lay_out(loaded)
     rule = stated.names if name is None else check_rule(name)
     unit_name = unit or stated.unit

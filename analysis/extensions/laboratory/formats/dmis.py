@@ -299,7 +299,7 @@ def _of_points(reader: _Reader) -> Iterator[Feature]:
             for k, point in enumerate(reader.actual.get(part, ())):
                 measured += [(dict(point.marks), [])] if k == len(measured) else []
                 measured[k][1].extend([point.centre] if point.centre else [])
-        for marks, points in measured or [(nominal.marks, [])]:
+        for marks, points in measured or [(dict(nominal.marks), [])]:
             array = np.array(points) if points else None
             lack = "" if points else lacks
             yield replace(nominal, centre=None, points=array, lacks=lack, marks=marks)

@@ -274,9 +274,10 @@ def _agrees(row: dict[str, str]) -> bool:
 
     An option of the program reverses its sign for negative nominal values.
     """
-    names = (MEASURED, NOMINALS, ("DEV",))
-    texts = (next(filter(None, map(row.get, of)), "") for of in names)
-    return agrees(*texts, signed=False)
+    actual, nominal, deviation = (
+        next(filter(None, map(row.get, names)), "") for names in (MEASURED, NOMINALS, ("DEV",))
+    )
+    return agrees(actual, nominal, deviation, signed=False)
 
 
 def read(content: bytes, file: str, unit: Fraction | None) -> Report:
