@@ -45,8 +45,8 @@ def add_tables(parser: ArgumentParser) -> None:
         metavar="RULE",
         type=rule,
         help=(
-            'how reports name features, such as "{position}_{ball}_{probe}"; default: detected and'
-            " reported"
+            'how reports, or a column of a table, name features, such as "{position}_{ball}_*"; '
+            "default: detected in reports"
         ),
     )
     parser.add_argument(

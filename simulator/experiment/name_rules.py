@@ -1,5 +1,5 @@
 """Rules by which measuring programs name features: a name with fields in braces, such as
-{position}_{ball}_{probe}.
+{position}_{ball}_{probe}, and * for anything.
 """
 
 from __future__ import annotations
@@ -8,7 +8,7 @@ import re
 
 from ..inputs.settings import shorten
 
-PLACES = ("position", "ball", "probe")
+PLACES = ("position", "ball", "probe", "run")
 PLACE = re.compile(r"\{([^{}]*)\}")
 
 

@@ -31,6 +31,10 @@ def check_readings(sections: Sections, references: References) -> None:
             check_rule(settings.names)
         except ValueError as error:
             problems.add(("readings", "names"), str(error))
+    for name, probe in (settings.probes or {}).items():
+        if probe not in references.probes:
+            text = f'unknown probe "{probe}"; {hint(probe, references.probes)}'
+            problems.add(("readings", "probes", name), text)
     if settings.columns is not None:
         if settings.columns.z is not None and references.dimension == 2:
             problems.add(("readings", "columns", "z"), "there are two dimensions; leave z out")

@@ -63,9 +63,12 @@ class ReadingsSettings(Settings):
     names: Text | None = Field(
         None,
         description=(
-            "rule by which reports of measuring programs name features, with position, ball and"
-            " probe in braces; default: found in the report"
+            "rule by which reports of measuring programs, or a column of a table, name features:"
+            " position, ball, probe and run in braces, * for anything; default: found in the report"
         ),
+    )
+    probes: dict[Name, Name] | None = Field(
+        None, description="name of a probe in reports and tables → its name in this file"
     )
     columns: ColumnsSettings | None = Field(
         None, description="columns of the table, if their names do not identify them"

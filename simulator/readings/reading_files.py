@@ -261,20 +261,22 @@ def _refuse_repeated(rows: tuple[FileRow, ...], readings: Readings, design: Desi
     rows_by_key: dict[ReadingKey, list[FileRow]] = {}
     for key, row in zip(reading_keys(readings), rows, strict=True):
         rows_by_key.setdefault(key, []).append(row)
-    messages = []
-    for (position, ball, probe), occurrences in rows_by_key.items():
-        allowed = max(planned[position, ball, probe], 1)
-        # At most ten per ball, so that every ball is named and the list stays short.
-        for row in occurrences[allowed : allowed + 10]:
-            text = (
-                f'ball "{design.ball_label(ball)}" is repeated in position'
-                f' "{design.positions.names[position]}" with probe "{design.probes.names[probe]}"'
-                f" (first in line {occurrences[0].mark.line}); remove the line, or state repeats:"
-                f" {len(occurrences)} for that position in the experiment"
-            )
-            messages.append(row.mark.message("", text))
-    if messages:
-        raise ExperimentError(messages)
+    again = {
+        key: occurrences
+        for key, occurrences in rows_by_key.items()
+        if len(occurrences) > max(planned[key], 1)
+    }
+    for (position, ball, probe), occurrences in again.items():
+        # Of a table read twice all are: the first says it.
+        others = f", and {number_of(len(again) - 1, 'other reading')}" if len(again) > 1 else ""
+        text = (
+            f'ball "{design.ball_label(ball)}" is repeated in position'
+            f' "{design.positions.names[position]}" with probe "{design.probes.names[probe]}"'
+            f" (first in line {occurrences[0].mark.line}){others}; remove the"
+            f" line{'s' * (len(again) > 1)}, or state repeats: {len(occurrences)} for that position"
+            " in the experiment"
+        )
+        raise occurrences[max(planned[position, ball, probe], 1)].mark.refused(text)
 
 
 def _planned_uncertainty(design: Design, readings: Readings) -> Array | None:

@@ -190,9 +190,13 @@ def _has_plain_columns(
 ) -> bool:
     """Return whether a table has the columns of a plain CSV file and no others."""
     lengths = {*axes, "u", *units}
-    return is_plain(table, settings, axes) and all(
-        text in ROLES or ("_" in text and text.rpartition("_")[0] in lengths)
-        for text in header_texts(table.text)
+    return (
+        is_plain(table, settings, axes)
+        and not settings.probes
+        and all(
+            text in ROLES or ("_" in text and text.rpartition("_")[0] in lengths)
+            for text in header_texts(table.text)
+        )
     )
 
 

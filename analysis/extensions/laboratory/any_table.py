@@ -177,7 +177,7 @@ class _Reader:
             names = dict.fromkeys(headings.name(place) for _, place in form.blank)
             text = question(names, lines, bool(self.settings.fill_down))
             asked = [*self.error(text, lines[0]).messages]
-        if "ball" not in headings.roles:
+        if "ball" not in headings.roles and not headings.nominal:
             asked[:0] = self.error(missing_columns(headings.cells, self.words)).messages
         try:
             above = said_above(form.above)
@@ -203,6 +203,8 @@ class _Reader:
             if column is not None:
                 if column.constant is not None:
                     texts[role] = column.constant
+            elif f"{{{role}}}" in (self.settings.names or ""):
+                continue
             elif role in above:
                 texts[role] = above[role]
                 notes.append(f'{role} "{shorten(above[role])}" above the headings')
@@ -265,6 +267,10 @@ class _Reader:
                 text_of_cell(cells[places[role]]) if role in places else constants.get(role, "")
                 for role in TEXTS
             )
+            if nominal := self.form.headings.nominal:
+                # Where it should be is the name of a ball, which its place then identifies.
+                where = " ".join(cells[i] for i in nominal)
+                names = names[0], f"{names[0]}: {where}", names[2]
             x = [number(cells, i, mark) for i in axes]
             x.append(of_all if u is None else number(cells, u, mark))
             if "k" in roles and not math.isnan(x[-1]):
@@ -328,6 +334,7 @@ class _Reader:
         if len(headings.groups) > 1:
             groups_text = listing((" ".join(group.texts.values()) for group in headings.groups), 6)
             parts.append(f"co-ordinates of {groups_text} side by side")
+        parts += ["balls by nominal co-ordinates"] if headings.nominal else []
         parts += notes_above
         if headings.unused:
             names = quoted(headings.unused)

@@ -1,13 +1,13 @@
 """Positions, balls and probes from the names that a measuring program gives to features.
 
-A rule is a name with fields in braces, such as {position}_{ball}_{probe}. For a known experiment,
-capitals and characters other than letters and digits are ignored.
+A rule is a name with fields in braces, such as {position}_{ball}_{probe}, and * for anything. For
+a known experiment, capitals and characters other than letters and digits are ignored.
 """
 
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import product
 
@@ -33,6 +33,7 @@ SEPARATORS = ("_", ".", "-", ":", "/", " ")
 LONGEST_NAME = 200
 
 Parts = Mapping[str, str]
+NO_OTHERS: Mapping[str, str] = {}
 
 
 @dataclass(frozen=True)
@@ -59,37 +60,70 @@ def fold(name: str) -> str:
     return re.sub(r"[^\w|]|_", "", apart).replace("|", "_").casefold()
 
 
-def named(names: Sequence[str], rule: str | None, design: Design | None, file: str) -> Named:
-    """Return the parts of names by a rule, or by the one that they follow.
+def without_run(rule: str) -> str:
+    """Return a rule without its run, for names that do not have it.
+
+    >>> without_run("{run}_{ball}"), without_run("{position}/{ball}:{run}")
+    ('{ball}', '{position}/{ball}')
+    """
+    signs = r"(?:[^\w{}*]|_)*"
+    return re.sub(rf"^\{{run\}}{signs}|{signs}\{{run\}}", "", rule)
+
+
+def named(
+    names: Sequence[str],
+    rule: str | None,
+    design: Design | None,
+    file: str,
+    probes: Mapping[str, str] = NO_OTHERS,
+) -> Named:
+    """Return the parts of names by a rule, or by the one that they follow. `probes` are further
+    names of those of the experiment.
 
     :raises ExperimentError: they follow several rules, or no rule.
     """
     if design is not None:
-        return _known(names, rule, design, file)
+        return _known(names, rule, design, file, probes)
     rule = rule or _likely(names, file)
-    return Named(rule, tuple(_split(name, rule, file) for name in names))
+    patterns = _patterns(rule, {})
+    parts = [_split(name, patterns) for name in names]
+    for name, ways in zip(names, parts, strict=True):
+        if len(ways) > 1:
+            text = (
+                f'the name "{shorten(name)}" can be parted as {rule} in several ways; name the'
+                " experiment with --for, or another rule with --name"
+            )
+            raise refused(file, text)
+    return Named(rule, tuple(ways[0] if ways else None for ways in parts))
 
 
-def _split(name: str, rule: str, file: str) -> Parts | None:
-    """Return the parts of a name of an unknown experiment, if it matches the rule."""
-    pieces = PLACE.split(rule)
-    parts = []
-    for quantifier in ("+?", "+"):
-        pattern = "".join(
-            f"(?P<{piece}>.{quantifier})" if i % 2 else re.escape(piece)
-            for i, piece in enumerate(pieces)
-        )
-        match = re.fullmatch(pattern, name[:LONGEST_NAME])
-        if match is None or len(name) > LONGEST_NAME:
-            return None
-        parts.append(match.groupdict())
-    if parts[0] != parts[1]:
-        text = (
-            f'the name "{shorten(name)}" can be parted as {rule} in several ways; name the'
-            " experiment with --for, or another rule with --name"
-        )
-        raise refused(file, text)
-    return parts[0]
+def _patterns(rule: str, tables: Mapping[str, Collection[str]]) -> list[re.Pattern[str]]:
+    """Return patterns of names by a rule, of the shortest and of the longest parts; parts are of
+    the folded texts in `tables`, where they have any.
+    """
+    patterns = []
+    for lazy in ("?", ""):
+        pieces = [re.escape(piece).replace(r"\*", f".*{lazy}") for piece in PLACE.split(rule)]
+        for i in range(1, len(pieces), 2):
+            texts = sorted(tables.get(pieces[i], ()), key=len, reverse=not lazy)
+            # Numbers are whole, with zeros before them or not.
+            spelt = [
+                "_?".join(
+                    rf"(?<!\d)0*{word}(?!\d)" if word.isdigit() else word
+                    for word in re.findall(r"\d+|[^\W\d_]", text)
+                )
+                for text in texts
+            ]
+            pieces[i] = f"(?P<{pieces[i]}>{'|'.join(spelt) or f'.+{lazy}'})"
+        patterns.append(re.compile("".join(pieces), re.IGNORECASE if tables else 0))
+    return patterns
+
+
+def _split(name: str, patterns: Sequence[re.Pattern[str]]) -> list[Parts]:
+    """Return the ways in which a name is parted."""
+    matches = [pattern.fullmatch(name) for pattern in patterns if len(name) <= LONGEST_NAME]
+    ways = [match.groupdict() for match in matches if match is not None]
+    return [way for i, way in enumerate(ways) if way not in ways[:i]]
 
 
 def _likely(names: Sequence[str], file: str) -> str:
@@ -107,32 +141,36 @@ def _likely(names: Sequence[str], file: str) -> str:
     raise refused(file, text)
 
 
-def _lookup(rule: str, design: Design, numbered: Sequence[str]) -> dict[str, Parts | None]:
-    """Return names by a rule of all balls in all positions with all probes, folded; None for
-    ambiguous ones. Names contain the number, from 1, of `numbered` parts.
+def known_texts(
+    place: str, design: Design, others: Mapping[str, str], is_numbered: bool = False
+) -> dict[str, str]:
+    """Return the names of an experiment for a field of a rule by what is written, folded, if that
+    is of a single one; `others` are further names of probes, and numbers count from 1.
     """
-    places = PLACE.findall(rule)
-    positions = enumerate(design.positions.names) if "position" in places else ((-1, ""),)
-    probes = design.probes.names if "probe" in places else ("",)
-    parts_by_name: dict[str, Parts | None] = {}
-    for (k, position), probe in product(positions, probes):
-        artefacts = [int(design.positions.artefact[k])] if k >= 0 else design.artefacts.plates
-        for artefact in artefacts:
-            for number, b in enumerate(design.balls.of(artefact), start=1):
-                every = {"position": position, "ball": design.balls.names[b], "probe": probe}
-                numbers = {"position": str(k + 1), "ball": str(number)}
-                written = {**every, **{name: numbers[name] for name in numbered}}
-                parts = {name: every[name] for name in places}
-                key = fold(rule.format(**written))
-                parts_by_name[key] = None if parts_by_name.get(key, parts) != parts else parts
-    return parts_by_name
+    balls = [
+        [design.balls.names[b] for b in design.balls.of(k)]
+        for k in range(len(design.artefacts.names))
+    ]
+    lists: dict[str, Sequence[Sequence[str]]] = {
+        "position": [design.positions.names],
+        "probe": [design.probes.names],
+        "ball": balls,
+    }
+    texts: dict[str, str] = {}
+    for names in lists[place]:
+        for number, name in enumerate(names, start=1):
+            key = str(number) if is_numbered else fold(name)
+            texts[key] = name if texts.get(key, name) == name else ""
+    texts |= {fold(text): name for text, name in others.items() if place == "probe"}
+    return {text: name for text, name in texts.items() if name}
 
 
-def _known(names: Sequence[str], rule: str | None, design: Design, file: str) -> Named:
+def _known(
+    names: Sequence[str], rule: str | None, design: Design, file: str, others: Mapping[str, str]
+) -> Named:
     """Return the parts of names of an experiment, by the rule that most of them follow; by numbers
     if no rule matches names of balls or positions.
     """
-    folded = [fold(name) for name in names]
     for numbered in ((), ("ball",), ("position", "ball")):
         prefixes = ("",) if numbered else PREFIXES
         rules = (
@@ -141,10 +179,11 @@ def _known(names: Sequence[str], rule: str | None, design: Design, file: str) ->
             else [prefix + candidate_rule for candidate_rule in RULES for prefix in prefixes]
         )
         fitting = _fitting(
-            folded,
+            names,
             [candidate_rule for candidate_rule in rules if _has(candidate_rule, numbered)],
             design,
             numbered,
+            others,
         )
         if len(fitting) > 1:
             rules_text = " and ".join(candidate_rule.rule for candidate_rule in fitting[:2])
@@ -183,24 +222,61 @@ def _strange(names: Sequence[str], rule: str | None, design: Design, file: str) 
     return Named(strange.rule, strange.parts, strange=True)
 
 
+def _parted(
+    names: Sequence[str], rule: str, texts: Mapping[str, Mapping[str, str]]
+) -> tuple[Parts | None, ...]:
+    """Return the parts of names by a rule, with those of an experiment for their `texts`; None for
+    a name of no way or of several.
+    """
+    patterns = _patterns(re.sub(r"(?:[^\w{}*]|_)+", "_", rule).strip("_"), texts)
+    read: list[Parts | None] = []
+    for name in names:
+        ways = _split(re.sub(r"[\W_]+", "_", name).strip("_"), patterns)
+        way = ways[0] if len(ways) == 1 else {}
+        read.append({p: texts[p][fold(way[p])] if p in texts else way[p] for p in way} or None)
+    return tuple(read)
+
+
+def _lookup(rule: str, texts: Mapping[str, Mapping[str, str]]) -> dict[str, Parts | None]:
+    """Return the parts of all names by a rule, folded; None for ambiguous ones."""
+    places = PLACE.findall(rule)
+    parts_by_name: dict[str, Parts | None] = {}
+    for written in product(*(texts[place] for place in places)):
+        parts = {place: texts[place][text] for place, text in zip(places, written, strict=True)}
+        key = fold(rule.format(**dict(zip(places, written, strict=True))))
+        parts_by_name[key] = None if parts_by_name.get(key, parts) != parts else parts
+    return parts_by_name
+
+
 def _has(rule: str, places: Sequence[str]) -> bool:
     return all(f"{{{place}}}" in rule for place in places)
 
 
 def _fitting(
-    folded: Sequence[str], rules: Sequence[str], design: Design, numbered: Sequence[str]
+    names: Sequence[str],
+    rules: Sequence[str],
+    design: Design,
+    numbered: Sequence[str],
+    others: Mapping[str, str],
 ) -> list[Named]:
     """The rules by which the most names are those of an experiment, one for each way to read
     them.
     """
     fitting: list[Named] = []
     best = 1
+    texts = {
+        place: known_texts(place, design, others, place in numbered)
+        for place in ("position", "ball", "probe")
+    }
     for rule in rules:
-        beginning = fold(PLACE.split(rule)[0])
-        if not any(name.startswith(beginning) for name in folded):
+        beginning = fold(re.split(r"[{*]", rule)[0])
+        if not any(fold(name).startswith(beginning) for name in names):
             continue
-        lookup = _lookup(rule, design, numbered)
-        parts = tuple(lookup.get(name) for name in folded)
+        if "*" in rule or "{run}" in rule:
+            parts = _parted(names, rule, texts)
+        else:
+            lookup = _lookup(rule, texts)
+            parts = tuple(lookup.get(fold(name)) for name in names)
         count = sum(part is not None for part in parts)
         if count > best:
             fitting, best = [], count

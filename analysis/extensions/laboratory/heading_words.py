@@ -69,13 +69,15 @@ LESS_CLEAR = _words("""
 _OF_AXES = _words("""
     value: value, actual, act, measured, meas, wert, ist, istwert, gemessen, messwert, valeur
     value: mesuré, mesurée, valore, misurato, misurata, valor, medido, medida, värde, mätvärde
-    value: uppmätt, mätt
+    value: uppmätt, mätt, values, actuals, istwerte, messwerte, valeurs, valori, valores
+    nominal: nominal, nom, nominals, soll, sollwert, sollwerte, nennwert, nennwerte, nennmass
+    nominal: theoretical, theo, nominell, nominale, nominali, nominales, théorique, teorico, teórico
     axis: axis, achse, axe, asse, eje, axel, coordinate, koordinate, koordinat, coordonnée
     axis: coordinata, coordenada
     point: coordinates, co, ordinate, coord, coordonnées, centre, center, centro, centrum, mitte
     point: mittelpunkt
 """)
-VALUES, AXIS_WORDS = _OF_AXES["value"], _OF_AXES["axis"]
+VALUES, AXIS_WORDS, NOMINAL = _OF_AXES["value"], _OF_AXES["axis"], _OF_AXES.pop("nominal")
 MEASURED = {word for words in _OF_AXES.values() for word in words}
 
 # Other headings of further columns. Those of times have no unit where they are of a clock.

@@ -16,6 +16,7 @@ from .heading_words import (
     LESS_CLEAR,
     LONGEST,
     MEASURED,
+    NOMINAL,
     VALUES,
     WORDS,
     folded,
@@ -58,17 +59,20 @@ class Headings:
 
     `cells` are the headings, empty in a table without; `unused` those of unused columns. `by_axis`
     are the columns of axis and value of one row per axis, joined with co-ordinates behind the rest.
+    `nominal` are the columns of nominal co-ordinates of a table without names of balls.
     """
 
     roles: Mapping[str, HeadedColumn]
     groups: tuple[Group, ...]
     cells: tuple[str, ...]
     by_axis: tuple[int, int] | None = None
+    nominal: tuple[int, ...] = ()
 
     @cached_property
     def used(self) -> frozenset[int]:
         """Indices of the columns in use."""
-        return frozenset((*self.axes, *self.places.values(), *(self.by_axis or ())))
+        columns = *self.axes, *self.places.values(), *(self.by_axis or ()), *self.nominal
+        return frozenset(columns)
 
     @property
     def axes(self) -> list[int]:
@@ -173,7 +177,19 @@ def read_headings(cells: Sequence[str], words: Vocabulary) -> Headings | None:
     else:
         roles |= _uncertainty(cells, columns_taken)
     names = (f"{cells[by_axis[1]]} {axis}" for axis in words.axes) if by_axis else ()
-    return Headings(roles, groups, (*cells, *names), by_axis)
+    nominal = () if "ball" in roles else _nominal(parsed, words)
+    return Headings(roles, groups, (*cells, *names), by_axis, nominal)
+
+
+def _nominal(parsed: Sequence[tuple[str, str | None]], words: Vocabulary) -> tuple[int, ...]:
+    """Return the columns of nominal co-ordinates, if there is one of each axis."""
+    columns: dict[str, int] = {}
+    for i, (name, _) in enumerate(parsed):
+        parts = name.split()
+        axes = [part for part in parts if part in words.axes]
+        if len(axes) == 1 and {*parts} & {*NOMINAL} and {*parts} <= {*axes, *NOMINAL, *MEASURED}:
+            columns.setdefault(axes[0], i)
+    return tuple(columns[axis] for axis in words.axes if len(columns) == len(words.axes))
 
 
 def _axis_and_value(cells: Sequence[str], words: Vocabulary) -> tuple[int, int] | None:

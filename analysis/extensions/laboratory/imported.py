@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import re
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
@@ -27,9 +27,18 @@ from ballplate.simulator.inputs import (
     shorten,
 )
 
-from .feature_names import LONGEST_NAME, Named, fold, named, position_of_file
+from .feature_names import (
+    LONGEST_NAME,
+    Named,
+    fold,
+    known_texts,
+    named,
+    position_of_file,
+    without_run,
+)
 from .formats.registered import read_report
 from .formats.report import CIRCLE, POINT, SPHERE, UNSTATED, Feature, Report
+from .formats.runs import runs_of
 
 # How programs number the points of a sphere behind its name.
 NUMBERED = re.compile(r"(.+)[-_.:# ](?:P|PT|PNT)?([0-9]{1,6})", re.IGNORECASE)
@@ -114,7 +123,8 @@ class ImportedReadings:
 @dataclass(frozen=True)
 class ImportSettings:
     """Options for reports: the experiment that names features, the rule of the names, the format,
-    metres per unit for files without a unit, and a flag for centres of circles.
+    metres per unit for files without a unit, a flag for centres of circles, the encoding, and the
+    probes of the experiment by their names in the measuring program.
     """
 
     design: Design | None = None
@@ -122,6 +132,8 @@ class ImportSettings:
     form: str | None = None
     unit: Fraction | None = None
     circles: bool = False
+    encoding: str | None = None
+    probes: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def kinds(self) -> set[str]:
@@ -170,7 +182,8 @@ def report_readings(
         reading.
     """
     taken_reports = [
-        _taken(read_report(path, settings.form, settings.unit), path, settings) for path in paths
+        _taken(read_report(path, settings.form, settings.unit, settings.encoding), path, settings)
+        for path in paths
     ]
     fits = [fit for taken in taken_reports for _, _, fit in taken.features if fit is not None]
     freedom = sum(fit.degrees_of_freedom for fit in fits)
@@ -179,7 +192,7 @@ def report_readings(
     readings = [
         reading
         for item, path in zip(taken_reports, paths, strict=True)
-        for reading in _readings(item, path, variance, settings.design)
+        for reading in _readings(item, path, variance, settings)
     ]
     notes = [_told(taken) for taken in taken_reports]
     if fits:
@@ -203,6 +216,7 @@ def report_readings(
         remarks.append(
             "warning: centres in the machine's and in a part's system; import them separately"
         )
+    remarks += _repeated(readings)
     coordinates: Coordinate = "part" if systems == {"part"} else "ball centres"
     dimension = 3 if settings.design is None else settings.design.dimension
     return ImportedReadings(
@@ -210,8 +224,29 @@ def report_readings(
     )
 
 
+def _repeated(readings: Sequence[ImportedReading]) -> list[str]:
+    """Return a note on readings of which there are several of the same names, if any."""
+    counts = Counter((reading.position, reading.ball, reading.probe) for reading in readings)
+    several = [key for key, count in counts.items() if count > 1]
+    if not several:
+        return []
+    (position, ball, _), count = several[0], counts[several[0]]
+    return [
+        f'warning: ball "{ball}" is read {count} times in position "{position}", as are'
+        f" {len(several) - 1} others ({count} runs, or names that are one by the rule): repeats, if"
+        " nothing moved in between; otherwise {run} in the rule, or a file for each, parts them"
+    ]
+
+
+# In one piece: names, runs and the file's name together say which position a feature is of.
 def _taken(report: Report, path: Path | GivenText, settings: ImportSettings) -> _Taken:
     """The features of a report that are readings."""
+    runs, told_by = runs_of(
+        [(feature.name, feature.kind, feature.probe) for feature in report.features],
+        [feature.marks for feature in report.features],
+    )
+    in_runs = zip(report.features, runs, strict=True)
+    report = replace(report, features=tuple(replace(each, run=run) for each, run in in_runs))
     taken_report, kinds = _Taken(report), settings.kinds
     taken_report.left.update(
         feature.kind for feature in report.features if feature.kind not in kinds
@@ -233,34 +268,60 @@ def _taken(report: Report, path: Path | GivenText, settings: ImportSettings) -> 
         )
         raise refused(report.file, text)
     features = [feature for feature, _ in complete]
-    names, whose = _named(features, settings.rule, settings.design, report.file)
-    is_of_file = "{position}" not in names.rule
-    position = (
-        position_of_file(Path(str(path)).stem, settings.design, str(path)) if is_of_file else ""
-    )
+    rule, stem, position = settings.rule or "", Path(str(path)).stem, ""
+    # Of a report that tells runs apart itself, names do not have them.
+    apart = "{run}" in rule
+    names, whose = _named(features, without_run(rule) if told_by else rule, settings, report.file)
+    is_of_file = "{position}" not in names.rule and not apart
+    if is_of_file:
+        try:
+            position = position_of_file(stem, settings.design, str(path))
+        except ExperimentError:
+            design = settings.design
+            apart = bool(told_by) and design is not None and design.positions.across is None
+            if not apart:
+                raise
+    apart |= settings.design is None
     unnamed = [
         feature for feature, parts in zip(features, names.parts, strict=True) if parts is None
     ]
-    taken_report.leave(unnamed, f"the name is not of {names.rule}")
+    taken_report.leave(unnamed, f"the name is not, or in several ways, of {names.rule}")
     keys_seen = set()
     for (feature, fit), parts in zip(complete, names.parts, strict=True):
         if parts is None:
             continue
-        if (feature.name, feature.centre) in keys_seen:
+        key = feature.run, feature.name, feature.centre
+        if key in keys_seen:
             taken_report.left[f"{feature.kind} (printed again)"] += 1
             continue
-        keys_seen.add((feature.name, feature.centre))
-        taken_report.features.append((feature, {"position": position, "probe": "", **parts}, fit))
-    source = f'; position "{position}" by the name of the file' if is_of_file else ""
+        keys_seen.add(key)
+        own = {"position": position, "probe": "", **parts}
+        if apart and (run := own.get("run", feature.run)):
+            own["position"] = _in_run(parts.get("position", ""), run, stem, settings.design)
+        taken_report.features.append((feature, own, fit))
+    source = f'; position "{position}" by the name of the file' if position else ""
     if names.strange:
         source += "; they are not the experiment's, and fit matches them by number and location"
     for place in names.numbered:
         source += f"; {place}s by their numbers, from 1 in the experiment's order"
     taken_report.remarks.append(f"{report.file}: names{whose} are read as {names.rule}{source}")
+    if told_by:
+        labels = list(dict.fromkeys(runs))
+        how = "each is a position of its own" if apart else "in the same positions"
+        taken_report.remarks.append(
+            f"{report.file}: {len(labels)} runs by {told_by} ({listing(labels, 5)}), {how}"
+        )
     taken_report.remarks += _about_systems(
         report.file, [feature for feature, _, _ in taken_report.features]
     )
     return taken_report
+
+
+def _in_run(position: str, run: str, stem: str, design: Design | None) -> str:
+    """Return the name of a position in a run: that of the experiment, if it has it."""
+    known = () if design is None else design.positions.names
+    of_run = fold(f"{position} {run}")
+    return next((name for name in known if fold(name) == of_run), f"{position or stem} {run}")
 
 
 def _about_systems(file: str, features: Sequence[Feature]) -> list[str]:
@@ -278,18 +339,19 @@ def _about_systems(file: str, features: Sequence[Feature]) -> list[str]:
 
 
 def _named(
-    features: Sequence[Feature], rule: str | None, design: Design | None, file: str
+    features: Sequence[Feature], rule: str, settings: ImportSettings, file: str
 ) -> tuple[Named, str]:
     """Return the parts of features' names, or of the names of their dimensions, and whose names
     they are in the latter case.
     """
+    how = rule or None, settings.design, file, settings.probes
     try:
-        return named([feature.name for feature in features], rule, design, file), ""
+        return named([feature.name for feature in features], *how), ""
     except ExperimentError:
         other_dimensions = [feature.dimension for feature in features]
         if all(other_dimensions):
             with suppress(ExperimentError):
-                return named(other_dimensions, rule, design, file), " of dimensions"
+                return named(other_dimensions, *how), " of dimensions"
         raise
 
 
@@ -297,22 +359,24 @@ def _with_points(candidates: list[Feature], report: Report, taken_report: _Taken
     """Spheres that were not measured, with the points that have their names and a number; without
     any sphere, all points that have the same name except their number.
     """
-    lacking = {candidate.name: candidate for candidate in candidates if candidate.lacks}
-    points: dict[str, list[Feature]] = {}
+    lacking = {(candidate.run, candidate.name) for candidate in candidates if candidate.lacks}
+    points: dict[tuple[str, str], list[Feature]] = {}
     for feature in report.features:
         match = NUMBERED.fullmatch(feature.name[:LONGEST_NAME]) if feature.kind == POINT else None
         if (
             match is not None
             and feature.centre is not None
-            and (match[1] in lacking or not candidates)
+            and ((feature.run, match[1]) in lacking or not candidates)
         ):
-            points.setdefault(match[1], []).append(feature)
+            points.setdefault((feature.run, match[1]), []).append(feature)
     taken_report.left[POINT] -= sum(map(len, points.values()))
     taken_report.left += Counter()
     made = [
-        candidate for candidate in candidates if not (candidate.lacks and candidate.name in points)
+        candidate
+        for candidate in candidates
+        if not (candidate.lacks and (candidate.run, candidate.name) in points)
     ]
-    return [*made, *(_of_points(name, several) for name, several in points.items())]
+    return [*made, *(_of_points(name, several) for (_, name), several in points.items())]
 
 
 def _of_points(name: str, points: Sequence[Feature]) -> Feature:
@@ -321,17 +385,17 @@ def _of_points(name: str, points: Sequence[Feature]) -> Feature:
 
 
 def _readings(
-    taken_report: _Taken, path: Path | GivenText, variance: float, design: Design | None
+    taken_report: _Taken, path: Path | GivenText, variance: float, settings: ImportSettings
 ) -> list[ImportedReading]:
     """Return the readings of a report, with the probe from its names, its sensors or the plan."""
-    readings = []
+    readings, design = [], settings.design
     for feature, parts, fit in taken_report.features:
         uncertainty = None
         if fit is not None:
             uncertainty = float(np.sqrt(variance * np.diag(fit.cofactor).max()))
         probe = parts["probe"]
         if not probe:
-            probe = _probe(feature, parts["position"], design, str(path))
+            probe = _probe(feature, parts["position"], settings, str(path))
         assert feature.centre is not None
         name, across = parts["position"], -1
         if design is not None and design.positions.across is not None:
@@ -345,17 +409,17 @@ def _readings(
     return readings
 
 
-def _probe(feature: Feature, position: str, design: Design | None, file: str) -> str:
+def _probe(feature: Feature, position: str, settings: ImportSettings, file: str) -> str:
     """Return the probe of a feature whose name contains none.
 
     :raises ExperimentError: several are possible.
     """
+    design = settings.design
     if design is None:
         return feature.probe
     names, positions = design.probes.names, design.positions.names
-    same = [name for name in names if fold(name) == fold(feature.probe)]
-    if len(same) == 1:
-        return same[0]
+    if same := known_texts("probe", design, settings.probes).get(fold(feature.probe)):
+        return same
     if position not in positions:
         # Which probe was planned there is known when the position is.
         return ""

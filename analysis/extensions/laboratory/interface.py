@@ -31,15 +31,16 @@ def read_report(
 
     Positions, balls and probes are in the names of features, by a rule such as
     {position}_{ball}_{probe}: that of `name`, or the one by which the names are those of the
-    `experiment`. `form` is dmis, pcdmis, calypso or qif, by default recognised; `unit` applies to
-    reports without one; `circles` includes centres of circles.
+    `experiment`, whose `readings` may state it, as well as unit and encoding. `form` is dmis,
+    pcdmis, calypso or qif, by default recognised; `unit` applies to reports without one;
+    `circles` includes centres of circles.
 
     >>> import ballplate as bp
     >>> bp.read_report("designs/reports/z-low.dmo", "designs/quickstart.yaml").told
     ('designs/reports/z-low.dmo: DMIS output; taken: 3 sphere centres; left: 1 plane',)
     """
-    from ballplate.simulator.experiment import check_rule, lay_out
-    from ballplate.simulator.inputs import LENGTH_UNITS
+    from ballplate.simulator.experiment import ReadingsSettings, check_rule, lay_out
+    from ballplate.simulator.inputs import LENGTH_UNITS, plain_unit
 
     from .formats.registered import FORMATS
     from .imported import ImportSettings, report_readings
@@ -54,9 +55,14 @@ def read_report(
     ensure_one_of([known_format.name for known_format in FORMATS], form=form)
     ensure_one_of(("mm", "cm", "m", "in"), unit=unit)
     ensure_type(bool, "True or False", circles=circles)
-    design = None if experiment is None else lay_out(experiment_of(experiment))
-    rule = None if name is None else check_rule(name)
-    factor = None if unit is None else LENGTH_UNITS[unit]
-    settings = ImportSettings(design, rule, form, factor, circles)
+    loaded = None if experiment is None else experiment_of(experiment)
+    stated = ReadingsSettings.model_construct() if loaded is None else loaded.readings
+    design = None if loaded is None else lay_out(loaded)
+    rule = stated.names if name is None else check_rule(name)
+    unit_name = unit or stated.unit
+    factor = None if unit_name is None else LENGTH_UNITS[plain_unit(unit_name)]
+    settings = ImportSettings(
+        *(design, rule, form, factor, circles, stated.encoding), stated.probes or {}
+    )
     imported = report_readings([Path(path) for path in paths], settings)
     return ReadReport(Path(paths[0]).stem, imported)

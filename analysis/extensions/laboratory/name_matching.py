@@ -394,7 +394,9 @@ def _by_place(
                     " experiment"
                 )
                 return {}
-    if len(set(names.values())) < len(names):
+    # Names by nominal co-ordinates are others in each position.
+    used_once = {(row.texts[0], row.texts[2], row.texts[1]) for row in rows}
+    if len({(p, q, names[ball]) for p, q, ball in used_once}) < len(used_once):
         findings.asked.append(f"{text}; two have the same planned location")
         return {}
     findings.told.append(

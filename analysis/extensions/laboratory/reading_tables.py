@@ -33,6 +33,7 @@ from ballplate.simulator.readings import (
 
 from .any_table import AskedError, TableRows, read_any_table
 from .clock_times import wrong_times
+from .column_names import with_stated_names
 from .coordinate_kinds import controller_offsets
 from .heading_words import heading, is_clock
 from .headings import Vocabulary
@@ -68,7 +69,7 @@ def any_source_rows(
     names = {
         "position": design.positions.names,
         "ball": design.balls.names,
-        "probe": design.probes.names,
+        "probe": (*design.probes.names, *(settings.probes or {})),
     }
 
     def of_report(source: Source, text: GivenText) -> TableRows | None:
@@ -83,9 +84,15 @@ def any_source_rows(
         )
         for table_read in tables_read
     ]
-    rows = [row for table in tables for row in table.rows]
     if messages:
-        return SourceRows(tuple(rows), (), settings)
+        return SourceRows(tuple(row for table in tables for row in table.rows), (), settings)
+    tables = [
+        with_stated_names(table, str(source), design, settings)
+        if table.coordinates is None
+        else table
+        for source, table in zip(sources, tables, strict=True)
+    ]
+    rows = [row for table in tables for row in table.rows]
     _refuse_wrong_times(sources, tables)
     notes: tuple[str, ...] = ()
     if any(table.coordinates is not None for table in tables):

@@ -45,7 +45,12 @@ def report_rows(
     of_holes = design.positions.across is not None
     imported = report_readings(
         [source if is_file else text],
-        ImportSettings(design, settings.names, form.name, unit, circles=of_holes),
+        ImportSettings(
+            *(design, settings.names, form.name, unit),
+            of_holes,
+            settings.encoding if is_file else None,
+            settings.probes or {},
+        ),
     )
     rows = tuple(_row(reading, design.dimension, len(further)) for reading in imported.readings)
     notes = (*imported.told, *imported.remarks)

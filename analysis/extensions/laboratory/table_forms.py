@@ -50,6 +50,9 @@ NUMBERS = {
     "comma": re.compile(_DIGITS.format(",[0-9]+", ",")),
 }
 
+# How a number begins.
+BEGINS = re.compile(r"[+-]?[.,]?[0-9]")
+
 Line = tuple[int, str]
 
 
@@ -178,17 +181,44 @@ def _find_headings(
         cells = _split_headings(text, sign) if len(text) <= LONGEST * MOST_COLUMNS else None
         if not cells or len(cells) > MOST_COLUMNS:
             continue
+        above = split(lines[i - 1][1], sign) if i else None
         try:
-            headings = read_headings(cells, words)
+            headings = _of_two_lines(above or (), cells, words) or read_headings(cells, words)
         except HeadingError as error:
             if wrong is None or len(cells) > len(wrong.cells):
                 wrong = NoFormError(number, str(error), cells)
             continue
+        if headings and not headings.by_axis and all(BEGINS.match(cells[k]) for k in headings.axes):
+            # Columns stated by number are those of a row of readings.
+            return i - 1, replace(headings, cells=())
         if headings is not None:
             return i, headings
         if len(cells) > len(widest.cells) and not any(map(_is_number, cells)):
             widest = NoFormError(number, "", cells)
     raise wrong or widest
+
+
+def _of_two_lines(above: Sequence[str], cells: Sequence[str], words: Vocabulary) -> Headings | None:
+    """Return headings whose names are also in the line above them, as of merged cells that stand
+    over several columns; None where one line has them.
+    """
+    if len(above) != len(cells) or any(map(_is_number, above)):
+        return None
+    left, joined = "", []
+    for name, cell in zip(above, cells, strict=True):
+        left = name or left * bool(cell)
+        joined.append(f"{cell} {left}".strip())
+    both: list[Headings | None] = []
+    for names in (cells, joined):
+        try:
+            both.append(read_headings(names, words))
+        except HeadingError:
+            both.append(None)
+    alone, with_above = both
+    if with_above is None or not (with_above.nominal or "ball" in with_above.roles):
+        return None
+    is_more = alone is None or "ball" not in alone.roles
+    return with_above if is_more or any(group.texts for group in with_above.groups) else None
 
 
 def holds_nothing(cells: Sequence[str], places: Iterable[int]) -> bool:
@@ -250,8 +280,8 @@ def _form_without_decimals(
     )
     if headings.by_axis and units:
         units |= dict.fromkeys(axes, units[places[0]])
-    above = tuple(text for _, text in lines[: max(header, 0)])
-    line = lines[header][0] if header >= 0 else 0
+    above = tuple(text for _, text in lines[: header + (not headings.cells)] if header >= 0)
+    line = lines[header][0] if header >= 0 and headings.cells else 0
     return Form(separator, "", line, headings, units, rows, remarks, wrong, above, blank, filled)
 
 

@@ -13,7 +13,7 @@ from fractions import Fraction
 
 from ballplate.simulator.inputs import LENGTH_UNITS, Mark, shorten
 
-from .columns import headings, is_number, with_point
+from .columns import agrees, headings, is_number, with_point
 from .report import (
     AXES,
     UNSTATED,
@@ -24,6 +24,7 @@ from .report import (
     System,
     centre_of,
 )
+from .runs import runs_of
 from .text import Text, read_lines
 
 UNITS = {
@@ -58,6 +59,11 @@ OF_FEATURES = {
     **dict.fromkeys(("stylus", "taster"), "stylus"),
     **dict.fromkeys(("alignment", "koordinatensystem"), "alignment"),
 }
+# Headings that only Calypso writes: those that many programs have do not tell whose a report is.
+OF_CALYPSO = re.compile(
+    "planid|partnb|idsymbol|featureid|featuresigma|warninglimitcf|natuppertolid|natlowertolid|"
+    "groupname|fftphi|geotype|numpoints|apexangle"
+)
 # Alignments that are the machine's own system.
 OF_MACHINE = ("gerät", "geraet", "machine", "cmm", "gerätekoordinatensystem", "device")
 KINDS = {
@@ -78,8 +84,6 @@ STATED = re.compile(
 AXIS = re.compile(r"([XYZ])(?:[-_ ]?(?:value|wert|coordinate|koordinate|position))?[0-9]*", re.I)
 BEFORE = re.compile(r"([XYZ])[-_ ]?(?:value|wert)?[-_.: ]+(\S.*)", re.IGNORECASE)
 BEHIND = re.compile(r"(\S.*?)[-_.: ]+([XYZ])(?:[-_ ]?(?:value|wert))?", re.IGNORECASE)
-# A row has to agree in itself to this many units of the last digit.
-AGREEMENT = Fraction(2)
 # Lines at the beginning among which the headings are.
 MOST_BEFORE = 200
 LONGEST = 300
@@ -117,15 +121,19 @@ def _table(text: Text) -> _Table | None:
 
 
 def recognises(beginning: str) -> bool:
-    """True if a text has headings of Calypso within its first lines: those of a table with a
-    characteristic to a row, or one with a feature to a row and its kind.
+    """True if a text has headings of Calypso within its first lines, among them two that other
+    programs do not have, or those of a printed table of characteristics and the program's name.
     """
     table = _table(Text("", tuple(beginning.splitlines()), (), False))
     if table is None:
         return False
-    if table.is_of_features:
-        return "\t" in table.separator and {"type", "symbol"} & table.columns.keys() != set()
-    return bool({"nominal", "deviation"} & table.columns.keys())
+    cells = _cells(table.text.lines[table.start - 1], table.separator)
+    own = [cell for cell in cells if OF_CALYPSO.fullmatch(re.sub("[^a-z]", "", cell.casefold()))]
+    return len(own) >= 2 or (
+        not table.is_of_features
+        and {"nominal", "deviation"} <= table.columns.keys()
+        and "calypso" in beginning.casefold()
+    )
 
 
 @dataclass
@@ -138,6 +146,7 @@ class _Located:
     probe: str = ""
     alignment: str = ""
     axes: dict[str, float] = field(default_factory=dict)
+    marks: dict[str, str] = field(default_factory=dict)
 
     def feature(self) -> Feature:
         """Return the feature, without a centre if an axis is missing."""
@@ -149,6 +158,7 @@ class _Located:
             *(self.mark, self.name, self.kind, centre, None, self.probe, system),
             of=self.alignment,
             lacks=lacks,
+            marks=self.marks,
         )
 
 
@@ -157,17 +167,19 @@ class _Reader:
     table: _Table
     problems: ReportProblems
     unit: Fraction | None
-    located: dict[str, _Located] = field(default_factory=dict)
-    complete: list[_Located] = field(default_factory=list)
+    rows_taken: list[_Located] = field(default_factory=list)
     others: Counter[str] = field(default_factory=Counter)
     ends_in_text: bool = False
 
-    def rows(self) -> Iterator[tuple[Mark, dict[str, str]]]:
-        """Yield each row by column; rows that end before the last required column are reported."""
+    def rows(self) -> Iterator[tuple[Mark, dict[str, str], dict[str, str]]]:
+        """Yield each row by column, and other cells by heading; rows that end before the last
+        required column are reported.
+        """
         table, text = self.table, self.table.text
         names = ("id", *AXES) if table.is_of_features else ("id", "actual")
         needed = max(table.columns[name] for name in names)
-        width = len(_cells(text.lines[table.start - 1], table.separator))
+        heads = _cells(text.lines[table.start - 1], table.separator)
+        width, used = len(heads), {*table.columns.values()}
         for number, line in enumerate(text.lines[table.start :], start=table.start + 1):
             cells = _cells(line, table.separator)
             if not line.strip() or set(line.strip()) <= set("-=_*"):
@@ -186,12 +198,13 @@ class _Reader:
             if len(values["id"]) > LONGEST:
                 self.problems.add(mark, f"a name of {len(values['id'])} characters")
                 continue
-            yield mark, values
+            beside = zip(heads, cells, strict=False)
+            yield mark, values, {h: cell for i, (h, cell) in enumerate(beside) if i not in used}
 
-    def take(self, mark: Mark, row: dict[str, str]) -> None:
+    def take(self, mark: Mark, row: dict[str, str], marks: dict[str, str]) -> None:
         """Read one row."""
         if self.table.is_of_features:
-            self._feature(mark, row)
+            self._feature(mark, row, marks)
             return
         axis, name = _axis_and_name(row)
         if not axis:
@@ -205,9 +218,10 @@ class _Reader:
             problem = f"{axis}: the deviation is not actual minus nominal; is the line damaged?"
             self.problems.add(mark, problem)
             return
-        self._locate(axis, name, self._length(mark, row, row["actual"]), mark)
+        axes = {axis: self._length(mark, row, row["actual"])}
+        self.rows_taken.append(_Located(mark, name, axes=axes, marks=marks))
 
-    def _feature(self, mark: Mark, row: dict[str, str]) -> None:
+    def _feature(self, mark: Mark, row: dict[str, str], marks: dict[str, str]) -> None:
         words = [row.get("type", ""), row.get("symbol", "")]
         kinds = [
             KINDS[word]
@@ -215,11 +229,13 @@ class _Reader:
             if word in KINDS
         ]
         kind = kinds[0] if kinds else UNSTATED
-        located = _Located(mark, row["id"], kind, row.get("stylus", ""), row.get("alignment", ""))
+        located = _Located(
+            *(mark, row["id"], kind, row.get("stylus", ""), row.get("alignment", "")), marks=marks
+        )
         for axis in AXES:
             if is_number(row[axis]):
                 located.axes[axis] = self._length(mark, row, row[axis])
-        self.complete.append(located)
+        self.rows_taken.append(located)
 
     def _length(self, mark: Mark, row: dict[str, str], text: str) -> float:
         name = row.get("unit", "").lower()
@@ -232,14 +248,22 @@ class _Reader:
             return math.nan
         return self.problems.length(with_point(text), unit, mark)
 
-    def _locate(self, axis: str, name: str, value: float, mark: Mark) -> None:
-        """Add a co-ordinate to its feature; one that it has already begins another reading."""
-        located = self.located.get(name)
-        if located is None or axis in located.axes:
-            located = _Located(mark, name)
-            self.located[name] = located
-            self.complete.append(located)
-        located.axes[axis] = value
+    def complete(self) -> list[_Located]:
+        """Return features with the co-ordinates of their rows, run by run; a co-ordinate that a
+        feature has already begins another reading.
+        """
+        keys = [(row.name, *row.axes) for row in self.rows_taken]
+        runs, _ = runs_of(keys, [row.marks for row in self.rows_taken])
+        latest: dict[tuple[str, str], _Located] = {}
+        features = []
+        for run, row in zip(runs, self.rows_taken, strict=True):
+            located = latest.get((run, row.name))
+            if located and not (self.table.is_of_features or row.axes.keys() & located.axes.keys()):
+                located.axes.update(row.axes)
+                continue
+            latest[run, row.name] = row
+            features.append(row)
+        return features
 
 
 def _has_number(cells: list[str]) -> bool:
@@ -266,13 +290,10 @@ def _axis_and_name(row: dict[str, str]) -> tuple[str, str]:
 
 def _agrees(row: dict[str, str]) -> bool:
     """True if a row's deviation is the actual value less the nominal, if it has them."""
-    texts = [with_point(row.get(name, "")) for name in ("actual", "nominal", "deviation")]
-    if not all(is_number(text) for text in texts):
-        return True
-    actual, nominal, deviation = (Fraction(text) for text in texts)
-    digits = min(len(text.partition(".")[2]) for text in texts)
+    deviation = row.get("deviation", "")
     # Some versions leave the deviation of what is within its tolerance at zero.
-    return deviation == 0 or abs(actual - nominal - deviation) <= AGREEMENT / 10**digits
+    is_left = set(deviation) <= set("+-0.,")
+    return is_left or agrees(row["actual"], row.get("nominal", ""), deviation)
 
 
 def read(content: bytes, file: str, unit: Fraction | None) -> Report:
@@ -289,10 +310,10 @@ def read(content: bytes, file: str, unit: Fraction | None) -> Report:
         unit_match = STATED.search(line)
         unit = UNITS[(unit_match[1] or unit_match[2]).lower()] if unit_match else unit
     reader = _Reader(table, problems, unit)
-    for mark, row in reader.rows():
-        reader.take(mark, row)
+    for mark, row, marks in reader.rows():
+        reader.take(mark, row, marks)
     problems.finish()
-    features = tuple(located.feature() for located in reader.complete)
+    features = tuple(located.feature() for located in reader.complete())
     remarks = text.remarks
     if reader.ends_in_text:
         last = shorten(text.lines[-1].strip(), 30)

@@ -56,6 +56,8 @@ BEGINNING = re.compile(
 )
 # What moves a machine: only a program has it, and its points are where it is to probe.
 OF_PROGRAMS = ("GOTO", "MODE", "GOHOME")
+# What may tell runs of a program in one file apart.
+OF_RUNS = ("FILNAM", "PARTID", "PARTSN", "PARTRV", "LOTID", "DATE", "TIME")
 SYSTEMS = ("DATSET", "TRANS", "ROTATE", "LOCATE", "TRMATX")
 
 
@@ -120,8 +122,11 @@ class _Reader:
     machine_systems: set[str] = field(default_factory=set)
     actual: dict[str, list[Feature]] = field(default_factory=dict)
     nominal: dict[str, Feature] = field(default_factory=dict)
-    # Points by the sphere that they are on, as probed and as features that it is made of.
-    probed: dict[str, list[Place]] = field(default_factory=dict)
+    marks: dict[str, str] = field(default_factory=dict)
+    files: int = 0
+    # Points by the sphere that they are on, as probed in each measurement of it and as features
+    # that it is made of.
+    probed: dict[str, list[tuple[dict[str, str], list[Place]]]] = field(default_factory=dict)
     made_of: dict[str, list[str]] = field(default_factory=dict)
     others: Counter[str] = field(default_factory=Counter)
 
@@ -146,20 +151,28 @@ class _Reader:
             self._system(statement)
         elif statement.word == "MEAS":
             label = LABEL.search(statement.rest)
-            self.measuring = label[1].strip() if label else ""
+            self._measure(label[1].strip() if label else "")
         elif statement.word == "ENDMES":
             self.measuring = ""
         elif statement.word in ("PTMEAS", "PTDATA") and self.measuring:
-            self.probed.setdefault(self.measuring, []).append(
-                self._place(statement, statement.parts)
-            )
+            self.probed[self.measuring][-1][1].append(self._place(statement, statement.parts))
         elif statement.word == "CONST" and statement.parts[0].upper() == "SPHERE":
             names = [name.strip() for name in LABEL.findall(statement.rest)]
             self.made_of[names[0] if names else ""] = names[1:]
         elif statement.word == "TOL" and statement.kind == "TA":
             self.others["tolerance"] += 1
+        elif statement.word in OF_RUNS:
+            # The same program, run again, has the same name.
+            self.files += statement.word == "FILNAM"
+            text = statement.rest.strip("'\" ") + f" {self.files}" * (statement.word == "FILNAM")
+            self.marks = self.marks | {statement.word: text}
         self.is_program |= statement.word in OF_PROGRAMS
         self.is_ended |= statement.word == "ENDFIL"
+
+    def _measure(self, name: str) -> None:
+        """Begin a measurement of a feature."""
+        self.measuring = name
+        self.probed.setdefault(name, []).append((self.marks, []))
 
     def _units(self, statement: Statement) -> None:
         name = statement.parts[0].upper()
@@ -186,7 +199,11 @@ class _Reader:
         parts = statement.parts
         kind = KINDS.get(parts[0].upper(), parts[0].lower())
         here = Feature(
-            statement.mark, statement.name, kind, probe=self.probe, system=self.system, of=self.of
+            *(statement.mark, statement.name, kind),
+            probe=self.probe,
+            system=self.system,
+            of=self.of,
+            marks=self.marks,
         )
         if kind in LOCATED:
             if parts[1:2] and parts[1].upper() in ("INNER", "OUTER"):
@@ -195,7 +212,7 @@ class _Reader:
             here = replace(here, centre=place)
         if statement.kind == "FA":
             self.actual.setdefault(statement.name, []).append(here)
-            self.measuring = statement.name if kind == SPHERE else ""
+            self._measure(statement.name if kind == SPHERE else "")
         else:
             self.nominal[statement.name] = here
 
@@ -273,15 +290,19 @@ def _of_points(reader: _Reader) -> Iterator[Feature]:
     for name, nominal in reader.nominal.items():
         if name in reader.actual or nominal.kind != SPHERE:
             continue
-        points = reader.probed.get(name, [])
+        measured = [(marks, [*points]) for marks, points in reader.probed.get(name, ())]
         lacks = "nominal only, not measured"
-        if points and reader.is_program:
-            points, lacks = [], "PTMEAS of a program are points to probe, not measured points"
+        if any(points for _, points in measured) and reader.is_program:
+            measured = []
+            lacks = "PTMEAS of a program are points to probe, not measured points"
         for part in reader.made_of.get(name, ()):
-            points += [point.centre for point in reader.actual.get(part, ()) if point.centre]
-        points_array = np.array(points) if points else None
-        lacks = "" if points else lacks
-        yield replace(nominal, centre=None, points=points_array, lacks=lacks)
+            for k, point in enumerate(reader.actual.get(part, ())):
+                measured += [(dict(point.marks), [])] if k == len(measured) else []
+                measured[k][1].extend([point.centre] if point.centre else [])
+        for marks, points in measured or [(dict(nominal.marks), [])]:
+            array = np.array(points) if points else None
+            lack = "" if points else lacks
+            yield replace(nominal, centre=None, points=array, lacks=lack, marks=marks)
 
 
 def read(content: bytes, file: str, unit: Fraction | None) -> Report:

@@ -14,7 +14,7 @@ from itertools import takewhile
 
 from ballplate.simulator.inputs import LENGTH_UNITS, Mark, shorten
 
-from .columns import is_number, with_point
+from .columns import agrees, is_number, with_point
 from .report import (
     AXES,
     CIRCLE,
@@ -26,6 +26,7 @@ from .report import (
     ReportProblems,
     centre_of,
 )
+from .runs import OF_RUNS
 from .text import Text, read_lines
 
 UNITS = {"MM": LENGTH_UNITS["mm"], "IN": LENGTH_UNITS["in"], "INCH": LENGTH_UNITS["in"]}
@@ -36,17 +37,16 @@ WHAT = re.compile(r"[A-Z0-9 ]*?\b(?:OF|FROM|BETWEEN)\s+\S+", re.IGNORECASE)
 LOCATION = re.compile(r"LOCATION OF\s+(\S+)\s+(\S+)", re.IGNORECASE)
 HEADED = re.compile(r"\s*(?:\S{1,3}\s+)?(MM|IN|INCH)\s+(\S.*?)\s+-\s+(\S.*?)\s*", re.IGNORECASE)
 MEASURED = ("MEAS", "MEASURED")
-NOMINALS = {"NOMINAL", "NOM"}
+NOMINALS = ("NOMINAL", "NOM")
 ENDING = re.compile(r"\s*END OF DIMENSION\s+\S.*", re.IGNORECASE)
 PROBE = re.compile(r"\s*(TIP|LOADPROBE)\s*/\s*([^,\s]+).*", re.IGNORECASE)
 BEGINNING = re.compile(
     r"^[ \t]*(?:DIM(?:ENSION)?[ \t][^=\n]*=|AX[ \t]+(?:NOM|MEAS|\+TOL))|\bPC-?DMIS\b",
     re.MULTILINE | re.IGNORECASE,
 )
+# What stands about dimensions, such as `SER NUMBER : 2`.
+BESIDE = re.compile(r"\b([A-Z][A-Z ]{1,20}?)\s*[:=]\s*(\S.*?)(?=\s\s|$)", re.IGNORECASE)
 LONGEST = 1000
-# Columns about which a row has to agree: nominal + deviation = measured, to this many units of the
-# last digit.
-AGREEMENT = Fraction(2)
 
 
 @dataclass
@@ -73,6 +73,7 @@ class _Located:
     title: str
     kind: str
     probe: str
+    marks: dict[str, str]
     axes: dict[str, float] = field(default_factory=dict)
 
     def feature(self) -> Feature:
@@ -84,6 +85,7 @@ class _Located:
             probe=self.probe,
             lacks=lacks,
             dimension=self.title,
+            marks=self.marks,
         )
 
 
@@ -93,6 +95,7 @@ class _Reader:
     problems: ReportProblems
     unit: Fraction | None
     probe: str = ""
+    marks: dict[str, str] = field(default_factory=dict)
     dimension: _Dimension | None = None
     located: dict[str, _Located] = field(default_factory=dict)
     complete: list[_Located] = field(default_factory=list)
@@ -129,14 +132,22 @@ class _Reader:
             self.others["dimension (without its name and =)"] += 1
         elif ENDING.fullmatch(line):
             self._end()
-        elif self.dimension is None:
-            return
+        elif self.dimension is None or first not in ("AX", *AXES):
+            self._beside(line)
         elif first == "AX":
             headings = list(re.finditer(r"\S+", line))[1:]
             self.dimension.columns = [(word[0].upper(), word.end()) for word in headings]
-        elif first in AXES and len(first) == 1:
+        else:
             self.dimension.has_row = True
             self._row(first, line, mark, number == len(self.text.lines))
+
+    def _beside(self, line: str) -> None:
+        """Take what a line says of the features below; another run begins other features."""
+        for name, text in BESIDE.findall(line):
+            before = self.marks.get(name.upper(), text)
+            self.marks = self.marks | {name.upper(): text}
+            if OF_RUNS.fullmatch(name) and text != before:
+                self.located = {}
 
     def _end(self) -> None:
         """End the current dimension; a location without a row is skipped and reported."""
@@ -144,7 +155,9 @@ class _Reader:
         if ended is None or ended.has_row:
             return
         if ended.kind != UNSTATED:
-            located = _Located(ended.mark, ended.name, ended.title, ended.kind, self.probe)
+            located = _Located(
+                *(ended.mark, ended.name, ended.title, ended.kind), self.probe, self.marks
+            )
             self.complete.append(located)
         elif ended.columns:
             self.others[f"dimension (no row {' or '.join(AXES)})"] += 1
@@ -228,7 +241,8 @@ class _Reader:
         name, title = self.dimension.name, self.dimension.title
         located = self.located.get(name)
         if located is None or axis in located.axes:
-            located = _Located(mark, name, title, self.dimension.kind, self.probe)
+            kind = self.dimension.kind
+            located = _Located(mark, name, title, kind, self.probe, self.marks)
             self.located[name] = located
             self.complete.append(located)
         located.axes[axis] = value
@@ -247,7 +261,11 @@ def _by_column(line: str, columns: list[tuple[str, int]]) -> dict[str, str] | No
     ends = {end: name for name, end in columns}
     row = {ends[word.end()]: word[0] for word in numbers if word.end() in ends}
     # The deviation then checks it.
-    is_clear = len(row) == len(numbers) < len(columns) and "DEV" in row and row.keys() & NOMINALS
+    is_clear = (
+        len(row) == len(numbers) < len(columns)
+        and "DEV" in row
+        and not row.keys().isdisjoint(NOMINALS)
+    )
     return row if is_clear else None
 
 
@@ -256,15 +274,10 @@ def _agrees(row: dict[str, str]) -> bool:
 
     An option of the program reverses its sign for negative nominal values.
     """
-    nominal = row.get("NOMINAL", row.get("NOM"))
-    measured = row.get("MEAS", row.get("MEASURED"))
-    deviation = row.get("DEV")
-    if nominal is None or measured is None or deviation is None:
-        return True
-    values = [Fraction(with_point(text)) for text in (measured, nominal, deviation)]
-    digits = min(len(with_point(text).partition(".")[2]) for text in (measured, nominal, deviation))
-    difference = abs(abs(values[0] - values[1]) - abs(values[2]))
-    return difference <= AGREEMENT / 10**digits
+    actual, nominal, deviation = (
+        next(filter(None, map(row.get, names)), "") for names in (MEASURED, NOMINALS, ("DEV",))
+    )
+    return agrees(actual, nominal, deviation, signed=False)
 
 
 def read(content: bytes, file: str, unit: Fraction | None) -> Report:

@@ -9,7 +9,7 @@ from __future__ import annotations
 import re
 from collections import Counter
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 
 import numpy as np
@@ -183,7 +183,11 @@ def read(content: bytes, file: str, unit: Fraction | None) -> Report:
         for element in set_element.walk()
         if element.name == "MeasurementResults"
     ]
-    features = tuple(feature for result in results for feature in _features(document, result))
+    features = tuple(
+        replace(feature, marks={"MeasurementResults": str(number)})
+        for number, result in enumerate(results, start=1)
+        for feature in _features(document, result)
+    )
     if not results:
         problems.add(root.mark, "no measurement results; is it a plan, or a model?")
     problems.finish()

@@ -9,7 +9,6 @@ from pathlib import Path
 
 from ballplate.simulator.inputs import (
     GivenText,
-    hint,
     listing,
     read_bytes,
     refused,
@@ -56,23 +55,26 @@ def is_table(text: str) -> bool:
 
 
 def read_report(
-    path: Path | GivenText, name: str | None = None, unit: Fraction | None = None
+    path: Path | GivenText,
+    name: str | None = None,
+    unit: Fraction | None = None,
+    encoding: str | None = None,
 ) -> Report:
     """Return the report in a file, of the named format or of the one that recognises it.
 
-    `unit` is metres per unit for a file without a unit.
+    `unit` is metres per unit for a file without a unit, `encoding` that of a text, by default
+    detected; XML states its own.
 
     :raises ExperimentError: the file cannot be read, is of unknown format, or is invalid.
     """
     content, file = read_bytes(path), str(path)
-    if name is not None:
-        chosen = {known_format.name: known_format for known_format in FORMATS}
-        if name not in chosen:
-            raise refused(file, f'no format "{name}"; {hint(name, chosen)}')
-        return chosen[name].read(content, file, unit)
-    text = text_and_encoding(content, file)[0]
+    text = text_and_encoding(content, file, encoding)[0]
     report_format = recognised(text)
+    if name is not None:
+        report_format = {known_format.name: known_format for known_format in FORMATS}[name]
     if report_format is not None:
+        if encoding is not None and report_format is not QIF:
+            content = text.encode("utf-8", "surrogatepass")
         return report_format.read(content, file, unit)
     if is_table(text):
         raise refused(file, "this is a table, which needs no import; ballplate fit reads it")

@@ -36,7 +36,8 @@ class Feature:
 
     `lacks` states why there is neither. `probe` is the label of the active sensor, possibly empty,
     `system` the type of its co-ordinate system, and `of` the system's name. `dimension` is the
-    report's name of the characteristic, if it has one.
+    report's name of the characteristic, if it has one. `marks` are texts beside it, by name, that
+    may tell in which run of the program it was measured, and `run` is that run.
     """
 
     mark: Mark
@@ -49,6 +50,8 @@ class Feature:
     of: str = ""
     lacks: str = ""
     dimension: str = ""
+    marks: Mapping[str, str] = field(default_factory=dict)
+    run: str = ""
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,213 @@
+"""Names that the measuring program gives: of its probes, of features with what no rule needs, in
+one column of a table.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from decimal import Decimal
+from pathlib import Path
+from typing import Any
+
+import ballplate as bp
+import numpy as np
+import pytest
+from ballplate.extensions.laboratory.feature_names import named
+from ballplate.simulator.experiment import lay_out
+from ballplate.simulator.experiment.name_rules import check_rule
+from ballplate.simulator.inputs.messages import ExperimentError
+from ballplate.simulator.readings import read_readings
+
+from tests.extensions.laboratory import makers
+from tests.extensions.laboratory.makers import Ball
+
+D = Decimal
+QUICKSTART = bp.quickstart()
+DESIGN = lay_out(QUICKSTART)
+TIPS = {"T1A0B0": "down", "T2A90B0": "left", "T3A90B180": "right", "T4": "front", "T5": "back"}
+TIP_OF = {probe: tip for tip, probe in TIPS.items()}
+ROWS = list(bp.simulate(QUICKSTART, exact=True).itertuples())
+
+
+EXPECTED = {row[1:4]: np.array(row[4:]) / 1000 for row in ROWS}
+
+
+def observed(tmp_path: Path, text: str, name: str = "lab.csv", **readings: object) -> Any:
+    (tmp_path / name).write_text(text, encoding="utf-8")
+    experiment = QUICKSTART.with_readings(readings)
+    design = lay_out(experiment)
+    return read_readings(tmp_path / name, design, settings=experiment.readings)
+
+
+def assert_all_planned(found: Any) -> None:
+    """Every planned reading is there once, at its place but for applied offsets of probes."""
+    assert not found.missing and not found.unplanned
+    assert len(found.x) == len(DESIGN.readings)
+    read = found.design.readings
+    for x, position, ball, probe in zip(found.x, read.position, read.ball, read.probe, strict=True):
+        key = DESIGN.positions.names[position], DESIGN.balls.names[ball], DESIGN.probes.names[probe]
+        np.testing.assert_allclose(x, EXPECTED[key], rtol=0, atol=1e-9)
+
+
+def table(name: Callable[[Any], str], more: str = "") -> str:
+    lines = [
+        "Element;X;Y;Z",
+        *(f"{name(row)};{row.x_mm!r};{row.y_mm!r};{row.z_mm!r}" for row in ROWS),
+    ]
+    return "\n".join([*lines, more, ""])
+
+
+def test_probes_of_tables_have_the_names_of_the_program(tmp_path: Path) -> None:
+    lines = ["position,ball,probe,x_mm,y_mm,z_mm"]
+    lines += [
+        f"{row.position},{row.ball},{TIP_OF[row.probe].lower()},{row.x_mm!r},{row.y_mm!r},{row.z_mm!r}"
+        for row in ROWS
+    ]
+    assert_all_planned(observed(tmp_path, "\n".join(lines), probes=TIPS))
+
+
+def test_names_of_probes_may_be_those_of_other_probes(tmp_path: Path) -> None:
+    swapped = {"left": "right", "right": "left"}
+    lines = ["position,ball,probe,x_mm,y_mm,z_mm"]
+    lines += [
+        f"{row.position},{row.ball},{swapped.get(row.probe, row.probe)},{row.x_mm!r},{row.y_mm!r},{row.z_mm!r}"
+        for row in ROWS
+    ]
+    assert_all_planned(observed(tmp_path, "\n".join(lines), probes=swapped))
+
+
+def test_names_of_probes_in_one_column_may_be_those_of_other_probes(tmp_path: Path) -> None:
+    swapped = {"left": "right", "right": "left"}
+    text = table(lambda row: f"{row.position}/{row.ball}/{swapped.get(row.probe, row.probe)}")
+    rule = "{position}/{ball}/{probe}"
+    assert_all_planned(observed(tmp_path, text, names=rule, unit="mm", probes=swapped))
+
+
+def test_columns_of_a_wide_table_have_the_names_of_the_program(tmp_path: Path) -> None:
+    rows = [row for row in ROWS if row.position == "x low"]
+    tips = [TIP_OF[probe] for probe in dict.fromkeys(row.probe for row in rows)]
+    lines = [";".join(["ball", *(f"{axis} {tip} [mm]" for tip in tips for axis in "XYZ")])]
+    for ball in dict.fromkeys(row.ball for row in rows):
+        own = {TIP_OF[row.probe]: row for row in rows if row.ball == ball}
+        cells = [repr(getattr(own[tip], f"{axis}_mm")) for tip in tips for axis in "xyz"]
+        lines.append(";".join([ball, *cells]))
+    found = observed(tmp_path, "\n".join(lines), "x low.csv", probes=TIPS)
+    names = [found.design.probes.names[k] for k in found.design.readings.probe]
+    assert sorted(names) == sorted(row.probe for row in rows)
+
+
+@pytest.mark.parametrize("form", ["dmis", "pcdmis", "calypso"])
+def test_probes_of_reports_have_the_names_of_the_program(tmp_path: Path, form: str) -> None:
+    offsets = {name: DESIGN.probes.offsets[k] for k, name in enumerate(DESIGN.probes.names)}
+    balls = []
+    for row in ROWS:
+        centre = np.array([row.x_mm, row.y_mm, row.z_mm]) + 1000 * offsets[row.probe]
+        x, y, z = (round(D(value), 9) for value in centre.tolist())
+        sensor = "" if form == "calypso" else TIP_OF[row.probe]
+        place = row.position.replace(" ", "")
+        name = f"{place}_{row.ball}" + f"_{TIP_OF[row.probe]}" * (form == "calypso")
+        balls.append(Ball(name, sensor, (x, y, z)))
+    text = getattr(makers, form)(balls)
+    if form == "pcdmis":
+        # The maker has no line of the tip.
+        pieces = text.split("DIM LOC")
+        tips = [f"TIP/{ball.sensor}, SHANKIJK=0, 0, 1\nDIM LOC" for ball in balls]
+        text = pieces[0] + "".join(a + b for a, b in zip(tips, pieces[1:], strict=True))
+    assert_all_planned(observed(tmp_path, text, "report.txt", probes=TIPS))
+
+
+def test_a_probe_that_the_experiment_lacks_is_refused() -> None:
+    with pytest.raises(ExperimentError, match='unknown probe "dwon"; did you mean "down"'):
+        QUICKSTART.with_readings({"probes": {"T1": "dwon"}})
+
+
+@pytest.mark.parametrize(
+    ("rule", "name"),
+    [
+        ("SPH_{position}_{ball}_{probe}_*", "SPH_{0}_{1}_{2}_0{3}"),
+        ("*_{position}_{ball}_{probe}", "KUG {3}_{0}_{1}_{2}"),
+        ("SPH({position},{ball},{probe})*", "SPH({0},{1},{2}) {3}"),
+        ("{position}.*.{ball}.{probe}", "{0}.M{3}-x.{1}.{2}"),
+        ("{probe}*{ball}@{position}", "{2} no {3} {1}@{0}"),
+    ],
+)
+@pytest.mark.parametrize("spelt", [str, str.upper, lambda text: text.replace(" ", "_")])
+def test_one_column_of_a_table_has_all_names(
+    tmp_path: Path, rule: str, name: str, spelt: Callable[[str], str]
+) -> None:
+    count = iter(range(1, 1000))
+    text = table(
+        lambda row: spelt(name.format(row.position, row.ball, row.probe, next(count))),
+        "PLANE_TOP;1;2;3\nORIGIN;0;0;0",
+    )
+    found = observed(tmp_path, text, names=rule, unit="mm")
+    assert_all_planned(found)
+    assert any(
+        f"names are read as {rule}; left out, of another form (2): " in one for one in found.remarks
+    )
+
+
+def test_the_rule_is_for_what_has_no_names_of_the_experiment(tmp_path: Path) -> None:
+    lines = ["ball,probe,x_mm,y_mm,z_mm"]
+    rows = [row for row in ROWS if row.position == "x low"]
+    lines += [f"{row.ball},{row.probe},{row.x_mm!r},{row.y_mm!r},{row.z_mm!r}" for row in rows]
+    found = observed(tmp_path, "\n".join(lines), "x low.csv", names="{position}_{ball}")
+    assert {found.design.positions.names[k] for k in found.design.readings.position} == {"x low"}
+
+
+def test_a_column_and_a_name_that_contradict_each_other_are_refused(tmp_path: Path) -> None:
+    text = "position;ball;x_mm;y_mm;z_mm\nz low;zhigh_r1c1;1;2;3\n"
+    with pytest.raises(ExperimentError) as caught:
+        observed(tmp_path, text, names="{position}_{ball}")
+    assert 'has the position z high, and its column "z low"; state one' in str(caught.value)
+
+
+def test_no_name_of_the_rule_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(ExperimentError, match="state the rule with --name"):
+        observed(tmp_path, table(lambda row: f"K{row.ball}"), names="SPH_{ball}", unit="mm")
+
+
+def read(names: list[str], rule: str) -> list[tuple[str, ...] | None]:
+    found = named(names, rule, DESIGN, "f", TIPS)
+    return [None if parts is None else tuple(parts.values()) for parts in found.parts]
+
+
+@pytest.mark.parametrize(
+    ("rule", "name", "expected"),
+    [
+        ("SPH_{ball}_*", "SPH_R1C1_001", ("r1c1",)),
+        ("SPH_{ball}_*", "sph-r01c01-x-y", ("r1c1",)),
+        ("*_{ball}", "A_B_r5c5", ("r5c5",)),
+        # A number is never parted.
+        ("*{ball}", "xr1c1", ("r1c1",)),
+        ("{ball}*", "r1c15", None),
+        ("{ball}_*", "r1c1", None),
+        ("SPH_*", "SPH_r1c1", None),
+        ("{position}_{ball}_{probe}", "ZLOW.r1c1.T1A0B0", ("z low", "r1c1", "down")),
+        ("{position}_{ball}_{probe}*", "ZLOW.r1c1.t2a90b0 (2)", ("z low", "r1c1", "left")),
+        ("{position}_{ball}_{run}", "z_low r1c1:007", ("z low", "r1c1", "007")),
+    ],
+)
+def test_what_a_star_leaves_open(rule: str, name: str, expected: tuple[str, ...] | None) -> None:
+    if expected is None:
+        with pytest.raises((ExperimentError, ValueError)):
+            read([name], check_rule(rule))
+    else:
+        assert read([name], rule) == [expected]
+
+
+def test_a_name_that_a_star_leaves_in_doubt_is_left(tmp_path: Path) -> None:
+    assert read(["r1c1_r2c2", "r1c1_x"], "*{ball}*") == [None, ("r1c1",)]
+    # Two features of one ball by the rule are counted.
+    balls = [Ball(f"SPH_r1c1_{k}", "", (D(k), D(2), D(3))) for k in range(1, 4)]
+    (tmp_path / "z low.txt").write_text(makers.dmis(balls), encoding="utf-8")
+    report = bp.read_report(tmp_path / "z low.txt", QUICKSTART, name="SPH_{ball}_*")
+    assert report.to_frame()["ball"].tolist() == ["r1c1"] * 3
+    assert any('ball "r1c1" is read 3 times in position "z low"' in one for one in report.remarks)
+
+
+def test_without_an_experiment_a_star_is_anything() -> None:
+    found = named(["SPH_a_001", "SPH_b_002"], "SPH_{ball}_*", None, "f")
+    assert found.parts == ({"ball": "a"}, {"ball": "b"})
+    with pytest.raises(ExperimentError, match="in several ways"):
+        named(["SPH_a_1_1"], "SPH_{ball}_*", None, "f")
