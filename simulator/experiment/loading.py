@@ -17,6 +17,7 @@ from ..inputs.problems import Problems, in_order, written_count
 from ..inputs.trust import OPENED, Trust
 from ..inputs.yamltree import Mapping, Mark, Node, mark_of, parse_tree, read_text
 from ..machines.settings import with_defaults
+from .bounds import resolve_bounds
 from .calibrations import resolve_calibration
 from .changes import node_of
 from .checks import (
@@ -191,6 +192,7 @@ def _build(
     if machine is not None:
         references = replace(references, volume=machine.volume)
     probes = resolve_probes(sections, references)
+    bounds = resolve_bounds(sections, machine, probes, references)
     check_error_model(sections, machine, references)
     check_true_machine(sections, machine, references)
     for section in ("positions", "calibration"):
@@ -202,13 +204,13 @@ def _build(
     positions = {}
     for key, settings in sections.entries("positions").items():
         i = int(key)
-        position = resolve_position(settings, ("positions", i), references)
+        position = resolve_position(settings, ("positions", i), bounds, references)
         if position is not None:
             positions[i] = position
             volume = machine.volume if machine is not None and position.enabled else None
             if volume is not None and len(volume.lower) == references.dimension:
                 check_inside(position, ("positions", i), volume, probes, references)
-    candidates = resolve_candidates(sections, positions, machine, probes, references)
+    candidates = resolve_candidates(sections, positions, bounds, references)
     possible = candidates.positions if candidates.complete else None
     check_use(sections, positions, position_count, references, possible, planning)
     # What may read calibrated balls, and have priors; more than there is of it where some is wrong.

@@ -19,7 +19,7 @@ from ..design.objects import Machine
 from ..design.observations.calibration import Calibration
 from ..design.observations.star import Star
 from ..geometry.ball_layouts import ArtefactSettings, BallLayout
-from ..geometry.positions import Pose
+from ..geometry.positions import Pose, ReferencePoint
 from ..inputs.messages import ExperimentError, Message, Steps, format_path
 from ..inputs.number_arrays import Array
 from ..inputs.quantities import Target
@@ -86,7 +86,8 @@ class Position:
     """A position of an artefact, its nominal pose in the machine and its readings.
 
     ``description`` completes a short name; possibly empty. One that is not ``enabled`` is not read,
-    and no experiment that can be evaluated has it.
+    and no experiment that can be evaluated has it. ``reference`` is the point by which
+    a file places it, if one does.
     """
 
     name: str
@@ -95,6 +96,7 @@ class Position:
     readings: tuple[ReadingGroup, ...]
     description: str = ""
     enabled: bool = True
+    reference: ReferencePoint | None = None
 
     @property
     def count(self) -> int:

@@ -2,20 +2,28 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any, Literal
 
 import numpy as np
 
 from ..design.lookup import References, lengths_per_axis
-from ..geometry.ball_layouts import BallLayout
+from ..geometry.ball_layouts import BallLayout, frozen
 from ..geometry.positions import (
+    AXIS_INDEX,
     IN_PLANE_AXES,
     Axis,
     FreePlacement,
     PlanePlacement,
+    Pose,
+    ReferencePoint,
     nominal_pose,
 )
 from ..inputs.messages import Steps
+from ..inputs.number_arrays import Array
+from ..inputs.quantities import length_text
+from ..inputs.room_parts import RoomPart
+from .bounds import Bounds, edge_of, free_room
 from .model import Position, ReadingGroup
 from .position_sections import PositionSettings, ReadingSettings
 
@@ -27,9 +35,12 @@ READING_KEYS = ("probes", "balls", "repeats", "standard_uncertainty")
 
 
 def resolve_position(
-    settings: PositionSettings, steps: Steps, references: References
+    settings: PositionSettings, steps: Steps, bounds: Bounds | None, references: References
 ) -> Position | None:
-    """Return a position with its pose and readings, or None after reporting faults."""
+    """Return a position with its pose and readings, or None after reporting faults.
+
+    Without `bounds`, which is a fault, no place is known that is a part of the free room.
+    """
     artefact = references.artefact(settings.artefact, steps)
     layout = references.layouts.get(artefact) if artefact is not None else None
     readings = _readings(settings, steps, layout, references)
@@ -42,7 +53,16 @@ def resolve_position(
         or references.dimension is None
     ):
         return None
-    pose = nominal_pose(placement, layout, references.dimension)
+    parts = _parts(settings)
+    pose, reference = nominal_pose(placement, layout, references.dimension), None
+    if bounds is not None:
+        edge = edge_of(artefact, bounds, references)
+        read = [(group.ball_indices, group.probes) for group in readings]
+        shifts = free_room(pose, layout, edge, read, bounds)
+        if shifts is not None:
+            pose, reference = _placed(pose, placement.point(references.dimension), shifts, parts)
+    if parts and reference is None:
+        return None
     in_plane = references.artefacts[artefact].reads == "in plane"
     text = (
         f'"{artefact}" is read in its plane, which has to be across an axis of the machine;'
@@ -52,7 +72,47 @@ def resolve_position(
     if not references.require(is_across or not in_plane, (*steps, "pose"), text):
         return None
     words = settings.description or ""
-    return Position(settings.name, artefact, pose, readings, words, settings.enabled)
+    return Position(settings.name, artefact, pose, readings, words, settings.enabled, reference)
+
+
+def _parts(settings: PositionSettings) -> dict[int, RoomPart]:
+    """Return the places that are parts of the free room, by axis."""
+    points = [settings.corner, settings.centre]
+    places = {axis: place for point in points if point is not None for axis, place in point}
+    if settings.plane is not None:
+        places[settings.plane] = settings.level
+    if settings.pose is not None:
+        places = dict(zip(AXIS_INDEX, settings.pose.origin, strict=False))
+    return {AXIS_INDEX[axis]: at for axis, at in places.items() if isinstance(at, RoomPart)}
+
+
+def _placed(
+    pose: Pose, point: Array, shifts: Array, parts: Mapping[int, RoomPart]
+) -> tuple[Pose, ReferencePoint]:
+    """Return a pose with its reference point moved to parts of the room of `shifts` (2, d)."""
+    room, by = point + shifts, np.zeros(len(point))
+    for axis, part in parts.items():
+        by[axis] = part.between(*room[:, axis].tolist()) - point[axis]
+    reference = ReferencePoint(frozen(point + by), frozen(room), frozenset(parts))
+    return Pose(pose.rotation, pose.origin + by) if parts else pose, reference
+
+
+def in_lengths(settings: Mapping[str, Any], position: Position) -> Mapping[str, Any]:
+    """Return the settings of a position with lengths for the parts of its room."""
+    reference = position.reference
+    if reference is None or not reference.parts:
+        return settings
+    axes = list(AXIS_INDEX)
+    lengths = {axes[k]: length_text(float(reference.point[k])) for k in sorted(reference.parts)}
+    stated = dict(settings)
+    for key in {"corner", "centre"} & stated.keys():
+        stated[key] = {axis: lengths.get(axis, text) for axis, text in stated[key].items()}
+    if "level" in stated:
+        stated["level"] = lengths.get(stated["plane"], stated["level"])
+    if "pose" in stated:
+        origin = zip(axes, stated["pose"]["origin"], strict=False)
+        stated["pose"] = stated["pose"] | {"origin": [lengths.get(*entry) for entry in origin]}
+    return stated
 
 
 def _readings(
@@ -154,7 +214,13 @@ def _placement(
     is_right &= check_turns(turns, (*steps, "quarter_turns"), references)
     if point is None or not is_right:
         return None
-    return PlanePlacement(plane, settings.level or 0.0, anchor, point, turns)
+    first, second = map(_length, point)
+    return PlanePlacement(plane, _length(settings.level or 0.0), anchor, (first, second), turns)
+
+
+def _length(place: float | RoomPart) -> float:
+    """Return a length; 0 for a part of the room, which is known once all readings are."""
+    return 0.0 if isinstance(place, RoomPart) else place
 
 
 def check_turns(turns: int, steps: Steps, references: References) -> bool:
@@ -170,7 +236,7 @@ def check_turns(turns: int, steps: Steps, references: References) -> bool:
 
 def _in_plane(
     point: Any, plane: Axis, steps: Steps, references: References
-) -> tuple[float, float] | None:
+) -> tuple[float | RoomPart, float | RoomPart] | None:
     axes = IN_PLANE_AXES[plane]
     first, second = sorted(axes)
     is_right = True
@@ -204,8 +270,9 @@ def _free_placement(pose: Any, steps: Steps, references: References) -> FreePlac
     )
     if not is_right:
         return None
+    origin = tuple(map(_length, pose.origin))
     if pose.rotation is None:
-        return FreePlacement(pose.origin, (0.0,) if dimension == 2 else (0.0, 0.0, 0.0))
+        return FreePlacement(origin, (0.0,) if dimension == 2 else (0.0, 0.0, 0.0))
     return FreePlacement(
-        pose.origin, pose.rotation if isinstance(pose.rotation, tuple) else (pose.rotation,)
+        origin, pose.rotation if isinstance(pose.rotation, tuple) else (pose.rotation,)
     )

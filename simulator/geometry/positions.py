@@ -43,6 +43,18 @@ class Pose:
             array.setflags(write=False)
 
 
+@dataclass(frozen=True, eq=False)
+class ReferencePoint:
+    """Where a file places an artefact: the co-ordinates ``point`` (d,) of its level and corner or
+    centre, or of its origin, the lowest and the highest ones ``room`` (2, d) that its probes can
+    reach, and the axes, ``parts``, along which the file states a part of this room.
+    """
+
+    point: Array
+    room: Array
+    parts: frozenset[int]
+
+
 @dataclass(frozen=True)
 class PlanePlacement:
     """An artefact parallel to a machine plane.
@@ -59,6 +71,12 @@ class PlanePlacement:
     at: tuple[float, float]
     quarter_turns: int = 0
 
+    def point(self, dimension: int) -> Array:
+        """Return the co-ordinates (d,) of the anchor, out of its plane those of the plane."""
+        first, second = IN_PLANE_AXES[self.plane]
+        by_axis = {first: self.at[0], second: self.at[1], self.plane: self.level}
+        return np.array([by_axis[axis] for axis in AXIS_INDEX])[:dimension]
+
 
 @dataclass(frozen=True)
 class FreePlacement:
@@ -68,6 +86,10 @@ class FreePlacement:
 
     origin: tuple[float, ...]
     rotation: tuple[float, ...]
+
+    def point(self, dimension: int) -> Array:
+        """Return the origin (d,)."""
+        return np.array(self.origin)
 
 
 def nominal_pose(
