@@ -47,9 +47,7 @@ def resolve_bounds(
     """Return the limits that the volume, the probes and the limits of a pool state, or report
     faults.
     """
-    limits = sections.get("pool", "limits") or LimitsSettings.model_construct(
-        reach={}, forbidden=(), edge=None
-    )
+    limits = sections.get("pool", "limits") or LimitsSettings.model_validate({})
     reach = _reach(limits, references)
     forbidden = _forbidden(limits, references)
     if machine is None or machine.dimension != references.dimension:
@@ -64,26 +62,23 @@ def free_room(
     edge: float | None,
     readings: Iterable[tuple[Indices, tuple[str, ...]]],
     bounds: Bounds,
-) -> Array | None:
+) -> Array:
     """Return the least and the greatest shifts (2, d) of a pose at which all probes reach the balls
     that they read, and an `edge` of material stays inside the volume; the least is above the
-    greatest where there is no room. None if a probe is invalid.
+    greatest where there is no room.
 
     `readings` are indices of balls, with the names of probes.
     """
-    volume, balls = bounds.volume, ball_coordinates(pose, layout)
-    shifts = []
-    if edge is not None:
-        shifts.append([volume.lower, volume.upper] - outline(pose, layout, edge))
+    balls, ends = (
+        ball_coordinates(pose, layout),
+        np.array([bounds.volume.lower, bounds.volume.upper]),
+    )
+    shifts = [] if edge is None else [ends - outline(pose, layout, edge)]
     for indices, names in readings:
         around = extent(balls[indices])
-        for name in names:
-            if name not in bounds.probes or bounds.probes[name].offset.shape != pose.origin.shape:
-                return None
-            shifts.append([volume.lower, volume.upper] + bounds.probes[name].offset - around)
-            if name in bounds.reach:
-                shifts.append(bounds.reach[name] - around)
-    least, greatest = np.array(shifts).swapaxes(0, 1)
+        shifts += [ends + bounds.probes[name].offset - around for name in names]
+        shifts += [bounds.reach[name] - around for name in names if name in bounds.reach]
+    least, greatest = np.swapaxes(shifts, 0, 1)
     return frozen([least.max(axis=0), greatest.min(axis=0)])
 
 

@@ -308,9 +308,9 @@ def check_inside(
         if offset
         else ""
     )
-    has_no_room = position.reference is not None and axis in position.reference.parts
-    remedy = f"there is no room along {AXES[axis]}: take a smaller artefact"
-    remedy = remedy if has_no_room else "move the artefact"
+    remedy = "move the artefact"
+    if AXES[axis] in position.parts:
+        remedy = f"there is no room along {AXES[axis]}: take a smaller artefact"
     text = (
         f'reading ball "{layout.names[balls[worst]]}" with probe "{probe}" moves the scales to'
         f" {AXES[axis]} = {format_length(place - offset)}{less},"

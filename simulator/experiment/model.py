@@ -19,7 +19,7 @@ from ..design.objects import Machine
 from ..design.observations.calibration import Calibration
 from ..design.observations.star import Star
 from ..geometry.ball_layouts import ArtefactSettings, BallLayout
-from ..geometry.positions import Pose, ReferencePoint
+from ..geometry.positions import Pose
 from ..inputs.messages import ExperimentError, Message, Steps, format_path
 from ..inputs.number_arrays import Array
 from ..inputs.quantities import Target
@@ -86,8 +86,9 @@ class Position:
     """A position of an artefact, its nominal pose in the machine and its readings.
 
     ``description`` completes a short name; possibly empty. One that is not ``enabled`` is not read,
-    and no experiment that can be evaluated has it. ``reference`` is the point by which
-    a file places it, if one does.
+    and no experiment that can be evaluated has it. ``room`` (2, d) are the least and
+    greatest shifts within reach of its probes, if known, and ``parts`` the co-ordinates by axis for
+    which the file states a part of this room, both in metres.
     """
 
     name: str
@@ -96,7 +97,8 @@ class Position:
     readings: tuple[ReadingGroup, ...]
     description: str = ""
     enabled: bool = True
-    reference: ReferencePoint | None = None
+    room: Array | None = None
+    parts: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def count(self) -> int:

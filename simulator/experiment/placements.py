@@ -16,13 +16,11 @@ from ..geometry.positions import (
     FreePlacement,
     PlanePlacement,
     Pose,
-    ReferencePoint,
     nominal_pose,
 )
 from ..inputs.messages import Steps
-from ..inputs.number_arrays import Array
 from ..inputs.quantities import length_text
-from ..inputs.room_parts import RoomPart
+from ..inputs.room_parts import Place, RoomPart, length_of
 from .bounds import Bounds, edge_of, free_room
 from .model import Position, ReadingGroup
 from .position_sections import PositionSettings, ReadingSettings
@@ -53,15 +51,16 @@ def resolve_position(
         or references.dimension is None
     ):
         return None
-    parts = _parts(settings)
-    pose, reference = nominal_pose(placement, layout, references.dimension), None
-    if bounds is not None:
-        edge = edge_of(artefact, bounds, references)
+    pose = nominal_pose(placement, layout, references.dimension)
+    parts = {axis: at for axis, at in placement.places.items() if isinstance(at, RoomPart)}
+    lengths, room = {}, None
+    if bounds is not None and bounds.probes.keys() >= {*references.probes}:
         read = [(group.ball_indices, group.probes) for group in readings]
-        shifts = free_room(pose, layout, edge, read, bounds)
-        if shifts is not None:
-            pose, reference = _placed(pose, placement.point(references.dimension), shifts, parts)
-    if parts and reference is None:
+        room = free_room(pose, layout, edge_of(artefact, bounds, references), read, bounds)
+        lengths = {axis: length_of(at, *room[:, AXIS_INDEX[axis]]) for axis, at in parts.items()}
+        by = [lengths.get(axis, 0.0) for axis in AXIS_INDEX][: references.dimension]
+        pose, room = Pose(pose.rotation, pose.origin + by), frozen(room - by)
+    elif parts:
         return None
     in_plane = references.artefacts[artefact].reads == "in plane"
     text = (
@@ -72,46 +71,21 @@ def resolve_position(
     if not references.require(is_across or not in_plane, (*steps, "pose"), text):
         return None
     words = settings.description or ""
-    return Position(settings.name, artefact, pose, readings, words, settings.enabled, reference)
+    return Position(settings.name, artefact, pose, readings, words, settings.enabled, room, lengths)
 
 
-def _parts(settings: PositionSettings) -> dict[int, RoomPart]:
-    """Return the places that are parts of the free room, by axis."""
-    points = [settings.corner, settings.centre]
-    places = {axis: place for point in points if point is not None for axis, place in point}
-    if settings.plane is not None:
-        places[settings.plane] = settings.level
-    if settings.pose is not None:
-        places = dict(zip(AXIS_INDEX, settings.pose.origin, strict=False))
-    return {AXIS_INDEX[axis]: at for axis, at in places.items() if isinstance(at, RoomPart)}
-
-
-def _placed(
-    pose: Pose, point: Array, shifts: Array, parts: Mapping[int, RoomPart]
-) -> tuple[Pose, ReferencePoint]:
-    """Return a pose with its reference point moved to parts of the room of `shifts` (2, d)."""
-    room, by = point + shifts, np.zeros(len(point))
-    for axis, part in parts.items():
-        by[axis] = part.between(*room[:, axis].tolist()) - point[axis]
-    reference = ReferencePoint(frozen(point + by), frozen(room), frozenset(parts))
-    return Pose(pose.rotation, pose.origin + by) if parts else pose, reference
-
-
-def in_lengths(settings: Mapping[str, Any], position: Position) -> Mapping[str, Any]:
+def in_lengths(settings: Mapping[str, Any], position: Position) -> dict[str, Any]:
     """Return the settings of a position with lengths for the parts of its room."""
-    reference = position.reference
-    if reference is None or not reference.parts:
-        return settings
-    axes = list(AXIS_INDEX)
-    lengths = {axes[k]: length_text(float(reference.point[k])) for k in sorted(reference.parts)}
+    lengths = {axis: length_text(length) for axis, length in position.parts.items()}
     stated = dict(settings)
     for key in {"corner", "centre"} & stated.keys():
         stated[key] = {axis: lengths.get(axis, text) for axis, text in stated[key].items()}
     if "level" in stated:
         stated["level"] = lengths.get(stated["plane"], stated["level"])
     if "pose" in stated:
-        origin = zip(axes, stated["pose"]["origin"], strict=False)
-        stated["pose"] = stated["pose"] | {"origin": [lengths.get(*entry) for entry in origin]}
+        origin = zip(AXIS_INDEX, stated["pose"]["origin"], strict=False)
+        origin_lengths = [lengths.get(axis, text) for axis, text in origin]
+        stated["pose"] = {**stated["pose"], "origin": origin_lengths}
     return stated
 
 
@@ -214,13 +188,7 @@ def _placement(
     is_right &= check_turns(turns, (*steps, "quarter_turns"), references)
     if point is None or not is_right:
         return None
-    first, second = map(_length, point)
-    return PlanePlacement(plane, _length(settings.level or 0.0), anchor, (first, second), turns)
-
-
-def _length(place: float | RoomPart) -> float:
-    """Return a length; 0 for a part of the room, which is known once all readings are."""
-    return 0.0 if isinstance(place, RoomPart) else place
+    return PlanePlacement(plane, settings.level or 0.0, anchor, point, turns)
 
 
 def check_turns(turns: int, steps: Steps, references: References) -> bool:
@@ -236,7 +204,7 @@ def check_turns(turns: int, steps: Steps, references: References) -> bool:
 
 def _in_plane(
     point: Any, plane: Axis, steps: Steps, references: References
-) -> tuple[float | RoomPart, float | RoomPart] | None:
+) -> tuple[Place, Place] | None:
     axes = IN_PLANE_AXES[plane]
     first, second = sorted(axes)
     is_right = True
@@ -270,9 +238,8 @@ def _free_placement(pose: Any, steps: Steps, references: References) -> FreePlac
     )
     if not is_right:
         return None
-    origin = tuple(map(_length, pose.origin))
     if pose.rotation is None:
-        return FreePlacement(origin, (0.0,) if dimension == 2 else (0.0, 0.0, 0.0))
+        return FreePlacement(pose.origin, (0.0,) if dimension == 2 else (0.0, 0.0, 0.0))
     return FreePlacement(
-        origin, pose.rotation if isinstance(pose.rotation, tuple) else (pose.rotation,)
+        pose.origin, pose.rotation if isinstance(pose.rotation, tuple) else (pose.rotation,)
     )

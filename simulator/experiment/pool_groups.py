@@ -25,7 +25,7 @@ from ..geometry.positions import (
 from ..inputs.messages import Steps
 from ..inputs.number_arrays import Array
 from ..inputs.quantities import length_text
-from ..inputs.room_parts import RoomPart, place_text
+from ..inputs.room_parts import Place, RoomPart, length_of, place_text
 from ..inputs.yamltree import to_python, written
 from .bounds import Bounds, edge_of, entered, extent, free_room, is_within, occupied, outline
 from .model import Position, ReadingGroup
@@ -43,6 +43,11 @@ MOST_CANDIDATES = 20_000
 
 # Why a candidate is dropped that enters a forbidden box.
 FORBIDDEN = "in a forbidden box"
+
+
+# The pose at level and location 0, both (n, d) in metres, and why each candidate cannot be read;
+# empty if it can.
+_Rows = tuple[Pose, Array, list[str]]
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,9 +79,9 @@ class _Group:
     layout: BallLayout
     prefix: str
     planes: tuple[Axis, ...]
-    levels: Mapping[str, tuple[float | RoomPart, ...]]
+    levels: Mapping[str, tuple[Place, ...]]
     anchor: Literal["corner", "centre"]
-    places: Mapping[str, tuple[tuple[float | RoomPart, float | RoomPart], ...]]
+    places: Mapping[str, tuple[tuple[Place, Place], ...]]
     turns: tuple[int, ...]
     probes: Mapping[str, tuple[tuple[str, ...], ...]]
     balls: tuple[_Balls, ...]
@@ -94,13 +99,6 @@ class _Group:
         )
         return sum(of_planes) * len(self.turns) * len(self.balls)
 
-    @property
-    def has_parts(self) -> bool:
-        """True if a place depends on the free room."""
-        levels = (level for plane in self.planes for level in self.levels[plane])
-        places = (at for plane in self.planes for place in self.places[plane] for at in place)
-        return any(isinstance(place, RoomPart) for place in (*levels, *places))
-
 
 def generate(
     settings: GroupSettings, steps: Steps, bounds: Bounds | None, count: int, references: References
@@ -116,10 +114,8 @@ def generate(
     if (
         not references.require(count + group.count <= MOST_CANDIDATES, steps, text)
         or bounds is None
+        or set(references.probes) - bounds.probes.keys()
     ):
-        return None
-    used = {name for plane in group.planes for names in group.probes[plane] for name in names}
-    if group.has_parts and used - bounds.probes.keys():
         return None
     rows = {
         (plane, turn, k): _rows(group, plane, turn, balls, bounds, references)
@@ -128,7 +124,7 @@ def generate(
         for k, balls in enumerate(group.balls)
     }
     candidate_count = sum(
-        sum(reason == "" for reason in rows[plane, turn, k][probes][1])
+        sum(reason == "" for reason in rows[plane, turn, k][probes][2])
         * len(probes)
         * len(balls.indices)
         for plane, turn, (k, balls) in product(group.planes, group.turns, enumerate(group.balls))
@@ -141,64 +137,49 @@ def generate(
 
 def _rows(
     group: _Group, plane: Axis, turn: int, balls: _Balls, bounds: Bounds, references: References
-) -> dict[tuple[str, ...], tuple[Array, list[str]]]:
-    """Return by set of probes, for each level and location, the co-ordinates (n, d) of level and
-    location in metres, and why a candidate cannot be read; empty if it can.
-    """
-    at_zero = _at_zero(group, plane, turn, references.dimension or 3)
-    extents_at_zero = extent(ball_coordinates(at_zero, group.layout)[balls.indices])
+) -> dict[tuple[str, ...], _Rows]:
+    """Return by set of probes where the candidates of each level and location are."""
+    d = references.dimension or 3
+    at_zero = nominal_pose(
+        PlanePlacement(plane, 0.0, group.anchor, (0.0, 0.0), turn), group.layout, d
+    )
+    all_places = [
+        PlanePlacement(plane, level, group.anchor, at).places
+        for level, at in product(group.levels[plane], group.places[plane])
+    ]
     edge = edge_of(group.artefact, bounds, references)
     by_probes = {}
     for probes in group.probes[plane]:
         room = free_room(at_zero, group.layout, edge, [(balls.indices, probes)], bounds)
-        shifts = _points(group, plane, room, len(at_zero.origin))
-        extents = extents_at_zero + shifts[:, None, :]
-        reasons = np.full(len(shifts), "", dtype=object)
+        points = np.array(
+            [
+                [length_of(places[axis], *room[:, k]) for axis, k in [*AXIS_INDEX.items()][:d]]
+                for places in all_places
+            ]
+        )
+        shifts = points[:, None, :]
+        extents = extent(ball_coordinates(at_zero, group.layout)[balls.indices]) + shifts
+        reasons = np.full(len(points), "", dtype=object)
         if edge is not None:
-            around = outline(at_zero, group.layout, edge) + shifts[:, None, :]
+            around = outline(at_zero, group.layout, edge) + shifts
             beyond = ~is_within(around, bounds.volume.lower, bounds.volume.upper)
             reasons[beyond] = "edge outside the volume"
-        around = occupied(at_zero, group.layout, edge) + shifts[:, None, :]
+        around = occupied(at_zero, group.layout, edge) + shifts
         reasons[entered(around, bounds.forbidden).any(axis=-1)] = FORBIDDEN
         for probe in probes:
-            if probe in bounds.probes:
-                readings = extents - bounds.probes[probe].offset
-                outside = ~is_within(readings, *bounds.volume.of_readings)
-                reasons[outside] = "outside the volume"
+            readings = extents - bounds.probes[probe].offset
+            reasons[~is_within(readings, *bounds.volume.of_readings)] = "outside the volume"
         for probe in probes:
             if probe in bounds.reach:
                 beyond = (reasons == "") & ~is_within(extents, *bounds.reach[probe])
                 reasons[beyond] = f"out of reach of probe {probe}"
-        by_probes[probes] = shifts, reasons.tolist()
+        by_probes[probes] = at_zero, points, reasons.tolist()
     return by_probes
-
-
-def _at_zero(group: _Group, plane: Axis, turn: int, d: int) -> Pose:
-    """Return the pose with level and location at the zero of the machine's co-ordinates."""
-    placement = PlanePlacement(plane, 0.0, group.anchor, (0.0, 0.0), turn)
-    return nominal_pose(placement, group.layout, d)
-
-
-def _points(group: _Group, plane: Axis, room: Array | None, d: int) -> Array:
-    """Return the co-ordinates (n, d) of every level and location of a plane in metres, of those
-    that are parts of the `room` (2, d) within it.
-    """
-    axes = [AXIS_INDEX[axis] for axis in (*IN_PLANE_AXES[plane], plane)]
-    rows = [(*at, level) for level, at in product(group.levels[plane], group.places[plane])]
-    points = np.zeros((len(rows), 3))
-    for axis, places in zip(axes, zip(*rows, strict=True), strict=True):
-        points[:, axis] = [
-            place.between(*room[:, axis].tolist())
-            if isinstance(place, RoomPart) and room is not None
-            else place
-            for place in places
-        ]
-    return points[:, :d]
 
 
 def _candidates(
     group: _Group,
-    rows: Mapping[tuple[Axis, int, int], Mapping[tuple[str, ...], tuple[Array, list[str]]]],
+    rows: Mapping[tuple[Axis, int, int], Mapping[tuple[str, ...], _Rows]],
     d: int,
 ) -> Iterator[Generated]:
     readings = {
@@ -220,10 +201,9 @@ def _candidates(
                 else f"{group.prefix}{plane} {place_text(level)} {where}"
             )
             for turn in group.turns:
-                at_zero = _at_zero(group, plane, turn, d)
                 turned = f"{name} turn {turn}" if len(set(group.turns)) > 1 else name
                 for probes, (k, balls) in product(group.probes[plane], enumerate(group.balls)):
-                    points, reasons = rows[plane, turn, k][probes]
+                    at_zero, points, reasons = rows[plane, turn, k][probes]
                     full = (
                         f"{turned} {'+'.join(probes)}" if len(group.probes[plane]) > 1 else turned
                     )
@@ -245,7 +225,7 @@ def _candidates(
                     yield Generated(full, position, "" if d == 2 else plane, settings, "")
 
 
-def _both(first: float | RoomPart, second: float | RoomPart) -> str:
+def _both(first: Place, second: Place) -> str:
     first_text, second_text = place_text(first), place_text(second)
     number, _, unit = first_text.partition(" ")
     return f"{number if second_text.endswith(f' {unit}') else first_text}, {second_text}"
@@ -326,7 +306,7 @@ def _planes(
 
 def _levels(
     settings: GroupSettings, planes: Sequence[Axis], steps: Steps, references: References
-) -> dict[str, tuple[float | RoomPart, ...]]:
+) -> dict[str, tuple[Place, ...]]:
     if references.dimension == 2:
         return {"z": (0.0,)}
     text = 'missing; add "levels", the co-ordinates of the planes'
@@ -339,12 +319,12 @@ def _levels(
 
 def _places(
     lengths: PlacesByAxisSettings, planes: Sequence[Axis], steps: Steps, references: References
-) -> dict[str, tuple[tuple[float | RoomPart, float | RoomPart], ...]]:
+) -> dict[str, tuple[tuple[Place, Place], ...]]:
     axes = sorted({axis for plane in planes for axis in IN_PLANE_AXES[plane]})
     places_by_axis = _by_axis(lengths, axes, "an axis of the planes", steps, references)
     if set(places_by_axis) != set(axes):
         return {}
-    result: dict[str, tuple[tuple[float | RoomPart, float | RoomPart], ...]] = {}
+    result: dict[str, tuple[tuple[Place, Place], ...]] = {}
     for plane in planes:
         first, second = IN_PLANE_AXES[plane]
         # A grid so fine that it is refused need not be made.
@@ -367,7 +347,7 @@ def _by_axis(
     noun: str,
     steps: Steps,
     references: References,
-) -> dict[str, tuple[float | RoomPart, ...]]:
+) -> dict[str, tuple[Place, ...]]:
     by_axis = {}
     for axis in AXIS_INDEX:
         value = getattr(lengths, axis)
@@ -382,7 +362,7 @@ def _by_axis(
     return by_axis
 
 
-def _values(places: Any) -> tuple[float | RoomPart, ...]:
+def _values(places: Any) -> tuple[Place, ...]:
     if not isinstance(places, RangeSettings):
         return places if isinstance(places, tuple) else (places,)
     first, last = (

@@ -9,14 +9,11 @@ from typing import Annotated
 
 from pydantic import PlainValidator, WithJsonSchema
 
-from .quantities import NUMBER, Length, QuantityError, exact_number, parse_length, typed_length
+from .quantities import Length, QuantityError, parse_length, typed_length
 from .settings import nearest, shorten
 
 ENDS = {"low": 0.0, "middle": 0.5, "high": 1.0}
-RATIO = r"[0-9]{1,9} */ *[1-9][0-9]{0,8}"
-PART = re.compile(rf"({NUMBER}) *%|({RATIO})")
-# A millionth of a micrometre: places in a room are as round as those that one would write.
-DECIMALS = 12
+PART = r" *([+-]?[0-9]{1,9}(\.[0-9]{1,20})? *%|[0-9]{1,9} */ *[1-9][0-9]{0,8}) *"
 
 
 @dataclass(frozen=True)
@@ -28,14 +25,18 @@ class RoomPart:
     fraction: float
     written: str
 
-    def between(self, low: float, high: float) -> float:
-        """Return the place between two ends in metres; the middle if there is no room.
 
-        >>> RoomPart(0.3, "30 %").between(-0.05, 0.95)
-        0.25
-        """
-        fraction = self.fraction if low <= high else 0.5
-        return round(low + fraction * (high - low), DECIMALS) + 0.0
+def length_of(place: Place, low: float, high: float) -> float:
+    """Return a place in metres; parts of a room between two ends, the middle if there is no room.
+
+    >>> length_of(0.75, 0.0, 0.5), length_of(RoomPart(0.3, "30 %"), -0.05, 0.95)
+    (0.75, 0.25)
+    """
+    if isinstance(place, float):
+        return place
+    fraction = place.fraction if low <= high else 0.5
+    # A millionth of a micrometre: as round as a length that one would write.
+    return float(round(low + fraction * (high - low), 12)) + 0.0
 
 
 def parse_place(value: object) -> float | RoomPart:
@@ -49,23 +50,23 @@ def parse_place(value: object) -> float | RoomPart:
     text = value.strip() if isinstance(value, str) else ""
     if text in ENDS:
         return RoomPart(ENDS[text], text)
-    if match := PART.fullmatch(text):
-        ratio = match[2] and Fraction(match[2].replace(" ", ""))
-        fraction = exact_number(match[1]) / 100 if ratio is None else ratio
-        if not 0 <= fraction <= 1:
-            raise QuantityError(f'"{shorten(text)}" is beyond the free room; give 0 % to 100 %')
-        return RoomPart(float(fraction), text)
-    if text[:1].isalpha():
-        meant = nearest(text, ENDS)
-        meant = f'did you mean "{meant}"? ' if meant else ""
-        raise QuantityError(
-            f'"{shorten(text)}" is not a place; {meant}write low, middle, high, a part of the free'
-            ' room such as "30 %", or a length such as "750 mm"'
-        )
-    return parse_length(value)
+    if re.fullmatch(PART, text):
+        fraction = Fraction(re.sub("[ %]", "", text)) / (100 if "%" in text else 1)
+        if 0 <= fraction <= 1:
+            return RoomPart(float(fraction), text)
+        raise QuantityError(f'"{text}" is beyond the free room; give 0 % to 100 %')
+    if not text[:1].isalpha():
+        return parse_length(value)
+    meant = nearest(text, ENDS)
+    raise QuantityError(
+        f'"{shorten(text)}" is not a place; '
+        + (f'did you mean "{meant}"? ' if meant else "")
+        + 'write low, middle, high, a part of the free room such as "30 %", or a length such as'
+        ' "750 mm"'
+    )
 
 
-def place_text(place: float | RoomPart) -> str:
+def place_text(place: Place) -> str:
     """Return a place as typed into a file.
 
     >>> place_text(0.25), place_text(RoomPart(0.3, "30 %"))
@@ -74,16 +75,11 @@ def place_text(place: float | RoomPart) -> str:
     return place.written if isinstance(place, RoomPart) else typed_length(place)
 
 
+_SCHEMAS = [
+    {"enum": [*ENDS]},
+    {"type": "string", "pattern": f"^{PART}$", "examples": ["30 %"]},
+    Length.__metadata__[1].json_schema,
+]
 Place = Annotated[
-    float | RoomPart,
-    PlainValidator(parse_place),
-    WithJsonSchema(
-        {
-            "anyOf": [
-                {"enum": [*ENDS]},
-                {"type": "string", "pattern": f"^ *({NUMBER} *%|{RATIO})$", "examples": ["30 %"]},
-                Length.__metadata__[1].json_schema,
-            ]
-        }
-    ),
+    float | RoomPart, PlainValidator(parse_place), WithJsonSchema({"anyOf": _SCHEMAS})
 ]

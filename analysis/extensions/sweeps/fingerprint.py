@@ -55,7 +55,7 @@ LEFT_OUT = (
 # whose module text and options count instead.
 LEFT_OUT_OF = {
     "Experiment": ("readings", "extensions", "switched_off", "faults"),
-    "Position": ("enabled", "reference"),
+    "Position": ("enabled", "room", "parts"),
     "Prior": ("data",),
     "PythonCalibration": ("functions",),
 }
