@@ -21,6 +21,9 @@ from .structure import Sections
 
 TOLERANCE = 1e-9
 
+# Why a place cannot be taken.
+OUTSIDE, EDGE = "outside the volume", "edge outside the volume"
+
 
 @dataclass(frozen=True, eq=False)
 class Bounds:
@@ -44,8 +47,8 @@ def resolve_bounds(
     probes: Mapping[str, Probe],
     references: References,
 ) -> Bounds | None:
-    """Return the limits that the volume, the probes and the limits of a pool state, or report
-    faults.
+    """Return the limits that the volume, the probes and the limits of a pool state; None if one of
+    them is invalid, which is reported.
     """
     limits = sections.get("pool", "limits") or LimitsSettings.model_validate({})
     reach = _reach(limits, references)
@@ -56,29 +59,38 @@ def resolve_bounds(
     return Bounds(machine.volume, probes, reach, limits.edge, forbidden)
 
 
-def free_room(
+def limits_of(
     pose: Pose,
     layout: BallLayout,
     edge: float | None,
     readings: Iterable[tuple[Indices, tuple[str, ...]]],
     bounds: Bounds,
-) -> Array:
-    """Return the least and the greatest shifts (2, d) of a pose at which all probes reach the balls
-    that they read, and an `edge` of material stays inside the volume; the least is above the
-    greatest where there is no room.
+) -> dict[str, Array]:
+    """Return the least and the greatest shifts (2, d) of a pose at which probes reach the balls
+    that they read, and an `edge` of material stays inside the volume, by what is wrong beyond them;
+    the least is above the greatest where there is no room.
 
     `readings` are indices of balls, with the names of probes.
     """
-    balls, ends = (
-        ball_coordinates(pose, layout),
-        np.array([bounds.volume.lower, bounds.volume.upper]),
-    )
-    shifts = [] if edge is None else [ends - outline(pose, layout, edge)]
+    ends = np.array([bounds.volume.lower, bounds.volume.upper])
+    balls = ball_coordinates(pose, layout)
+    shifts: dict[str, list[Array]] = {OUTSIDE: []}
+    if edge is not None:
+        shifts[EDGE] = [ends - outline(pose, layout, edge)]
     for indices, names in readings:
         around = extent(balls[indices])
-        shifts += [ends + bounds.probes[name].offset - around for name in names]
-        shifts += [bounds.reach[name] - around for name in names if name in bounds.reach]
-    least, greatest = np.swapaxes(shifts, 0, 1)
+        for name in names:
+            offset = bounds.probes[name].offset if name in bounds.probes else 0.0
+            shifts[OUTSIDE].append(ends + offset - around)
+            if name in bounds.reach:
+                beyond = shifts.setdefault(f"out of reach of probe {name}", [])
+                beyond.append(bounds.reach[name] - around)
+    return {reason: shared(rooms) for reason, rooms in shifts.items()}
+
+
+def shared(rooms: Iterable[Array]) -> Array:
+    """Return what rooms (2, d) have in common."""
+    least, greatest = np.swapaxes([*rooms], 0, 1)
     return frozen([least.max(axis=0), greatest.min(axis=0)])
 
 
@@ -97,14 +109,6 @@ def outline(pose: Pose, layout: BallLayout, edge: float) -> Array:
     beyond its balls.
     """
     return extent(corners(pose, layout, edge))
-
-
-def is_within(indices: Array, lower: Array, upper: Array) -> Any:
-    """True if extents (…, 2, d) are within limits (d,)."""
-    return np.all(
-        (indices[..., 0, :] >= lower - TOLERANCE) & (indices[..., 1, :] <= upper + TOLERANCE),
-        axis=-1,
-    )
 
 
 def entered(around: Array, boxes: Array) -> Any:

@@ -44,6 +44,7 @@ from .probes import resolve_probes, resolve_stars
 from .readings_checks import check_readings
 from .readings_section import no_settings
 from .references import resolve_references
+from .spans import unspanned
 from .structure import validate_sections
 from .variants import MOST_OF_ALL, in_variants, variant_trees, with_present_keys
 
@@ -88,7 +89,10 @@ def load(
         if experiment is not None:
             faults = tuple(in_order(messages, refused, source)) if tolerant else None
             mark = mark_of(root, ("variants", name), of_key=True)
-            experiments.append(replace(experiment, mark=mark, faults=faults))
+            experiment = replace(experiment, mark=mark, faults=faults)
+            lost = unspanned(_without_variants(root), experiment)
+            notes = (str(experiment.message(("variants", name), lost)),) if lost else ()
+            experiments.append(replace(experiment, notes=(*experiment.notes, *notes)))
             size += experiment.size
         if size > MOST_OF_ALL and len(experiments) > 1:
             text = (

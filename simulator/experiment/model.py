@@ -87,7 +87,7 @@ class Position:
 
     ``description`` completes a short name; possibly empty. One that is not ``enabled`` is not read,
     and no experiment that can be evaluated has it. ``room`` (2, d) are the least and
-    greatest shifts within reach of its probes, if known, and ``parts`` the co-ordinates by axis for
+    greatest shifts within reach of its probes, and ``parts`` the co-ordinates by axis for
     which the file states a part of this room, both in metres.
     """
 
@@ -97,7 +97,7 @@ class Position:
     readings: tuple[ReadingGroup, ...]
     description: str = ""
     enabled: bool = True
-    room: Array | None = None
+    room: Array = field(default_factory=lambda: np.zeros((2, 3)))
     parts: Mapping[str, float] = field(default_factory=dict)
 
     @property

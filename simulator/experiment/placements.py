@@ -8,7 +8,7 @@ from typing import Any, Literal
 import numpy as np
 
 from ..design.lookup import References, lengths_per_axis
-from ..geometry.ball_layouts import BallLayout, frozen
+from ..geometry.ball_layouts import BallLayout
 from ..geometry.positions import (
     AXIS_INDEX,
     IN_PLANE_AXES,
@@ -21,7 +21,7 @@ from ..geometry.positions import (
 from ..inputs.messages import Steps
 from ..inputs.quantities import length_text
 from ..inputs.room_parts import Place, RoomPart, length_of
-from .bounds import Bounds, edge_of, free_room
+from .bounds import Bounds, edge_of, limits_of, shared
 from .model import Position, ReadingGroup
 from .position_sections import PositionSettings, ReadingSettings
 
@@ -35,10 +35,7 @@ READING_KEYS = ("probes", "balls", "repeats", "standard_uncertainty")
 def resolve_position(
     settings: PositionSettings, steps: Steps, bounds: Bounds | None, references: References
 ) -> Position | None:
-    """Return a position with its pose and readings, or None after reporting faults.
-
-    Without `bounds`, which is a fault, no place is known that is a part of the free room.
-    """
+    """Return a position with its pose and readings, or None after reporting faults."""
     artefact = references.artefact(settings.artefact, steps)
     layout = references.layouts.get(artefact) if artefact is not None else None
     readings = _readings(settings, steps, layout, references)
@@ -53,15 +50,14 @@ def resolve_position(
         return None
     pose = nominal_pose(placement, layout, references.dimension)
     parts = {axis: at for axis, at in placement.places.items() if isinstance(at, RoomPart)}
-    lengths, room = {}, None
-    if bounds is not None and bounds.probes.keys() >= {*references.probes}:
+    lengths, room = dict[str, float](), np.zeros((2, references.dimension))
+    if bounds is not None:
         read = [(group.ball_indices, group.probes) for group in readings]
-        room = free_room(pose, layout, edge_of(artefact, bounds, references), read, bounds)
+        edge = edge_of(artefact, bounds, references)
+        room = shared(limits_of(pose, layout, edge, read, bounds).values())
         lengths = {axis: length_of(at, *room[:, AXIS_INDEX[axis]]) for axis, at in parts.items()}
         by = [lengths.get(axis, 0.0) for axis in AXIS_INDEX][: references.dimension]
-        pose, room = Pose(pose.rotation, pose.origin + by), frozen(room - by)
-    elif parts:
-        return None
+        pose, room = Pose(pose.rotation, pose.origin + by), room - by
     in_plane = references.artefacts[artefact].reads == "in plane"
     text = (
         f'"{artefact}" is read in its plane, which has to be across an axis of the machine;'
@@ -71,7 +67,9 @@ def resolve_position(
     if not references.require(is_across or not in_plane, (*steps, "pose"), text):
         return None
     words = settings.description or ""
-    return Position(settings.name, artefact, pose, readings, words, settings.enabled, room, lengths)
+    return Position(
+        settings.name, artefact, pose, readings, words, settings.enabled, room - by, lengths
+    )
 
 
 def in_lengths(settings: Mapping[str, Any], position: Position) -> dict[str, Any]:

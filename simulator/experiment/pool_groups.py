@@ -12,6 +12,7 @@ from typing import Any, Literal
 import numpy as np
 
 from ..design.lookup import Indices, References, lengths_per_axis
+from ..design.objects import SLIGHTLY
 from ..geometry.ball_layouts import BallLayout
 from ..geometry.positions import (
     AXIS_INDEX,
@@ -19,7 +20,6 @@ from ..geometry.positions import (
     Axis,
     PlanePlacement,
     Pose,
-    ball_coordinates,
     nominal_pose,
 )
 from ..inputs.messages import Steps
@@ -27,7 +27,7 @@ from ..inputs.number_arrays import Array
 from ..inputs.quantities import length_text
 from ..inputs.room_parts import Place, RoomPart, length_of, place_text
 from ..inputs.yamltree import to_python, written
-from .bounds import Bounds, edge_of, entered, extent, free_room, is_within, occupied, outline
+from .bounds import OUTSIDE, TOLERANCE, Bounds, edge_of, entered, limits_of, occupied, shared
 from .model import Position, ReadingGroup
 from .placements import check_turns
 from .pool_sections import (
@@ -114,7 +114,6 @@ def generate(
     if (
         not references.require(count + group.count <= MOST_CANDIDATES, steps, text)
         or bounds is None
-        or set(references.probes) - bounds.probes.keys()
     ):
         return None
     rows = {
@@ -150,29 +149,22 @@ def _rows(
     edge = edge_of(group.artefact, bounds, references)
     by_probes = {}
     for probes in group.probes[plane]:
-        room = free_room(at_zero, group.layout, edge, [(balls.indices, probes)], bounds)
+        limits = limits_of(at_zero, group.layout, edge, [(balls.indices, probes)], bounds)
+        room = shared(limits.values())
         points = np.array(
             [
                 [length_of(places[axis], *room[:, k]) for axis, k in [*AXIS_INDEX.items()][:d]]
                 for places in all_places
             ]
         )
-        shifts = points[:, None, :]
-        extents = extent(ball_coordinates(at_zero, group.layout)[balls.indices]) + shifts
+        around = occupied(at_zero, group.layout, edge) + points[:, None, :]
+        beyond = {FORBIDDEN: entered(around, bounds.forbidden).any(axis=-1)}
+        for reason, (least, greatest) in limits.items():
+            play = TOLERANCE + (reason == OUTSIDE) * SLIGHTLY * bounds.volume.size
+            beyond[reason] = ((points < least - play) | (points > greatest + play)).any(axis=-1)
         reasons = np.full(len(points), "", dtype=object)
-        if edge is not None:
-            around = outline(at_zero, group.layout, edge) + shifts
-            beyond = ~is_within(around, bounds.volume.lower, bounds.volume.upper)
-            reasons[beyond] = "edge outside the volume"
-        around = occupied(at_zero, group.layout, edge) + shifts
-        reasons[entered(around, bounds.forbidden).any(axis=-1)] = FORBIDDEN
-        for probe in probes:
-            readings = extents - bounds.probes[probe].offset
-            reasons[~is_within(readings, *bounds.volume.of_readings)] = "outside the volume"
-        for probe in probes:
-            if probe in bounds.reach:
-                beyond = (reasons == "") & ~is_within(extents, *bounds.reach[probe])
-                reasons[beyond] = f"out of reach of probe {probe}"
+        for reason in dict.fromkeys((OUTSIDE, FORBIDDEN, *limits)):
+            reasons[(reasons == "") & beyond[reason]] = reason
         by_probes[probes] = at_zero, points, reasons.tolist()
     return by_probes
 

@@ -16,23 +16,14 @@ import numpy as np
 from ..design.lookup import ReadingCount, References
 from ..design.observations.calibration import Calibration
 from ..design.observations.radius import RadiusCalibration
-from ..geometry.positions import AXIS_INDEX, ball_coordinates
+from ..geometry.positions import AXIS_INDEX
 from ..inputs.messages import Steps, format_path
 from ..inputs.number_arrays import Array
 from ..inputs.problems import written_count, written_text
 from ..inputs.quantities import format_length
 from ..inputs.settings import hint, listing
 from ..inputs.yamltree import Mapping, Sequence, to_python, written
-from .bounds import (
-    TOLERANCE,
-    Bounds,
-    edge_of,
-    entered,
-    extent,
-    is_within,
-    occupied,
-    outline,
-)
+from .bounds import EDGE, OUTSIDE, TOLERANCE, Bounds, edge_of, entered, limits_of, occupied
 from .calibrations import resolve_calibration
 from .checks import check_inside, check_lengths
 from .model import AtMost, Candidate, ChangeTimes, Pool, Position
@@ -381,46 +372,24 @@ def _entered(position: Position, bounds: Bounds, references: References) -> int 
 
 def _check_bounds(position: Position, steps: Steps, bounds: Bounds, references: References) -> None:
     """Report a position whose plate's edge is outside the volume, or that a probe cannot reach."""
-    layout, problems = references.layouts[position.artefact], references.problems
-    lower, upper = bounds.volume.lower, bounds.volume.upper
     edge = edge_of(position.artefact, bounds, references)
-    if edge is not None:
-        around = outline(position.pose, layout, edge)
-        if not is_within(around, lower, upper):
-            beyond = format_length(float(np.max([lower - around[0], around[1] - upper])))
+    read = [(group.ball_indices, group.probes) for group in position.readings]
+    layout = references.layouts[position.artefact]
+    for reason, (least, greatest) in limits_of(position.pose, layout, edge, read, bounds).items():
+        by_axis = np.maximum(least, -greatest)
+        beyond, axis = float(by_axis.max()), list(AXIS_INDEX)[by_axis.argmax()]
+        if reason == OUTSIDE or beyond <= TOLERANCE:
+            continue
+        text = (
+            f"a ball is {format_length(beyond)} {reason} along {axis}; move it, or correct"
+            " pool.limits.reach"
+        )
+        if edge is not None and reason == EDGE:
             text = (
-                f"with its edge of {format_length(edge)} the plate is {beyond} outside the volume"
+                f"with its edge of {format_length(edge)} the plate is {format_length(beyond)}"
+                " outside the volume; move it, or correct pool.limits.edge"
             )
-            problems.add(steps, f"{text}; move it, or correct pool.limits.edge")
-    if not bounds.reach:
-        return
-    coordinates = ball_coordinates(position.pose, layout)
-    for group in position.readings:
-        for probe in group.probes:
-            if probe in bounds.reach:
-                text = _beyond(coordinates[group.ball_indices], bounds.reach[probe])
-                if text:
-                    text = (
-                        f"probe {probe} does not reach that far: {text}; move it, or correct"
-                        " pool.limits.reach"
-                    )
-                    problems.add(steps, text)
-
-
-def _beyond(points: Array, ends: Array) -> str:
-    lowest, highest = extent(points)
-    for k, axis in enumerate(list(AXIS_INDEX)[: points.shape[1]]):
-        if lowest[k] < ends[0, k] - TOLERANCE:
-            return (
-                f"a ball is at {axis} = {format_length(lowest[k])}, below"
-                f" {format_length(ends[0, k])}"
-            )
-        if highest[k] > ends[1, k] + TOLERANCE:
-            return (
-                f"a ball is at {axis} = {format_length(highest[k])}, above"
-                f" {format_length(ends[1, k])}"
-            )
-    return ""
+        references.problems.add(steps, text)
 
 
 def _limits(

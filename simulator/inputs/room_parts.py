@@ -5,12 +5,12 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass
 from fractions import Fraction
-from typing import Annotated
+from typing import Annotated, get_args
 
 from pydantic import PlainValidator, WithJsonSchema
 
 from .quantities import Length, QuantityError, parse_length, typed_length
-from .settings import nearest, shorten
+from .settings import hint, shorten
 
 ENDS = {"low": 0.0, "middle": 0.5, "high": 1.0}
 PART = r" *([+-]?[0-9]{1,9}(\.[0-9]{1,20})? *%|[0-9]{1,9} */ *[1-9][0-9]{0,8}) *"
@@ -57,12 +57,9 @@ def parse_place(value: object) -> float | RoomPart:
         raise QuantityError(f'"{text}" is beyond the free room; give 0 % to 100 %')
     if not text[:1].isalpha():
         return parse_length(value)
-    meant = nearest(text, ENDS)
     raise QuantityError(
-        f'"{shorten(text)}" is not a place; '
-        + (f'did you mean "{meant}"? ' if meant else "")
-        + 'write low, middle, high, a part of the free room such as "30 %", or a length such as'
-        ' "750 mm"'
+        f'"{shorten(text)}" is not a place ({hint(text, ENDS)}); write low, middle, high, a part of'
+        ' the free room such as "30 %", or a length such as "750 mm"'
     )
 
 
@@ -78,7 +75,7 @@ def place_text(place: Place) -> str:
 _SCHEMAS = [
     {"enum": [*ENDS]},
     {"type": "string", "pattern": f"^{PART}$", "examples": ["30 %"]},
-    Length.__metadata__[1].json_schema,
+    get_args(Length)[-1].json_schema,
 ]
 Place = Annotated[
     float | RoomPart, PlainValidator(parse_place), WithJsonSchema({"anyOf": _SCHEMAS})

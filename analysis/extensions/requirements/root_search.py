@@ -11,7 +11,7 @@ from typing import Literal
 import numpy as np
 from ballplate.results import PlannedUncertainty, planned_uncertainty, predict
 from ballplate.simulator.computing import Report, comparable, counted, single_threaded, unreported
-from ballplate.simulator.experiment import Experiment, override
+from ballplate.simulator.experiment import Experiment, override, unspanned
 from ballplate.simulator.inputs import ExperimentError, Mapping, Node, Scalar, listing, refused
 
 from .answers import Answer, Reach
@@ -182,6 +182,11 @@ def _told(
 ) -> Answer:
     searched, verified = trials.one, trials.verified(step)
     assert verified.is_met is (status != "none")
+    # Where no value does, the smallest one leaves most of the volume out.
+    valid = [tried for tried in sorted(trials.known) if trials.known[tried].judgement]
+    shown = step if verified.is_met else valid[0]
+    if lost := unspanned(trials.searched.root, trials.searched.built(searched.tree(shown))):
+        remarks = [*remarks, f"with {searched.words(shown)} {lost}"]
     needed = searched.words(step), searched.value(step), verified.words, "", tuple(remarks)
     return Answer(searched.name, searched.title, status, searched.present, searched.grows, *needed)
 

@@ -11,6 +11,7 @@ NAMES = (
     "cell",
     "status",
     "reason",
+    "unspanned",
     "data_set_seed",
     "fingerprint",
     "duration_s",
