@@ -49,13 +49,16 @@ def resolve_position(
     ):
         return None
     pose = nominal_pose(placement, layout, references.dimension)
-    parts = {axis: at for axis, at in placement.places.items() if isinstance(at, RoomPart)}
     lengths, room = dict[str, float](), np.zeros((2, references.dimension))
     if bounds is not None:
         read = [(group.ball_indices, group.probes) for group in readings]
         edge = edge_of(artefact, bounds, references)
         room = shared(limits_of(pose, layout, edge, read, bounds).values())
-        lengths = {axis: length_of(at, *room[:, AXIS_INDEX[axis]]) for axis, at in parts.items()}
+        lengths = {
+            axis: length_of(place, *room[:, AXIS_INDEX[axis]])
+            for axis, place in placement.places.items()
+            if isinstance(place, RoomPart)
+        }
         by = [lengths.get(axis, 0.0) for axis in AXIS_INDEX][: references.dimension]
         pose, room = Pose(pose.rotation, pose.origin + by), room - by
     in_plane = references.artefacts[artefact].reads == "in plane"
@@ -67,9 +70,7 @@ def resolve_position(
     if not references.require(is_across or not in_plane, (*steps, "pose"), text):
         return None
     words = settings.description or ""
-    return Position(
-        settings.name, artefact, pose, readings, words, settings.enabled, room - by, lengths
-    )
+    return Position(settings.name, artefact, pose, readings, words, settings.enabled, room, lengths)
 
 
 def in_lengths(settings: Mapping[str, Any], position: Position) -> dict[str, Any]:

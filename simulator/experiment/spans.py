@@ -58,7 +58,7 @@ def _room(experiment: Experiment) -> Array:
     d, artefacts = experiment.dimension, experiment.artefacts
     places = [at for at in experiment.positions if artefacts[at.artefact].role == "plate"]
     balls = [ball_coordinates(at.pose, experiment.layouts[at.artefact]) for at in places]
-    lie = np.reshape([np.ptp(rows, axis=0) > TOLERANCE for rows in balls], (-1, 1, d))
+    lie = np.array([np.ptp(rows, axis=0) > TOLERANCE for rows in balls], bool).reshape(-1, 1, d)
     rooms = [np.abs(at.room) * [axis not in at.parts for axis in "xyz"[:d]] for at in places]
     where = lie | ~lie.any(axis=0)
     return np.min(np.reshape(rooms, (-1, 2, d)), axis=0, where=where, initial=np.inf)
