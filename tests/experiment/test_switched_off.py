@@ -111,7 +111,7 @@ def test_a_tolerant_reader_gets_everything_with_its_faults() -> None:
         lay_out(found)
     # A position that cannot be understood is told of, and the others are there.
     unclear = experiment_of(
-        TEXT.replace("plane: z, level: 750", "plane: q, level: 750"), tolerant=True
+        TEXT.replace("plane: z, level: 80", "plane: q, level: 80"), tolerant=True
     )
     assert len(unclear.positions) == len(names) - 1 and unclear.faults
     # What is no experiment at all is refused.

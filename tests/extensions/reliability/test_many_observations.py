@@ -47,7 +47,7 @@ def test_reliability_of_too_many(monkeypatch: pytest.MonkeyPatch) -> None:
         reliability(experiment)
     assert (
         str(caught.value)
-        == f"{QUICKSTART}:41:1: positions: {rows} observations, each co-ordinate counted, are too"
+        == f"{QUICKSTART}:39:1: positions: {rows} observations, each co-ordinate counted, are too"
         f" many to test for gross errors; at most {rows - 1} are possible with {columns} parameters"
         " of machine, poses and tied balls: read fewer balls, or in fewer positions"
     )

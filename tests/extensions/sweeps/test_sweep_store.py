@@ -447,7 +447,7 @@ def test_rows_do_not_depend_on_where_the_command_is_started(tmp_path: Path) -> N
     elsewhere = ("--store", tmp_path / "3.sqlite", "--workers", 1)
     assert run("sweep", tmp_path / "sweeps" / "s.yaml", *elsewhere).returncode == 1
     first = rows(tmp_path / "1.sqlite")
-    assert first["reason"][2].startswith("../quickstart.yaml:42:5: positions[0]: ")
+    assert first["reason"][2].startswith("../quickstart.yaml:40:5: positions[0]: ")
     for k in (2, 3):
         assert_same(first, rows(tmp_path / f"{k}.sqlite"))
 
