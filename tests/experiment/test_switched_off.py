@@ -16,7 +16,7 @@ TEXT = QUICKSTART.read_text(encoding="utf-8")
 LINE = next(line for line in TEXT.splitlines(keepends=True) if "name: z high" in line)
 OFF = TEXT.replace("name: z high,", "name: z high, enabled: false,")
 # A level at which all balls are above the volume.
-OUTSIDE = TEXT.replace(LINE, LINE.replace("750 mm", "7500 mm"))
+OUTSIDE = TEXT.replace(LINE, LINE.replace("80 %", "7500 mm"))
 
 
 def experiment_of(text: str, **options: bool) -> bp.Experiment:
