@@ -20,21 +20,17 @@ def unspanned(tree: Node, changed: Experiment) -> str:
     """Return which part of the volume plates span, where that is less than in the experiment of
     another `tree`, which shares all nodes that do not differ.
 
-    Empty unless artefacts, the volume or the edge differ, and outermost places are lengths and the
-    same.
+    Empty unless artefacts, the volume or the edge differ, and outermost places are lengths.
     """
-    differ = [
-        path
-        for path in (*SIZES, "positions")
-        if node_at(tree, path) is not node_at(changed.tree, path)
-    ]
-    if not differ or "positions" in differ:
+    if all(node_at(tree, path) is node_at(changed.tree, path) for path in SIZES):
         return ""
     try:
         before = _room(changed.builder(tree))
     except ExperimentError:
         return ""
     volume, room = changed.machine.volume, _room(changed)
+    if room.shape != before.shape:
+        return ""
     is_lost = room > before + SLIGHTLY * volume.size
     ends = 1e3 * np.array([volume.lower + room[0], volume.upper - room[1], volume.size])
     spans = [

@@ -87,16 +87,20 @@ def test_variants_with_plates_that_stay_are_noted(tmp_path: Path) -> None:
   noisy: {{machine.repeatability: 1 um}}
   balls: {{"artefacts.plate.balls": [4, 4]}}
   moved: {{{SIZE.format(450)}, "positions[z high].corner": {{x: 550 mm, y: 550 mm}}}}
+  all moved: {{{SIZE.format(450)}, "positions[z high].corner": {{x: 550 mm, y: 550 mm}}, "positions[x high].corner.z": 550 mm}}
+  flat: {{machine.volume: [1 m, 1 m], positions: [{{name: a, corner: {{x: 9 mm, y: 9 mm}}, probes: [down]}}], probes: {{down: [0 mm, 0 mm]}}, error_model: {{kind: kinematic}}, evaluation: {{points: {{random: 9}}}}}}
 """
     places = wording.THE_PLACES_ARE_LENGTHS
     found = notes(tmp_path, LENGTHS, variants)
-    assert [len(lines) for lines in found] == [0, 1, 1, 1, 0, 0, 0]
+    assert [len(lines) for lines in found] == [0, 1, 1, 1, 0, 0, 1, 0, 0]
     path, line = written(tmp_path, ""), len(LENGTHS.splitlines()) + 4
     assert found[1] == (
         f"{path}:{line}:3: variants.small: {LOST.format(700, places.format('x: high'))}",
     )
     assert found[2][0].endswith(f"plates span y 0 to 1000 of 1500 mm; {places.format('y: high')}")
     assert found[3][0].endswith(f"plates span z 0 to 1000 of 1200 mm; {places.format('z: low')}")
+    # What is moved is taken as it is.
+    assert found[6][0].endswith(f"plates span z 0 to 700 of 1000 mm; {places.format('z: high')}")
     # Plates that follow have nothing to note.
     assert not any(notes(tmp_path, TEXT, variants.replace("550 mm", "high")))
 
