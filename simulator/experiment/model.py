@@ -237,9 +237,10 @@ class Experiment:
     artefact → its balls. ``target_uncertainty`` and ``expected_rank_deficiency``: optional.
     ``coverage_factor`` times the standard uncertainty is compared with targets. ``noise``: of
     simulated readings. ``pool``: candidates of a plan. ``doubts``: possible but improbable
-    statements. ``notes``: settings detected in its tables. ``readings``: location and form of
-    tables of readings. ``sections``: entries under keys that extensions provide. ``extensions``:
-    names of required ones. ``tree``: the file's content without variants, ``mark``: the location
+    statements. ``notes``: settings detected in its tables, and what plates no longer span.
+    ``readings``: location and form of tables of readings. ``sections``: entries under keys that
+    extensions provide. ``extensions``: names of required ones. ``tree``: the file's content without
+    variants, ``mark``: the location
     of the experiment, and ``builder``: function from a tree to an experiment, with the ``trust``
     in the file. ``switched_off``: names of positions of the file that are not read. ``faults``: of
     an experiment that was loaded with them, to be changed and not to be evaluated; otherwise None.
