@@ -30,6 +30,7 @@ if TYPE_CHECKING:
         module_files,
         named_in,
     )
+    from .placements import in_lengths
     from .pool import placed_only, with_chosen
     from .pools import seconds_of
     from .readings_section import (
@@ -39,6 +40,7 @@ if TYPE_CHECKING:
         ReadingsSettings,
     )
     from .sections import Line, Seed
+    from .spans import unspanned
     from .star_tables import doubt_of_table
     from .variants import (
         is_same_place,

@@ -310,11 +310,14 @@ def check_inside(
         if offset
         else ""
     )
+    remedy = "move the artefact"
+    if AXES[axis] in position.parts:
+        remedy = f"there is no room along {AXES[axis]}: take a smaller artefact"
     text = (
         f'reading ball "{layout.names[balls[worst]]}" with probe "{probe}" moves the scales to'
         f" {AXES[axis]} = {format_length(place - offset)}{less},"
         f" {format_length(by_how_much[worst])} {sides[worst]} the measuring volume{others_text};"
-        " move the artefact, or read it otherwise"
+        f" {remedy}, or read it otherwise"
     )
     references.problems.add(steps, text)
 

@@ -17,6 +17,7 @@ from ..inputs.problems import Problems, in_order, written_count
 from ..inputs.trust import OPENED, Trust
 from ..inputs.yamltree import Mapping, Mark, Node, mark_of, parse_tree, read_text
 from ..machines.settings import with_defaults
+from .bounds import resolve_bounds
 from .calibrations import resolve_calibration
 from .changes import node_of
 from .checks import (
@@ -43,6 +44,7 @@ from .probes import resolve_probes, resolve_stars
 from .readings_checks import check_readings
 from .readings_section import no_settings
 from .references import resolve_references
+from .spans import unspanned
 from .structure import validate_sections
 from .variants import MOST_OF_ALL, in_variants, variant_trees, with_present_keys
 
@@ -87,7 +89,10 @@ def load(
         if experiment is not None:
             faults = tuple(in_order(messages, refused, source)) if tolerant else None
             mark = mark_of(root, ("variants", name), of_key=True)
-            experiments.append(replace(experiment, mark=mark, faults=faults))
+            experiment = replace(experiment, mark=mark, faults=faults)
+            lost = unspanned(_without_variants(root), experiment)
+            notes = (str(experiment.message(("variants", name), lost)),) if lost else ()
+            experiments.append(replace(experiment, notes=(*experiment.notes, *notes)))
             size += experiment.size
         if size > MOST_OF_ALL and len(experiments) > 1:
             text = (
@@ -191,6 +196,7 @@ def _build(
     if machine is not None:
         references = replace(references, volume=machine.volume)
     probes = resolve_probes(sections, references)
+    bounds = resolve_bounds(sections, machine, probes, references)
     check_error_model(sections, machine, references)
     check_true_machine(sections, machine, references)
     for section in ("positions", "calibration"):
@@ -202,13 +208,13 @@ def _build(
     positions = {}
     for key, settings in sections.entries("positions").items():
         i = int(key)
-        position = resolve_position(settings, ("positions", i), references)
+        position = resolve_position(settings, ("positions", i), bounds, references)
         if position is not None:
             positions[i] = position
             volume = machine.volume if machine is not None and position.enabled else None
             if volume is not None and len(volume.lower) == references.dimension:
                 check_inside(position, ("positions", i), volume, probes, references)
-    candidates = resolve_candidates(sections, positions, machine, probes, references)
+    candidates = resolve_candidates(sections, positions, bounds, references)
     possible = candidates.positions if candidates.complete else None
     check_use(sections, positions, position_count, references, possible, planning)
     # What may read calibrated balls, and have priors; more than there is of it where some is wrong.

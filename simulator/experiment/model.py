@@ -86,7 +86,9 @@ class Position:
     """A position of an artefact, its nominal pose in the machine and its readings.
 
     ``description`` completes a short name; possibly empty. One that is not ``enabled`` is not read,
-    and no experiment that can be evaluated has it.
+    and no experiment that can be evaluated has it. ``room`` (2, d) are the least and
+    greatest shifts within reach of its probes, and ``parts`` the co-ordinates by axis for
+    which the file states a part of this room, both in metres.
     """
 
     name: str
@@ -95,6 +97,8 @@ class Position:
     readings: tuple[ReadingGroup, ...]
     description: str = ""
     enabled: bool = True
+    room: Array = field(default_factory=lambda: np.zeros((2, 3)))
+    parts: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def count(self) -> int:
@@ -233,9 +237,10 @@ class Experiment:
     artefact → its balls. ``target_uncertainty`` and ``expected_rank_deficiency``: optional.
     ``coverage_factor`` times the standard uncertainty is compared with targets. ``noise``: of
     simulated readings. ``pool``: candidates of a plan. ``doubts``: possible but improbable
-    statements. ``notes``: settings detected in its tables. ``readings``: location and form of
-    tables of readings. ``sections``: entries under keys that extensions provide. ``extensions``:
-    names of required ones. ``tree``: the file's content without variants, ``mark``: the location
+    statements. ``notes``: settings detected in its tables, and what plates no longer span.
+    ``readings``: location and form of tables of readings. ``sections``: entries under keys that
+    extensions provide. ``extensions``: names of required ones. ``tree``: the file's content without
+    variants, ``mark``: the location
     of the experiment, and ``builder``: function from a tree to an experiment, with the ``trust``
     in the file. ``switched_off``: names of positions of the file that are not read. ``faults``: of
     an experiment that was loaded with them, to be changed and not to be evaluated; otherwise None.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any, Literal
 
 import numpy as np
@@ -9,13 +10,18 @@ import numpy as np
 from ..design.lookup import References, lengths_per_axis
 from ..geometry.ball_layouts import BallLayout
 from ..geometry.positions import (
+    AXIS_INDEX,
     IN_PLANE_AXES,
     Axis,
     FreePlacement,
     PlanePlacement,
+    Pose,
     nominal_pose,
 )
 from ..inputs.messages import Steps
+from ..inputs.quantities import length_text
+from ..inputs.room_parts import Place, RoomPart, length_of
+from .bounds import Bounds, edge_of, limits_of, shared
 from .model import Position, ReadingGroup
 from .position_sections import PositionSettings, ReadingSettings
 
@@ -27,7 +33,7 @@ READING_KEYS = ("probes", "balls", "repeats", "standard_uncertainty")
 
 
 def resolve_position(
-    settings: PositionSettings, steps: Steps, references: References
+    settings: PositionSettings, steps: Steps, bounds: Bounds | None, references: References
 ) -> Position | None:
     """Return a position with its pose and readings, or None after reporting faults."""
     artefact = references.artefact(settings.artefact, steps)
@@ -43,6 +49,18 @@ def resolve_position(
     ):
         return None
     pose = nominal_pose(placement, layout, references.dimension)
+    lengths, room = dict[str, float](), np.zeros((2, references.dimension))
+    if bounds is not None:
+        read = [(group.ball_indices, group.probes) for group in readings]
+        edge = edge_of(artefact, bounds, references)
+        room = shared(limits_of(pose, layout, edge, read, bounds).values())
+        lengths = {
+            axis: length_of(place, *room[:, AXIS_INDEX[axis]])
+            for axis, place in placement.places.items()
+            if isinstance(place, RoomPart)
+        }
+        by = [lengths.get(axis, 0.0) for axis in AXIS_INDEX][: references.dimension]
+        pose, room = Pose(pose.rotation, pose.origin + by), room - by
     in_plane = references.artefacts[artefact].reads == "in plane"
     text = (
         f'"{artefact}" is read in its plane, which has to be across an axis of the machine;'
@@ -52,7 +70,22 @@ def resolve_position(
     if not references.require(is_across or not in_plane, (*steps, "pose"), text):
         return None
     words = settings.description or ""
-    return Position(settings.name, artefact, pose, readings, words, settings.enabled)
+    return Position(settings.name, artefact, pose, readings, words, settings.enabled, room, lengths)
+
+
+def in_lengths(settings: Mapping[str, Any], position: Position) -> dict[str, Any]:
+    """Return the settings of a position with lengths for the parts of its room."""
+    lengths = {axis: length_text(length) for axis, length in position.parts.items()}
+    stated = dict(settings)
+    for key in {"corner", "centre"} & stated.keys():
+        stated[key] = {axis: lengths.get(axis, text) for axis, text in stated[key].items()}
+    if "level" in stated:
+        stated["level"] = lengths.get(stated["plane"], stated["level"])
+    if "pose" in stated:
+        origin = zip(AXIS_INDEX, stated["pose"]["origin"], strict=False)
+        origin_lengths = [lengths.get(axis, text) for axis, text in origin]
+        stated["pose"] = {**stated["pose"], "origin": origin_lengths}
+    return stated
 
 
 def _readings(
@@ -170,7 +203,7 @@ def check_turns(turns: int, steps: Steps, references: References) -> bool:
 
 def _in_plane(
     point: Any, plane: Axis, steps: Steps, references: References
-) -> tuple[float, float] | None:
+) -> tuple[Place, Place] | None:
     axes = IN_PLANE_AXES[plane]
     first, second = sorted(axes)
     is_right = True

@@ -12,7 +12,7 @@ from typing import Any, Literal
 import numpy as np
 
 from ..design.lookup import Indices, References, lengths_per_axis
-from ..design.objects import Volume
+from ..design.objects import SLIGHTLY
 from ..geometry.ball_layouts import BallLayout
 from ..geometry.positions import (
     AXIS_INDEX,
@@ -20,19 +20,19 @@ from ..geometry.positions import (
     Axis,
     PlanePlacement,
     Pose,
-    ball_coordinates,
-    corners,
     nominal_pose,
 )
 from ..inputs.messages import Steps
 from ..inputs.number_arrays import Array
-from ..inputs.quantities import length_text, typed_length
+from ..inputs.quantities import length_text
+from ..inputs.room_parts import Place, RoomPart, length_of, place_text
 from ..inputs.yamltree import to_python, written
-from .model import Position, Probe, ReadingGroup
+from .bounds import OUTSIDE, TOLERANCE, Bounds, edge_of, entered, limits_of, occupied, shared
+from .model import Position, ReadingGroup
 from .placements import check_turns
 from .pool_sections import (
     GroupSettings,
-    LengthsByAxisSettings,
+    PlacesByAxisSettings,
     ProbesByPlaneSettings,
     RangeSettings,
     form_of_balls,
@@ -41,26 +41,13 @@ from .pool_sections import (
 # Candidates of a pool, those dropped included.
 MOST_CANDIDATES = 20_000
 
-TOLERANCE = 1e-9
-
 # Why a candidate is dropped that enters a forbidden box.
 FORBIDDEN = "in a forbidden box"
 
 
-@dataclass(frozen=True, eq=False)
-class Bounds:
-    """Limits of the poses of artefacts.
-
-    The scale readings of balls (ball less probe offset) must be in `volume`, the balls themselves
-    in the lower and upper ends (2, d) of `reach`, by probe. `edge` is the margin of a plate around
-    its balls. No artefact may enter one of the `forbidden` boxes, lower and upper ends (n, 2, d).
-    """
-
-    volume: Volume
-    probes: Mapping[str, Probe]
-    reach: Mapping[str, Array]
-    edge: float | None
-    forbidden: Array
+# The pose at level and location 0, both (n, d) in metres, and why each candidate cannot be read;
+# empty if it can.
+_Rows = tuple[Pose, Array, list[str]]
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,9 +79,9 @@ class _Group:
     layout: BallLayout
     prefix: str
     planes: tuple[Axis, ...]
-    levels: Mapping[str, tuple[float, ...]]
+    levels: Mapping[str, tuple[Place, ...]]
     anchor: Literal["corner", "centre"]
-    places: Mapping[str, tuple[tuple[float, float], ...]]
+    places: Mapping[str, tuple[tuple[Place, Place], ...]]
     turns: tuple[int, ...]
     probes: Mapping[str, tuple[tuple[str, ...], ...]]
     balls: tuple[_Balls, ...]
@@ -129,14 +116,14 @@ def generate(
         or bounds is None
     ):
         return None
-    reasons = {
-        (plane, turn, k): _reasons(group, plane, turn, balls, bounds, references)
+    rows = {
+        (plane, turn, k): _rows(group, plane, turn, balls, bounds, references)
         for plane in dict.fromkeys(group.planes)
         for turn in dict.fromkeys(group.turns)
         for k, balls in enumerate(group.balls)
     }
     candidate_count = sum(
-        sum(reason == "" for reason in reasons[plane, turn, k][probes])
+        sum(reason == "" for reason in rows[plane, turn, k][probes][2])
         * len(probes)
         * len(balls.indices)
         for plane, turn, (k, balls) in product(group.planes, group.turns, enumerate(group.balls))
@@ -144,92 +131,47 @@ def generate(
     )
     if not references.count_readings(candidate_count * group.repeats, steps):
         return None
-    return list(_candidates(group, reasons, references.dimension or 3))
+    return list(_candidates(group, rows, references.dimension or 3))
 
 
-def extent(points: Array) -> Array:
-    """Return the lowest and the highest co-ordinates (2, d) of points (n, d)."""
-    return np.array([points.min(axis=0), points.max(axis=0)])
-
-
-def outline(pose: Pose, layout: BallLayout, edge: float) -> Array:
-    """Return the lowest and the highest co-ordinates (2, d) of a plate with `edge` of material
-    beyond its balls.
-    """
-    return extent(corners(pose, layout, edge))
-
-
-def is_within(indices: Array, lower: Array, upper: Array) -> Any:
-    """True if extents (…, 2, d) are within limits (d,)."""
-    return np.all(
-        (indices[..., 0, :] >= lower - TOLERANCE) & (indices[..., 1, :] <= upper + TOLERANCE),
-        axis=-1,
-    )
-
-
-def entered(around: Array, boxes: Array) -> Any:
-    """Return which of boxes (n, 2, d) each artefact enters (…, n), by its ends `around` (…, 2, d);
-    what touches a box does not enter it.
-    """
-    low, high = around[..., None, 0, :], around[..., None, 1, :]
-    is_beyond = (low >= boxes[:, 1] - TOLERANCE) | (high <= boxes[:, 0] + TOLERANCE)
-    return ~is_beyond.any(axis=-1)
-
-
-def occupied(pose: Pose, layout: BallLayout, edge: float | None) -> Array:
-    """Return the lowest and the highest co-ordinates (2, d) of an artefact's balls, and with an
-    `edge` of the plate.
-    """
-    balls = extent(ball_coordinates(pose, layout))
-    return balls if edge is None else extent(np.vstack([balls, outline(pose, layout, edge)]))
-
-
-def _reasons(
+def _rows(
     group: _Group, plane: Axis, turn: int, balls: _Balls, bounds: Bounds, references: References
-) -> dict[tuple[str, ...], list[str]]:
-    """Return by set of probes, for each level and location, why a candidate cannot be read; empty
-    if it can.
-    """
+) -> dict[tuple[str, ...], _Rows]:
+    """Return by set of probes where the candidates of each level and location are."""
     d = references.dimension or 3
     at_zero = nominal_pose(
         PlanePlacement(plane, 0.0, group.anchor, (0.0, 0.0), turn), group.layout, d
     )
-    shifts = np.zeros((len(group.levels[plane]) * len(group.places[plane]), d))
-    pairs = list(product(group.levels[plane], group.places[plane]))
-    first, second = (AXIS_INDEX[axis] for axis in IN_PLANE_AXES[plane])
-    shifts[:, [first, second]] = [place for _, place in pairs]
-    if d == 3:
-        shifts[:, AXIS_INDEX[plane]] = [level for level, _ in pairs]
-    extents = extent(ball_coordinates(at_zero, group.layout)[balls.indices]) + shifts[:, None, :]
-    reasons = np.full(len(shifts), "", dtype=object)
-    edge = bounds.edge if references.artefacts[group.artefact].role == "plate" else None
-    if edge is not None:
-        around = outline(at_zero, group.layout, edge) + shifts[:, None, :]
-        beyond = ~is_within(around, bounds.volume.lower, bounds.volume.upper)
-        reasons[beyond] = "edge outside the volume"
-    around = occupied(at_zero, group.layout, edge) + shifts[:, None, :]
-    reasons[entered(around, bounds.forbidden).any(axis=-1)] = FORBIDDEN
+    all_places = [
+        PlanePlacement(plane, level, group.anchor, at).places
+        for level, at in product(group.levels[plane], group.places[plane])
+    ]
+    edge = edge_of(group.artefact, bounds, references)
     by_probes = {}
     for probes in group.probes[plane]:
-        of_probe = reasons.copy()
-        for offset in (
-            bounds.probes[of_probe].offset for of_probe in probes if of_probe in bounds.probes
-        ):
-            of_probe[~is_within(extents - offset, *bounds.volume.of_readings)] = (
-                "outside the volume"
-            )
-        for probe in probes:
-            if probe in bounds.reach:
-                of_probe[(of_probe == "") & ~is_within(extents, *bounds.reach[probe])] = (
-                    f"out of reach of probe {probe}"
-                )
-        by_probes[probes] = of_probe.tolist()
+        limits = limits_of(at_zero, group.layout, edge, [(balls.indices, probes)], bounds)
+        room = shared(limits.values())
+        points = np.array(
+            [
+                [length_of(places[axis], *room[:, k]) for axis, k in [*AXIS_INDEX.items()][:d]]
+                for places in all_places
+            ]
+        )
+        around = occupied(at_zero, group.layout, edge) + points[:, None, :]
+        beyond = {FORBIDDEN: entered(around, bounds.forbidden).any(axis=-1)}
+        for reason, (least, greatest) in limits.items():
+            play = TOLERANCE + (reason == OUTSIDE) * SLIGHTLY * bounds.volume.size
+            beyond[reason] = ((points < least - play) | (points > greatest + play)).any(axis=-1)
+        reasons = np.full(len(points), "", dtype=object)
+        for reason in dict.fromkeys((OUTSIDE, FORBIDDEN, *limits)):
+            reasons[(reasons == "") & beyond[reason]] = reason
+        by_probes[probes] = at_zero, points, reasons.tolist()
     return by_probes
 
 
 def _candidates(
     group: _Group,
-    reasons: Mapping[tuple[Axis, int, int], Mapping[tuple[str, ...], list[str]]],
+    rows: Mapping[tuple[Axis, int, int], Mapping[tuple[str, ...], _Rows]],
     d: int,
 ) -> Iterator[Generated]:
     readings = {
@@ -243,34 +185,31 @@ def _candidates(
     for plane in group.planes:
         axes = IN_PLANE_AXES[plane]
         for row, (level, place) in enumerate(product(group.levels[plane], group.places[plane])):
-            at_axis = {axis: length for axis, length in sorted(zip(axes, place, strict=True))}
-            where = f"{'at' if group.anchor == 'corner' else 'about'} {_both(*at_axis.values())}"
+            at_axis = [at for _, at in sorted(zip(axes, place, strict=True))]
+            where = f"{'at' if group.anchor == 'corner' else 'about'} {_both(*at_axis)}"
             name = (
                 f"{group.prefix}{where}"
                 if d == 2
-                else f"{group.prefix}{plane} {typed_length(level)} {where}"
+                else f"{group.prefix}{plane} {place_text(level)} {where}"
             )
-            placed: dict[str, Any] = {} if d == 2 else {"plane": plane, "level": length_text(level)}
-            placed[group.anchor] = {axis: length_text(length) for axis, length in at_axis.items()}
             for turn in group.turns:
-                pose = None
                 turned = f"{name} turn {turn}" if len(set(group.turns)) > 1 else name
                 for probes, (k, balls) in product(group.probes[plane], enumerate(group.balls)):
-                    reason = reasons[plane, turn, k][probes][row]
+                    at_zero, points, reasons = rows[plane, turn, k][probes]
                     full = (
                         f"{turned} {'+'.join(probes)}" if len(group.probes[plane]) > 1 else turned
                     )
                     full = f"{full} {balls.word}" if len(group.balls) > 1 else full
-                    if reason:
-                        yield Generated(full, None, plane, {}, reason)
+                    if reasons[row]:
+                        yield Generated(full, None, plane, {}, reasons[row])
                         continue
-                    pose = pose or nominal_pose(
-                        PlanePlacement(plane, level, group.anchor, place, turn), group.layout, d
-                    )
+                    pose = Pose(at_zero.rotation, at_zero.origin + points[row])
                     position = Position(full, group.artefact, pose, readings[probes, k])
+                    lengths = dict(zip(AXIS_INDEX, map(length_text, points[row]), strict=False))
                     settings: dict[str, Any] = {"name": full}
                     settings |= {"artefact": group.artefact} if group.names_artefact else {}
-                    settings |= placed
+                    settings |= {} if d == 2 else {"plane": plane, "level": lengths[plane]}
+                    settings |= {group.anchor: {axis: lengths[axis] for axis in sorted(axes)}}
                     settings |= {"quarter_turns": turn} if turn else {}
                     settings |= {"probes": list(probes)} if group.names_probes else {}
                     settings |= {"balls": balls.written} if balls.written != "all" else {}
@@ -278,10 +217,10 @@ def _candidates(
                     yield Generated(full, position, "" if d == 2 else plane, settings, "")
 
 
-def _both(first: float, second: float) -> str:
-    first_length, second_length = typed_length(first), typed_length(second)
-    number, _, unit = first_length.partition(" ")
-    return f"{number if second_length.endswith(f' {unit}') else first_length}, {second_length}"
+def _both(first: Place, second: Place) -> str:
+    first_text, second_text = place_text(first), place_text(second)
+    number, _, unit = first_text.partition(" ")
+    return f"{number if second_text.endswith(f' {unit}') else first_text}, {second_text}"
 
 
 def _resolve(settings: GroupSettings, steps: Steps, references: References) -> _Group | None:
@@ -359,25 +298,25 @@ def _planes(
 
 def _levels(
     settings: GroupSettings, planes: Sequence[Axis], steps: Steps, references: References
-) -> dict[str, tuple[float, ...]]:
+) -> dict[str, tuple[Place, ...]]:
     if references.dimension == 2:
         return {"z": (0.0,)}
     text = 'missing; add "levels", the co-ordinates of the planes'
     if not references.require(settings.levels is not None, (*steps, "levels"), text):
         return {}
-    if not isinstance(settings.levels, LengthsByAxisSettings):
+    if not isinstance(settings.levels, PlacesByAxisSettings):
         return dict.fromkeys(planes, _values(settings.levels))
     return _by_axis(settings.levels, planes, "a plane", (*steps, "levels"), references)
 
 
 def _places(
-    lengths: LengthsByAxisSettings, planes: Sequence[Axis], steps: Steps, references: References
-) -> dict[str, tuple[tuple[float, float], ...]]:
+    lengths: PlacesByAxisSettings, planes: Sequence[Axis], steps: Steps, references: References
+) -> dict[str, tuple[tuple[Place, Place], ...]]:
     axes = sorted({axis for plane in planes for axis in IN_PLANE_AXES[plane]})
     places_by_axis = _by_axis(lengths, axes, "an axis of the planes", steps, references)
     if set(places_by_axis) != set(axes):
         return {}
-    result: dict[str, tuple[tuple[float, float], ...]] = {}
+    result: dict[str, tuple[tuple[Place, Place], ...]] = {}
     for plane in planes:
         first, second = IN_PLANE_AXES[plane]
         # A grid so fine that it is refused need not be made.
@@ -395,12 +334,12 @@ def _places(
 
 
 def _by_axis(
-    lengths: LengthsByAxisSettings,
+    lengths: PlacesByAxisSettings,
     axes: Sequence[str],
     noun: str,
     steps: Steps,
     references: References,
-) -> dict[str, tuple[float, ...]]:
+) -> dict[str, tuple[Place, ...]]:
     by_axis = {}
     for axis in AXIS_INDEX:
         value = getattr(lengths, axis)
@@ -415,13 +354,18 @@ def _by_axis(
     return by_axis
 
 
-def _values(lengths: Any) -> tuple[float, ...]:
-    if isinstance(lengths, RangeSettings):
-        last, spread = lengths.count - 1, lengths.to - lengths.from_
-        # The ends are exactly as stated, and values between them those that one would write.
-        inner = [float(np.round(lengths.from_ + spread * k / last, 12)) for k in range(1, last)]
-        return (lengths.from_, *inner, lengths.to)
-    return lengths if isinstance(lengths, tuple) else (lengths,)
+def _values(places: Any) -> tuple[Place, ...]:
+    if not isinstance(places, RangeSettings):
+        return places if isinstance(places, tuple) else (places,)
+    first, last = (
+        end.fraction if isinstance(end, RoomPart) else end for end in (places.from_, places.to)
+    )
+    steps = places.count - 1
+    # The ends are exactly as stated, and values between them those that one would write.
+    inner = [float(np.round(first + (last - first) * k / steps, 12)) for k in range(1, steps)]
+    if isinstance(places.from_, RoomPart):
+        return (places.from_, *(RoomPart(k, f"{100 * k:.9g} %") for k in inner), places.to)
+    return (places.from_, *inner, places.to)
 
 
 def _probes(

@@ -13,6 +13,7 @@ from ..geometry.ball_layouts import BallNames, Name
 from ..geometry.positions import Axis
 from ..inputs.open_kinds import OpenKinds
 from ..inputs.quantities import Duration, Length
+from ..inputs.room_parts import Place, RoomPart
 from ..inputs.settings import Forms, NonEmpty, Settings, Several, Text
 from .position_sections import Count, LengthPerAxis, PositionSettings, ProbeNames, QuarterTurns
 
@@ -48,22 +49,31 @@ class TimesSettings(OwnTimesSettings):
 
 
 class RangeSettings(Settings):
-    """Evenly spaced lengths, both ends included."""
+    """Evenly spaced lengths, or parts of the free room, both ends included."""
 
-    from_: Length = Field(alias="from", description="the first")
-    to: Length = Field(description="the last")
+    from_: Place = Field(alias="from", description="the first")
+    to: Place = Field(description="the last")
     count: Annotated[int, Field(ge=2, le=1000)] = Field(description="how many")
 
+    @model_validator(mode="after")
+    def _of_one_kind(self) -> Self:
+        if isinstance(self.from_, RoomPart) != isinstance(self.to, RoomPart):
+            raise ValueError(
+                "has a length at one end and a part of the free room at the other; give two lengths"
+                " or two parts"
+            )
+        return self
 
-Lengths = Forms[Length, Several[Length], RangeSettings]
+
+Places = Forms[Place, Several[Place], RangeSettings]
 
 
-class LengthsByAxisSettings(Settings):
-    """Lengths along each axis: one, a list, or a range."""
+class PlacesByAxisSettings(Settings):
+    """Lengths, or parts of the free room, along each axis: one, a list, or a range."""
 
-    x: Lengths | None = Field(None, description="along x")
-    y: Lengths | None = Field(None, description="along y")
-    z: Lengths | None = Field(None, description="along z")
+    x: Places | None = Field(None, description="along x")
+    y: Places | None = Field(None, description="along y")
+    z: Places | None = Field(None, description="along z")
 
 
 def _form_of_levels(value: Any) -> str:
@@ -73,10 +83,10 @@ def _form_of_levels(value: Any) -> str:
 
 
 Levels = Annotated[
-    Annotated[Length, Tag("<one>")]
-    | Annotated[Several[Length], Tag("<list>")]
+    Annotated[Place, Tag("<one>")]
+    | Annotated[Several[Place], Tag("<list>")]
     | Annotated[RangeSettings, Tag("<range>")]
-    | Annotated[LengthsByAxisSettings, Tag("<planes>")],
+    | Annotated[PlacesByAxisSettings, Tag("<planes>")],
     Discriminator(_form_of_levels),
 ]
 
@@ -146,17 +156,18 @@ class GroupSettings(Settings):
     levels: Levels | None = Field(
         None,
         description=(
-            "co-ordinates of the planes: a list, {from: 0 mm, to: 1 m, count: 5}, or by plane {x:"
-            " …, z: …}; omitted in 2-D"
+            "co-ordinates of the planes: a list, such as [low, 30 %, 750 mm], {from: 0 mm, to: 1"
+            " m, count: 5}, or by plane {x: …, z: …}; omitted in 2-D"
         ),
     )
-    corners: LengthsByAxisSettings | None = Field(
+    corners: PlacesByAxisSettings | None = Field(
         None,
         description=(
             "lower corners of the turned bounding rectangle along each axis, as lists or ranges"
+            " of lengths or of parts of the free room"
         ),
     )
-    centres: LengthsByAxisSettings | None = Field(
+    centres: PlacesByAxisSettings | None = Field(
         None, description="centres of the bounding rectangle along each axis, instead of corners"
     )
     quarter_turns: Forms[QuarterTurns, Several[QuarterTurns], QuarterTurns] = Field(

@@ -14,37 +14,26 @@ from typing import Any
 import numpy as np
 
 from ..design.lookup import ReadingCount, References
-from ..design.objects import Machine, Volume
 from ..design.observations.calibration import Calibration
 from ..design.observations.radius import RadiusCalibration
-from ..geometry.ball_layouts import frozen
-from ..geometry.positions import AXIS_INDEX, ball_coordinates
+from ..geometry.positions import AXIS_INDEX
 from ..inputs.messages import Steps, format_path
 from ..inputs.number_arrays import Array
 from ..inputs.problems import written_count, written_text
 from ..inputs.quantities import format_length
 from ..inputs.settings import hint, listing
 from ..inputs.yamltree import Mapping, Sequence, to_python, written
+from .bounds import EDGE, OUTSIDE, TOLERANCE, Bounds, edge_of, entered, limits_of, occupied
 from .calibrations import resolve_calibration
-from .checks import TOLERANCE, check_inside, check_lengths
-from .model import AtMost, Candidate, ChangeTimes, Pool, Position, Probe
-from .placements import resolve_position
-from .pool_groups import (
-    FORBIDDEN,
-    Bounds,
-    entered,
-    extent,
-    generate,
-    is_within,
-    occupied,
-    outline,
-)
+from .checks import check_inside, check_lengths
+from .model import AtMost, Candidate, ChangeTimes, Pool, Position
+from .placements import in_lengths, resolve_position
+from .pool_groups import FORBIDDEN, generate
 from .pool_sections import (
     LimitsSettings,
     ListedSettings,
     OwnTimesSettings,
     PoolSettings,
-    RegionSettings,
     SelectorSettings,
     TimesSettings,
     is_group,
@@ -103,8 +92,7 @@ class Candidates:
 def resolve_candidates(
     sections: Sections,
     positions: AnyMapping[int, Position],
-    machine: Machine | None,
-    probes: AnyMapping[str, Probe],
+    bounds: Bounds | None,
     references: References,
 ) -> Candidates:
     """Return the positions to choose from, if there is a pool; faults go to the problems."""
@@ -121,13 +109,8 @@ def resolve_candidates(
     is_list = isinstance(written(root, "pool", "candidates"), Sequence | None)
     names_differ = _check_names(references)
     times: TimesSettings = sections.get("pool", "times")
-    limits: LimitsSettings = sections.get("pool", "limits")
-    reach = _reach(limits, references)
-    result.forbidden = _forbidden(limits, references)
-    bounds = None
-    if machine is not None and machine.dimension == references.dimension:
-        result.forbidden = _through_walls(result.forbidden, machine.volume)
-        bounds = Bounds(machine.volume, probes, reach, limits.edge, result.forbidden)
+    if bounds is not None:
+        result.forbidden = bounds.forbidden
     all_drawn = len(positions) == written_count(root, "positions")
     result.complete = is_known and is_list and names_differ and all_drawn
     for i, position in positions.items():
@@ -160,7 +143,7 @@ def resolve_candidates(
             count += 1
         elif isinstance(settings, ListedSettings):
             count += 1
-            listed = resolve_position(settings, steps, references)
+            listed = resolve_position(settings, steps, bounds, references)
             if listed is None:
                 result.complete = False
                 continue
@@ -172,7 +155,7 @@ def resolve_candidates(
                     result.drop(FORBIDDEN)
                     continue
                 before = len(problems.messages)
-                check_inside(listed, steps, bounds.volume, probes, references)
+                check_inside(listed, steps, bounds.volume, bounds.probes, references)
                 if len(problems.messages) == before:
                     _check_bounds(listed, steps, bounds, references)
             item_settings = to_python(written(root, *steps))  # type: ignore[arg-type]
@@ -309,7 +292,9 @@ def _candidate(
     )
     seconds = seconds_of(position, set_up, reading, _or(times.probe_change, PROBE_CHANGE))
     across = "" if plane is None or references.dimension == 2 else plane
-    item_settings = {key: value for key, value in item_settings.items() if key != "times"}
+    item_settings = {
+        key: value for key, value in in_lengths(item_settings, position).items() if key != "times"
+    }
     return Candidate(position.name, position, seconds, across, group, drawn, item_settings, reading)
 
 
@@ -374,108 +359,37 @@ def _check_names(references: References) -> bool:
     return len(problems.messages) == before
 
 
-def _reach(limits: LimitsSettings, references: References) -> dict[str, Array]:
-    """Lower and upper ends (2, d) of where balls can be read, by probe."""
-    problems, reach = references.problems, {}
-    for name, region in limits.reach.items():
-        steps = ("pool", "limits", "reach", name)
-        if name not in references.probes:
-            problems.add(
-                steps, f'unknown probe "{name}"; {hint(name, references.probes)}', of_key=True
-            )
-            continue
-        reach[name] = _ends(region, steps, references)
-    return reach
-
-
-def _forbidden(limits: LimitsSettings, references: References) -> Array:
-    """Lower and upper ends (n, 2, d) of the boxes that no artefact may enter."""
-    d, boxes = references.dimension or 3, []
-    for k, region in enumerate(limits.forbidden):
-        steps, before = ("pool", "limits", "forbidden", k), len(references.problems.messages)
-        ends = _ends(region, steps, references)
-        text = "has no limits; give the ends of the box along at least one axis"
-        references.require(bool(region.stated), steps, text)
-        is_faulty = len(references.problems.messages) > before
-        # Nothing enters a box that begins at infinity.
-        boxes.append(np.full((2, d), np.inf) if is_faulty else ends)
-    return np.reshape(boxes, (len(boxes), 2, d))
-
-
-def _through_walls(boxes: Array, volume: Volume) -> Array:
-    """Return boxes (n, 2, d), those that reach a wall of the volume without an end there: what lies
-    on the wall is within them, and does not touch them alone.
-    """
-    lower = np.where(boxes[:, 0] <= volume.lower + TOLERANCE, -np.inf, boxes[:, 0])
-    upper = np.where(boxes[:, 1] >= volume.upper - TOLERANCE, np.inf, boxes[:, 1])
-    return frozen(np.stack([lower, upper], axis=1))
-
-
-def _ends(region: RegionSettings, steps: Steps, references: References) -> Array:
-    """Lower and upper ends (2, d) of a region, infinite where it is not limited."""
-    ends = np.array([[-np.inf] * 3, [np.inf] * 3])
-    for axis, axis_lengths in region.stated.items():
-        k = AXIS_INDEX[axis]
-        if axis_lengths[0] >= axis_lengths[1]:
-            text = "the lower end must be below the upper; correct them"
-            references.problems.add((*steps, axis), text)
-        if k >= (references.dimension or 3):
-            references.refuse_in_plane(*steps, axis)
-        ends[:, k] = axis_lengths
-    return frozen(ends[:, : references.dimension or 3])
-
-
 def _entered(position: Position, bounds: Bounds, references: References) -> int | None:
     """The first forbidden box that a position's artefact enters, if any."""
-    is_plate = references.artefacts[position.artefact].role == "plate"
-    layout = references.layouts[position.artefact]
-    around = occupied(position.pose, layout, bounds.edge if is_plate else None)
+    layout, edge = (
+        references.layouts[position.artefact],
+        edge_of(position.artefact, bounds, references),
+    )
+    around = occupied(position.pose, layout, edge)
     boxes = np.flatnonzero(entered(around, bounds.forbidden))
     return int(boxes[0]) if len(boxes) else None
 
 
 def _check_bounds(position: Position, steps: Steps, bounds: Bounds, references: References) -> None:
     """Report a position whose plate's edge is outside the volume, or that a probe cannot reach."""
-    layout, problems = references.layouts[position.artefact], references.problems
-    lower, upper = bounds.volume.lower, bounds.volume.upper
-    if bounds.edge is not None and references.artefacts[position.artefact].role == "plate":
-        around = outline(position.pose, layout, bounds.edge)
-        if not is_within(around, lower, upper):
-            beyond = format_length(float(np.max([lower - around[0], around[1] - upper])))
+    edge = edge_of(position.artefact, bounds, references)
+    read = [(group.ball_indices, group.probes) for group in position.readings]
+    layout = references.layouts[position.artefact]
+    for reason, (least, greatest) in limits_of(position.pose, layout, edge, read, bounds).items():
+        by_axis = np.maximum(least, -greatest)
+        beyond, axis = float(by_axis.max()), list(AXIS_INDEX)[by_axis.argmax()]
+        if reason == OUTSIDE or beyond <= TOLERANCE:
+            continue
+        text = (
+            f"a ball is {format_length(beyond)} {reason} along {axis}; move it, or correct"
+            " pool.limits.reach"
+        )
+        if edge is not None and reason == EDGE:
             text = (
-                f"with its edge of {format_length(bounds.edge)} the plate is {beyond} outside the"
-                " volume"
+                f"with its edge of {format_length(edge)} the plate is {format_length(beyond)}"
+                " outside the volume; move it, or correct pool.limits.edge"
             )
-            problems.add(steps, f"{text}; move it, or correct pool.limits.edge")
-    if not bounds.reach:
-        return
-    coordinates = ball_coordinates(position.pose, layout)
-    for group in position.readings:
-        for probe in group.probes:
-            if probe in bounds.reach:
-                text = _beyond(coordinates[group.ball_indices], bounds.reach[probe])
-                if text:
-                    text = (
-                        f"probe {probe} does not reach that far: {text}; move it, or correct"
-                        " pool.limits.reach"
-                    )
-                    problems.add(steps, text)
-
-
-def _beyond(points: Array, ends: Array) -> str:
-    lowest, highest = extent(points)
-    for k, axis in enumerate(list(AXIS_INDEX)[: points.shape[1]]):
-        if lowest[k] < ends[0, k] - TOLERANCE:
-            return (
-                f"a ball is at {axis} = {format_length(lowest[k])}, below"
-                f" {format_length(ends[0, k])}"
-            )
-        if highest[k] > ends[1, k] + TOLERANCE:
-            return (
-                f"a ball is at {axis} = {format_length(highest[k])}, above"
-                f" {format_length(ends[1, k])}"
-            )
-    return ""
+        references.problems.add(steps, text)
 
 
 def _limits(

@@ -6,9 +6,10 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from ..geometry.ball_layouts import BallNames, Coordinates, Name
+from ..geometry.ball_layouts import BallNames, Name
 from ..geometry.positions import Axis
-from ..inputs.quantities import Angle, Length, PositiveLength
+from ..inputs.quantities import Angle, PositiveLength
+from ..inputs.room_parts import Place
 from ..inputs.settings import Forms, NonEmpty, Settings
 
 Count = Annotated[int, Field(ge=1, le=10_000)]
@@ -18,6 +19,9 @@ BallSelection = Forms[Literal["all"], BallNames, BallNames]
 
 # Those beyond are refused when the position is placed, with what is meant.
 QuarterTurns = Annotated[int, Field(json_schema_extra={"minimum": 0, "maximum": 3})]
+
+
+PLACE = "a length, or low, middle, high or a part such as 30 % of the free room"
 
 
 class AxisLengthsSettings(Settings):
@@ -35,17 +39,24 @@ LengthPerAxis = Forms[PositiveLength, Edges, AxisLengthsSettings]
 
 
 class InPlaneSettings(Settings):
-    """A point in a machine plane: its co-ordinates along the plane's two axes."""
+    """A point in a machine plane: its co-ordinates along the plane's two axes, as lengths or parts
+    of the free room.
+    """
 
-    x: Length | None = Field(None, description="co-ordinate along x")
-    y: Length | None = Field(None, description="co-ordinate along y")
-    z: Length | None = Field(None, description="co-ordinate along z")
+    x: Place | None = Field(None, description=f"along x: {PLACE}")
+    y: Place | None = Field(None, description=f"along y: {PLACE}")
+    z: Place | None = Field(None, description=f"along z: {PLACE}")
 
 
 class PoseSettings(Settings):
     """A free pose x = R y + origin of an artefact."""
 
-    origin: Coordinates = Field(description="location of the origin of the artefact's frame")
+    origin: Annotated[tuple[Place, ...], Field(min_length=2, max_length=3)] = Field(
+        description=(
+            "location of the origin of the artefact's frame; a part of the free room moves the box"
+            " around its balls"
+        )
+    )
     rotation: Forms[Angle, tuple[Angle, Angle, Angle], tuple[Angle, Angle, Angle]] | None = Field(
         None,
         description=(
@@ -86,8 +97,9 @@ class PositionSettings(Settings):
     plane: Axis | None = Field(
         None, description="axis that the artefact's plane is normal to; omitted in 2-D"
     )
-    level: Length | None = Field(
-        None, description="co-ordinate of the plane along that axis; omitted in 2-D"
+    level: Place | None = Field(
+        None,
+        description=f"co-ordinate of the plane along that axis, {PLACE}; omitted in 2-D",
     )
     corner: InPlaneSettings | None = Field(
         None, description="lower corner of the turned bounding rectangle"

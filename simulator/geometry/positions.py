@@ -9,6 +9,7 @@ from typing import Literal
 import numpy as np
 
 from ..inputs.number_arrays import Array
+from ..inputs.room_parts import Place, RoomPart
 from .ball_layouts import BallLayout
 from .rotations import rotation_matrix
 
@@ -48,56 +49,66 @@ class PlanePlacement:
     """An artefact parallel to a machine plane.
 
     ``plane``: axis the plane is normal to; in two dimensions z. ``level``: co-ordinate of the
-    artefact's plane along it, in metres. ``anchor``: which point of the turned bounding rectangle
-    is ``at``, in metres in the order of ``IN_PLANE_AXES[plane]``. ``quarter_turns``:
-    counter-clockwise as seen against the plane's normal.
+    artefact's plane along it. ``anchor``: which point of the turned bounding rectangle is ``at``,
+    in the order of ``IN_PLANE_AXES[plane]``. Both are in metres, or parts of the free room.
+    ``quarter_turns``: counter-clockwise as seen against the plane's normal.
     """
 
     plane: Axis
-    level: float
+    level: Place
     anchor: Literal["corner", "centre"]
-    at: tuple[float, float]
+    at: tuple[Place, Place]
     quarter_turns: int = 0
+
+    @property
+    def places(self) -> dict[str, Place]:
+        """Level and anchor by axis."""
+        return dict(
+            zip((*IN_PLANE_AXES[self.plane], self.plane), (*self.at, self.level), strict=True)
+        )
 
 
 @dataclass(frozen=True)
 class FreePlacement:
-    """An artefact anywhere: x = R y + ``origin`` (d metres), R from ``rotation`` (3 radians, or 1
-    in 2-D).
+    """An artefact anywhere: x = R y + ``origin`` (d metres or parts of the free room), R from
+    ``rotation`` (3 radians, or 1 in 2-D).
     """
 
-    origin: tuple[float, ...]
+    origin: tuple[Place, ...]
     rotation: tuple[float, ...]
+
+    @property
+    def places(self) -> dict[str, Place]:
+        """The origin by axis."""
+        return dict(zip(AXIS_INDEX, self.origin, strict=False))
 
 
 def nominal_pose(
     placement: PlanePlacement | FreePlacement, layout: BallLayout, dimension: int
 ) -> Pose:
-    """Return the pose of a placement in a machine of 2 or 3 dimensions.
+    """Return the pose of a placement in a machine of 2 or 3 dimensions, at 0 along axes with a part
+    of the free room.
 
     :raises ValueError: in two dimensions a plane other than z, or a free placement of another
         dimension.
     """
+    anchor = np.zeros(dimension)
     if isinstance(placement, FreePlacement):
         if len(placement.origin) != dimension:
             raise ValueError(
                 f"a pose with {len(placement.origin)} co-ordinates in {dimension} dimensions"
             )
-        return Pose(rotation_matrix(placement.rotation), np.array(placement.origin))
-    if dimension == 2 and placement.plane != "z":
-        raise ValueError("a plane experiment has no plane but z")
-    turn = QUARTER_TURNS[placement.quarter_turns % 4]
-    rectangle = bounding_rectangle(layout) @ turn.T
-    lower, upper = rectangle.min(axis=0), rectangle.max(axis=0)
-    anchor = lower if placement.anchor == "corner" else (lower + upper) / 2
-    in_plane_origin = np.array(placement.at) - anchor
-    rotation = plane_rotation(placement.plane, placement.quarter_turns, dimension)
-    if dimension == 2:
-        return Pose(rotation, in_plane_origin)
-    origin = np.zeros(3)
-    first, second = (AXIS_INDEX[axis] for axis in IN_PLANE_AXES[placement.plane])
-    origin[[first, second, AXIS_INDEX[placement.plane]]] = *in_plane_origin, placement.level
-    return Pose(rotation, origin)
+        rotation = rotation_matrix(placement.rotation)
+    else:
+        if dimension == 2 and placement.plane != "z":
+            raise ValueError("a plane experiment has no plane but z")
+        rotation = plane_rotation(placement.plane, placement.quarter_turns, dimension)
+        rectangle = bounding_rectangle(layout) @ rotation[:, :2].T
+        lower, upper = rectangle.min(axis=0), rectangle.max(axis=0)
+        anchor = lower if placement.anchor == "corner" else (lower + upper) / 2
+    places = [placement.places[axis] for axis in list(AXIS_INDEX)[:dimension]]
+    lengths = [0.0 if isinstance(place, RoomPart) else place for place in places]
+    return Pose(rotation, lengths - anchor)
 
 
 def plane_rotation(plane: str, turns: int, dimension: int = 3) -> Array:

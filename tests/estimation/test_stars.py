@@ -200,7 +200,7 @@ def test_a_star_that_points_elsewhere_is_found(place: str) -> None:
     every = [{**one, "probes": list(QUICKSTART["probes"])} for one in QUICKSTART["positions"]]
     for one in every:
         one["corner"] = {axis: "150 mm" for axis in one["corner"]}
-        one["level"] = {"250 mm": "350 mm", "750 mm": "650 mm"}[one["level"]]
+        one["level"] = {"low": "350 mm", "high": "650 mm"}[one["name"].split()[1]]
     plate = {"kind": "grid", "balls": [3, 3], "size": ["600 mm", "600 mm"]}
     stated = small(star, positions=every, artefacts={"plate": plate})
     pivot = TIPS[0] if place == "unknown" else np.zeros(3)

@@ -499,7 +499,7 @@ MISTAKES = [
         '30:13: pool.limits.reach.rigth: unknown probe "rigth"; did you mean "right"?',
         "30:35: pool.limits.reach.right.x: the lower end must be below the upper; correct them"]),
     ("reach: {right: {x: [0 mm, 1 m]}}", "reach: {down: {x: [50 mm, 1 m]}}", [
-        "10:5: positions[0]: probe down does not reach that far: a ball is at x = 0 mm, below 50 mm; move it, or "
+        "10:5: positions[0]: a ball is 50 mm out of reach of probe down along x; move it, or "
         "correct pool.limits.reach"]),
     ("reach: {right: {x: [0 mm, 1 m]}}", "edge: 10 mm", [
         "10:5: positions[0]: with its edge of 10 mm the plate is 10 mm outside the volume; move it, or correct "

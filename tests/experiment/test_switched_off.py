@@ -16,7 +16,7 @@ TEXT = QUICKSTART.read_text(encoding="utf-8")
 LINE = next(line for line in TEXT.splitlines(keepends=True) if "name: z high" in line)
 OFF = TEXT.replace("name: z high,", "name: z high, enabled: false,")
 # A level at which all balls are above the volume.
-OUTSIDE = TEXT.replace(LINE, LINE.replace("750 mm", "7500 mm"))
+OUTSIDE = TEXT.replace(LINE, LINE.replace("80 %", "7500 mm"))
 
 
 def experiment_of(text: str, **options: bool) -> bp.Experiment:
@@ -111,7 +111,7 @@ def test_a_tolerant_reader_gets_everything_with_its_faults() -> None:
         lay_out(found)
     # A position that cannot be understood is told of, and the others are there.
     unclear = experiment_of(
-        TEXT.replace("plane: z, level: 750", "plane: q, level: 750"), tolerant=True
+        TEXT.replace("plane: z, level: 80", "plane: q, level: 80"), tolerant=True
     )
     assert len(unclear.positions) == len(names) - 1 and unclear.faults
     # What is no experiment at all is refused.

@@ -90,3 +90,30 @@ THE_TABLE_ENDS_AT_MM = "eyx.csv:4:1: the table ends at 1900 mm"
 YAML_STATES_NO_ERROR_THAT_COULD = (
     "e.yaml:3:36: error_model.file: m.yaml states no error that could be"
 )
+NOT_A_PLACE = (
+    'e.yaml:10:49: positions[0].{}: "{}" is not a place ({}); write low, middle, high, a part of the'
+    ' free room such as "30 %", or a length such as "750 mm"'
+)
+BEYOND_THE_FREE_ROOM = (
+    'e.yaml:10:49: positions[0].level: "{}" is beyond the free room; give 0 % to 100 %'
+)
+RATIO_FOR_A_LENGTH = (
+    'e.yaml:10:49: positions[0].level: "5 ppm" is a ratio; a length is expected, for example "750'
+    ' mm"'
+)
+PLACE_WITHOUT_UNIT = (
+    'e.yaml:10:49: positions[0].level: "0.3" has no unit; write for example "0.3 mm" or "0.3 um"'
+)
+TWO_LENGTHS_OR_TWO_PARTS = (
+    "pool.candidates[0].levels.x: has a length at one end and a part of the free room at the other;"
+    " give two lengths or two parts"
+)
+NO_ROOM = (
+    'e.yaml:10:5: positions[0]: reading ball "r1c1" with probe "down" moves the scales to y = -15'
+    " mm, 15 mm below the measuring volume, and 5 more readings; there is no room along y: take a"
+    " smaller artefact, or read it otherwise"
+)
+NO_ROOM_FOR_THE_EDGE = (
+    "e.yaml:10:5: positions[0]: with its edge of 13 mm the plate is 8 mm outside the volume; move"
+    " it, or correct pool.limits.edge"
+)

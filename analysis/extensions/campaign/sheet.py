@@ -16,7 +16,7 @@ from ballplate.planning import (
     summary,
 )
 from ballplate.presentation import Data, Result
-from ballplate.simulator.experiment import Candidate, ChangeTimes, Experiment
+from ballplate.simulator.experiment import Candidate, ChangeTimes, Experiment, in_lengths
 from ballplate.simulator.inputs import refused, to_python
 
 from .reading_lists import planned_readings, points_csv, points_dmis, template_csv
@@ -92,7 +92,7 @@ def sheet_of(experiment: Experiment) -> Sheet:
     )
     changes = ChangeTimes(0.0, 0.0) if pool is None else pool.changes
     for position in experiment.positions:
-        settings = by_name[position.name]
+        settings = in_lengths(by_name[position.name], position)
         plane = settings.get("plane") if experiment.dimension == 3 else None
         seconds = timed.get(position.name, 0.0)
         candidate = Candidate(position.name, position, seconds, plane or "", "", True, settings)

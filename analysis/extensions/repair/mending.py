@@ -199,6 +199,11 @@ def changes_of(experiment: Experiment, needed: Iterable[Edit]) -> Iterator[TextC
             if lacks_probes(experiment_settings["positions"][index]):
                 for group in settings.get("readings", [settings]):
                     group.pop("probes", None)
+            if places[name].parts and any(
+                settings.get(key) != edit.value.get(key) for key in READINGS
+            ):
+                # Other readings have another room, and the pose stays.
+                settings = {key: settings[key] for key in settings if key not in PLACEMENT}
             yield from _of_position(
                 steps, experiment_settings["positions"][index], settings, edit.value
             )

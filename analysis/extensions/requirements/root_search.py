@@ -12,7 +12,7 @@ from typing import Literal
 import numpy as np
 from ballplate.results import PlannedUncertainty, Prediction, planned_uncertainty, predict
 from ballplate.simulator.computing import Report, comparable, counted, single_threaded, unreported
-from ballplate.simulator.experiment import Experiment, override
+from ballplate.simulator.experiment import Experiment, override, unspanned
 from ballplate.simulator.inputs import ExperimentError, Mapping, Node, Scalar, listing, refused
 
 from .answers import Answer, Reach, Status
@@ -218,6 +218,11 @@ def _told(trials: _Trials, status: Status, step: int, remarks: list[str]) -> Ans
     assert verified.is_met is (status in ("found", "any"))
     if searched.name == "balls" and verified.is_met and prediction.assumptions is not None:
         remarks += filter(None, [prediction.assumptions.words_of("model")])
+    # Where no value does, the smallest one leaves most of the volume out.
+    valid = [tried for tried in sorted(trials.known) if trials.known[tried].judgement]
+    shown = step if verified.is_met else valid[0]
+    if lost := unspanned(trials.searched.root, trials.searched.built(searched.tree(shown))):
+        remarks = [*remarks, f"with {searched.words(shown)} {lost}"]
     needed = searched.words(step), searched.value(step), verified.words, "", tuple(remarks)
     first = searched.name, searched.title, status, searched.present, searched.grows
     return Answer(*first, *needed, prediction.qualifications)

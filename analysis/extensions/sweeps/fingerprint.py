@@ -52,11 +52,11 @@ LEFT_OUT = (
     "_found",
 )
 # The same, for single classes: the reading of the laboratory's tables; positions that are not read,
-# which no experiment that is computed has; and functions in Python, whose module text and options
-# count instead.
+# which no experiment that is computed has, and how a file states places; and functions in Python,
+# whose module text and options count instead.
 LEFT_OUT_OF = {
     "Experiment": ("readings", "extensions", "switched_off", "faults"),
-    "Position": ("enabled",),
+    "Position": ("enabled", "room", "parts"),
     "Prior": ("data",),
     "PythonCalibration": ("functions",),
     "GuardedModel": ("model",),

@@ -127,17 +127,19 @@ def _axes(settings: SweepSettings, root: Node, trees: Trees, problems: Problems)
     return axes
 
 
+def base_tree(sweep: Sweep, number: int) -> Node:
+    """Return the content of the base file, or of its variant, that a cell changes."""
+    variants = (choice.variant for choice in sweep.choices(number) if choice.variant is not None)
+    return sweep.trees[next(variants, sweep.variant)]
+
+
 def experiment_of(sweep: Sweep, number: int) -> Experiment:
     """Return the experiment of a cell.
 
     :raises ExperimentError: the cell makes no valid experiment.
     """
-    choices = sweep.choices(number)
-    variant = next(
-        (choice.variant for choice in choices if choice.variant is not None), sweep.variant
-    )
-    tree = sweep.trees[variant]
-    for choice in choices:
+    tree = base_tree(sweep, number)
+    for choice in sweep.choices(number):
         changes = (
             choice.changes
             if choice.kept is None

@@ -213,7 +213,9 @@ def computed(
 
 
 def shortcomings(path: Path, rows: Sequence[StoredRow]) -> tuple[str, ...]:
-    """Return notes on the rows of a sweep: different versions, and reasons of failed cells."""
+    """Return notes on the rows of a sweep: different versions, parts of the volume that are no
+    longer spanned, and reasons of failed cells.
+    """
     notes = []
     versions = {tuple(row.versions.items()) for row in rows}
     if len(versions) > 1:
@@ -221,11 +223,13 @@ def shortcomings(path: Path, rows: Sequence[StoredRow]) -> tuple[str, ...]:
         notes.append(in_one_line(f"{path}: {text}"))
     reasons: dict[str, list[int]] = {}
     for row in rows:
-        if row.status == "failed":
-            reasons.setdefault(row.reason, []).append(row.number)
-    for reason, failed in list(reasons.items())[:MOST_REASONS]:
-        more = f" and {len(failed) - 1} more" if len(failed) > 1 else ""
-        notes.append(f"case {failed[0]}{more} failed: {reason}")
+        of_size = row.details.get("unspanned")
+        if row.status == "failed" or of_size:
+            text = f": {of_size}" if of_size else f" failed: {row.reason}"
+            reasons.setdefault(text, []).append(row.number)
+    for reason, cells in list(reasons.items())[:MOST_REASONS]:
+        more = f" and {len(cells) - 1} more" if len(cells) > 1 else ""
+        notes.append(f"case {cells[0]}{more}{reason}")
     if len(reasons) > MOST_REASONS:
         more_reasons = len(reasons) - MOST_REASONS
         notes.append(f"and {more_reasons} reasons more; see ballplate sweep --export")

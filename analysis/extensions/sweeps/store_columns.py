@@ -12,6 +12,7 @@ NAMES = (
     "status",
     "reason",
     "given",
+    "unspanned",
     "data_set_seed",
     "fingerprint",
     "duration_s",

@@ -21,11 +21,11 @@ from ballplate.montecarlo import (
 )
 from ballplate.results import Prediction, predict
 from ballplate.simulator.computing import single_threaded, versions, want_of_memory
-from ballplate.simulator.experiment import Experiment
+from ballplate.simulator.experiment import Experiment, unspanned
 from ballplate.simulator.inputs import ExperimentError, UnusableError
 
 from .fingerprint import fingerprint, with_method, without_method
-from .load import experiment_of
+from .load import base_tree, experiment_of
 from .model import Sweep
 from .store_columns import symbol_column, unit_suffix
 
@@ -127,6 +127,8 @@ def _reason(error: Exception) -> str:
 def _whole(sweep: Sweep, experiment: Experiment, task: CellTask, key: str, seed: int) -> CellResult:
     planned = predict(experiment)
     figures, details = plan_figures(planned, sweep.record)
+    if lost := unspanned(base_tree(sweep, task.number), experiment):
+        details["unspanned"] = lost
     if sweep.trials is not None:
         if task.total is not None:
             replicates = Trials(seed, combined(experiment, task.total))

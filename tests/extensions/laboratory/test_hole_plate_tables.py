@@ -25,8 +25,8 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     text = text.replace("balls: [5, 5]", "balls: [3, 3], reads: in plane, flatness: 5 um")
     text = text.replace("_coefficients: 5", "_coefficients: 3")
     text = text.replace(
-        "corner: {x: 250 mm, y: 250 mm}, quarter_turns: 1, probes: [down]",
-        "corner: {x: 125 mm, y: 250 mm}, quarter_turns: 1, probes: [right, left]",
+        "corner: {x: high, y: high}, quarter_turns: 1, probes: [down]",
+        "corner: {x: 125 mm, y: high}, quarter_turns: 1, probes: [right, left]",
     )
     (tmp_path / "holes.yaml").write_text(text, encoding="utf-8")
     monkeypatch.chdir(tmp_path)
@@ -91,8 +91,8 @@ def test_offsets_across_the_plate_change_nothing(
     """Where all offsets are across the plate, nothing is in doubt."""
     text = Path("holes.yaml").read_text(encoding="utf-8")
     text = text.replace(
-        "corner: {x: 125 mm, y: 250 mm}, quarter_turns: 1, probes: [right, left]",
-        "corner: {x: 125 mm, y: 250 mm}, quarter_turns: 1, probes: [down]",
+        "corner: {x: 125 mm, y: high}, quarter_turns: 1, probes: [right, left]",
+        "corner: {x: 125 mm, y: high}, quarter_turns: 1, probes: [down]",
     )
     Path("holes.yaml").write_text(text, encoding="utf-8")
     assert main(["simulate", "holes.yaml", "-o", "readings.csv", "-q", "--force"]) == 0

@@ -426,7 +426,7 @@ def test_a_preview_is_small(tmp_path):
     kept = [line for line in lines if not any(f"name: {name}," in line for name in names)]
     (at,) = (k for k, line in enumerate(kept) if "name: z low" in line)
     kept[at:at] = [
-        kept[at].replace("z low", f"z {k}").replace("250 mm", f"{250 + 20 * k} mm")
+        kept[at].replace("z low", f"z {k}").replace("30 %", f"{250 + 20 * k} mm")
         for k in range(1, 20)
     ]
     path = tmp_path / "twenty.yaml"

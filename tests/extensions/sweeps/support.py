@@ -22,7 +22,7 @@ SWEEP = """\
 title: many small cells
 base: quickstart.yaml
 axes:
-  size: {paths: ["artefacts.plate.size[0]", "artefacts.plate.size[1]"], from: 600 mm, to: 800 mm, count: COUNT}
+  size: {paths: ["artefacts.plate.size[0]", "artefacts.plate.size[1]"], from: 700 mm, to: 1100 mm, count: COUNT}
   balls: {paths: ["artefacts.plate.balls[0]", "artefacts.plate.balls[1]"], values: [4, 5]}
 seed: 3
 """

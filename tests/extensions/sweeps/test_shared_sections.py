@@ -27,14 +27,14 @@ def test_cells_are_what_files_of_their_own_say(tmp_path: Path) -> None:
     # In two orders, so that no cell's experiment depends on what was made before.
     for numbers in (range(4), reversed(range(4))):
         for number in numbers:
-            size, balls = 600 + 100 * (number // 2), 4 + number % 2
+            size, balls = 700 + 200 * (number // 2), 4 + number % 2
             text = QUICKSTART.replace("balls: [5, 5]", f"balls: [{balls}, {balls}]")
             text = text.replace("size: [750 mm, 750 mm]", f"size: [{size} mm, {size} mm]")
             path = tmp_path / "own.yaml"
             path.write_text(text, encoding="utf-8")
             (own,) = load(path)
             assert fingerprint(experiment_of(sweep, number)) == fingerprint(own)
-    assert load(path)[0].layouts["plate"].coordinates.max() == pytest.approx(0.6)
+    assert load(path)[0].layouts["plate"].coordinates.max() == pytest.approx(0.7)
 
 
 def test_a_wrong_cell_is_wrong_each_time(tmp_path: Path) -> None:

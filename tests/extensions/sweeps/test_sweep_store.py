@@ -328,7 +328,7 @@ def test_dry_run_lists_the_cells(tmp_path: Path, capsys: pytest.CaptureFixture[s
     out, err = capsys.readouterr()
     # The last of the cells that were tried does not fit.
     assert "estimated from 3\ncase 3 fails: " in err
-    assert out.splitlines()[1] == "1: size 600 mm, balls 5" and len(out.splitlines()) == 4
+    assert out.splitlines()[1] == "1: size 700 mm, balls 5" and len(out.splitlines()) == 4
     assert err.startswith("4 cases, about ") and not (tmp_path / "small.sqlite").exists()
 
 
@@ -447,7 +447,7 @@ def test_rows_do_not_depend_on_where_the_command_is_started(tmp_path: Path) -> N
     elsewhere = ("--store", tmp_path / "3.sqlite", "--workers", 1)
     assert run("sweep", tmp_path / "sweeps" / "s.yaml", *elsewhere).returncode == 1
     first = rows(tmp_path / "1.sqlite")
-    assert first["reason"][2].startswith("../quickstart.yaml:41:5: positions[1]: ")
+    assert first["reason"][2].startswith("../quickstart.yaml:40:5: positions[0]: ")
     for k in (2, 3):
         assert_same(first, rows(tmp_path / f"{k}.sqlite"))
 

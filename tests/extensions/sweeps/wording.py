@@ -71,3 +71,4 @@ THE_WORKER_HAS_NO_BALLPLATE = (
 )
 HAVE_CHANGED_WHILE_IT_RAN = "have changed while it ran"
 WHILE_THE_SWEEP_RAN = "while the sweep ran"
+THE_PLACES_ARE_LENGTHS = "the places are lengths: state `corner: {{{}}}` to follow"

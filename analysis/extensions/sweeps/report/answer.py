@@ -174,7 +174,8 @@ def _sentences_on_others(results: ReportedSweep, done: Integers) -> list[str]:
             f"Of {_settings(len(results.cells))}, {listing(parts)}; the answer is that of the"
             " others."
         )
-    return sentences
+    lost = (texts["unspanned"] for texts in results.texts.values() if "unspanned" in texts)
+    return sentences + [f"Places do not follow the size: {text}." for text in dict.fromkeys(lost)]
 
 
 def _settings(count: int) -> str:
