@@ -437,7 +437,7 @@ def shape(t: Array, values: Array) -> str:
     """
     if not np.ptp(values):
         return ""
-    basis = np.polynomial.chebyshev.chebvander(2 * t - 1, HIGHEST)
+    basis = np.asarray(np.polynomial.chebyshev.chebvander(2 * t - 1, HIGHEST), float)
     size = float(np.abs(values).max())
     for degree in range(1, HIGHEST + 1):
         part = basis[:, : degree + 1]

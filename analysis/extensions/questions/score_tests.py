@@ -78,7 +78,7 @@ def reduced(rows: Array) -> Array:
     """Return rows (r, k) that span the same, each with 1 in a column in which the others have 0."""
     rows, columns = rows.copy(), np.zeros(len(rows), np.int64)
     for k in range(len(rows)):
-        row, columns[k] = np.unravel_index(np.abs(rows[k:]).argmax(), rows[k:].shape)
+        row, columns[k] = divmod(int(np.abs(rows[k:]).argmax()), rows.shape[1])
         rows[[k, k + row]] = rows[[k + row, k]]
         rows[k] /= rows[k, columns[k]]
         others = np.arange(len(rows)) != k

@@ -153,7 +153,7 @@ class _Refits:
         before, times = (math.sqrt(square / self.freedom) for square in (self.total, remaining))
         statistics = normal_equivalent(self._log_p(remaining, 1)), normal_equivalent(limit)
         cure = "correct the offsets under probes, or the names of probes in the readings"
-        if first.is_off:
+        if first is not None and first.is_off:
             cure = "qualify the probe again"
         return replace(remainder, refit=Refit(words, cure, before, times, *statistics))
 
