@@ -37,7 +37,6 @@ if TYPE_CHECKING:
     from ballplate.extensions.assumptions.interface import assumptions
     from ballplate.extensions.campaign.interface import sheet
     from ballplate.extensions.certificates.interface import certificate
-    from ballplate.extensions.compensation.interface import compensation, read_compensation
     from ballplate.extensions.drafting.interface import design
     from ballplate.extensions.information.interface import information
     from ballplate.extensions.judgement.interface import budget, compare_models, validate
@@ -138,7 +137,6 @@ __all__ = [
     "check",
     "compare",
     "compare_models",
-    "compensation",
     "convert",
     "correct",
     "curves",
@@ -161,7 +159,6 @@ __all__ = [
     "plan",
     "quickstart",
     "reach",
-    "read_compensation",
     "read_report",
     "reliability",
     "repair",

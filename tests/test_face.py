@@ -58,13 +58,6 @@ def printed(capsys: pytest.CaptureFixture[str], *arguments: str) -> Any:
             ("map", MACHINE, "--line=y = 300 mm, z = 200 mm", "--points=4"),
         ),
         (
-            lambda: bp.compensation(MACHINE, "isg", "200 mm", sense="errors of indication"),
-            (
-                *("compensation", MACHINE, "--format=isg", "--pitch=200 mm"),
-                "--sense=indication",
-            ),
-        ),
-        (
             lambda: bp.spline(
                 TABLE, y="finish_error", points="12-32", start_slope="0", evaluate="1 mm"
             ),

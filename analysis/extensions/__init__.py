@@ -191,17 +191,6 @@ SHIPPED = (
         ),
     ),
     _here(
-        "compensation",
-        commands={
-            "compensation": Command(
-                "compensation_command",
-                "write compensation tables of a machine for controllers, or read them",
-                "use",
-            ),
-        },
-        functions=_from("interface", "compensation", "read_compensation"),
-    ),
-    _here(
         "splines",
         commands={
             "spline": Command(

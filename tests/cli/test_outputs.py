@@ -161,12 +161,6 @@ WALK = {
         ("--grid", "2,2,2"),
         ("measured/exx.csv",),
     ),
-    "compensation": Walk(
-        {"FILE": "machine.yaml"},
-        {"-o": "c.csv"},
-        ("--format", "isg", "--pitch", "200 mm"),
-        ("measured/exx.csv",),
-    ),
     "spline": Walk(
         {"FILE": "points.csv", "--nominal": "nominal.csv"},
         {

@@ -7,7 +7,6 @@ from pathlib import Path
 
 import pytest
 from ballplate.estimators import distances as estimators
-from ballplate.extensions.compensation import table_formats
 from ballplate.extensions.judgement import components
 from ballplate.extensions.maps import correction
 from ballplate.extensions.maps import length_map as lengths
@@ -79,7 +78,6 @@ LIMITS = {
     "`sweep` | cases": (load.MOST_CELLS,),
     "`sweep` | values": (axes.MOST_VALUES,),
     "`reach`": (search.MOST_POINTS,),
-    "`compensation` |": (table_formats.MOST_NODES, table_formats.MOST_GRID_NODES),
     "`run --lengths` |": (lengths.MOST_POINTS,),
     "`correct --covariance`": (correction.MOST_CO_ORDINATES,),
     "`map`": (volumetric.MOST_POINTS,),

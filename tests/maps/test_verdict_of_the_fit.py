@@ -31,7 +31,6 @@ VERDICTS = {
     "beyond": "beyond the limit",
     "old": "not stated",
 }
-PITCH = ["--pitch", "500 mm"]
 
 
 @cache
@@ -88,7 +87,6 @@ def test_uncertainties_stated_wrong_are_no_failure(factor: float) -> None:
     result = bp.fit(experiment, bp.simulate(scattered))
     assert result.sigma == pytest.approx(factor, rel=0.25)
     assert result.too_large == (factor > 1.0) and not result.complaint
-    bp.compensation(result, "isg", PITCH[1])
 
 
 def test_what_is_beyond_the_limit_is_significant() -> None:
@@ -149,7 +147,6 @@ OF_MAPS = [
     ["map", "--convert", "MAP", "--to", "metric"],
     ["adjust", "MAP", "--scale", "x=10 um/m"],
     ["diff", "MAP", "clean.npz"],
-    ["compensation", "MAP", "--format", "isg", *PITCH, "--allow-lack-of-fit"],
 ]
 
 
@@ -218,32 +215,6 @@ def test_maps_made_of_a_map_carry_it(
     Path("edited.yaml").write_text(re.sub("^lack_of_fit:.*\n", "", text, flags=re.MULTILINE))
     with pytest.raises(bp.ExperimentError, match="checksum"):
         bp.load_map("edited.yaml")
-
-
-@pytest.mark.parametrize("form", ["csv", "isg", "heidenhain"])
-def test_controller_tables_are_made_only_if_it_is_allowed(
-    form: str, maps: dict[str, Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    ending = "cma" if form == "heidenhain" else "csv"
-    options = ["--format", form, "-o", str(tmp_path / f"table.{ending}"), *PITCH]
-    if form == "heidenhain":
-        options += ["--sense", "corrections", "--without-rotations"]
-    assert main(["compensation", str(maps["beyond"]), *options]) == 3
-    assert "--allow-lack-of-fit" in capsys.readouterr().err and not list(tmp_path.iterdir())
-    assert main(["compensation", str(maps["beyond"]), *options, "--allow-lack-of-fit"]) == 0
-    assert list(tmp_path.iterdir())
-    assert main(["compensation", str(maps["significant"]), *options, "--force"]) == 0
-    with pytest.raises(bp.ExperimentError, match="allow_lack_of_fit"):
-        bp.compensation(fit("beyond"), "isg")
-    bp.compensation(fit("beyond"), "isg", PITCH[1], allow_lack_of_fit=True)
-
-
-def test_a_map_of_old_is_judged_by_its_sigma(maps: dict[str, Path], tmp_path: Path) -> None:
-    text = maps["beyond"].read_text()
-    old = tmp_path / "old.yaml"
-    old.write_text(re.sub("^(lack_of_fit|checksum):.*\n", "", text, flags=re.MULTILINE))
-    with pytest.raises(bp.ExperimentError, match="allow_lack_of_fit"):
-        bp.compensation(old, "isg")
 
 
 def test_the_exit_status_of_fit(

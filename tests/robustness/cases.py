@@ -22,8 +22,6 @@ from random import Random
 from unicodedata import category
 
 from ballplate.simulator.experiment.machine_sections import machine_schema
-from ballplate.simulator.machines.arrangement import AXES
-from ballplate.simulator.machines.error_names import AXIS_ERRORS
 
 from tests.robustness.command_lines import changed_line, drawn, grammar, parsed, quick
 from tests.robustness.experiments import SEED, SWEEP_WORDS, WORDS
@@ -281,10 +279,6 @@ def _outputs(arguments: tuple[str, ...], folder: Path, before: dict[str, bytes])
         stores = {options.store or file.with_suffix(".sqlite")}
     elif command in ("sweep --export", "sweep --report"):
         stores = {options.store}
-    if command == "compensation":
-        # Tables of single axes, or of errors, beside what is named.
-        parts = [f"{part}{end}" for part in (*AXES, *AXIS_ERRORS) for end in (".csv", ".com")]
-        written |= {one.with_name(f"{one.stem}-{p}") for one in written if one.name for p in parts}
     if command == "certificate":
         written |= {
             one.with_name(f"{one.stem}-covariance.csv") for one in written if one.suffix == ".csv"

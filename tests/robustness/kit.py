@@ -98,21 +98,6 @@ CURVE = "position_mm,error_um,u_um\n" + "".join(
     for k, error in enumerate((0, 0.5, 0.8, 0.4, -0.1, -0.3, 0.2, 0.9, 1.4, 1.1, 0.6, 0.1))
 )
 
-VOLCOMP = """\
-// errors of three axes
-X EXX EYX ECX
-0 0 0 0
-100 0.001 -0.002 0.00001
-#
-Y EXY EYY
-0 0 0
-100 0.001 0.002
-#
-Z EZZ
--50 0.001
-0 0
-50 -0.001
-"""
 
 VARIANTS = {
     "splines": "plain",
@@ -154,7 +139,6 @@ def make_kit(folder: Path) -> None:
         "sweep.yaml": SWEEP,
         "machine.yaml": MACHINE,
         "curve.csv": CURVE,
-        "volcomp.csv": VOLCOMP,
     }
     for name, text in texts.items():
         (folder / name).write_text(text, encoding="utf-8")

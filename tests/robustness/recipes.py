@@ -125,14 +125,6 @@ RECIPES = (
     "'map --curves' map.yaml",
     "'map --curves' map.npz --error EXX --error EC0Y --points 5 --format csv",
     "map machine.yaml --line '0 mm, 0 mm, 0 mm to 600 mm, 500 mm, 400 mm' --plot out.svg",
-    "compensation machine.yaml --format isg --pitch '100 mm' -o out.csv",
-    "compensation machine.yaml --format csv --sense indication --origin '0 mm, 9 mm, 9 mm' -o out.csv",
-    "compensation gec-like.yaml --format isg --volumetric --pitch '600 mm' --json",
-    (
-        "compensation machine.yaml --format heidenhain --sense indication --without-rotations"
-        " --origin '100 mm, 0 mm, 0 mm' -o out.cma"
-    ),
-    "compensation volcomp.csv --format isg --read --sense corrections --arrangement MB2 -o out.yaml",
     "spline curve.csv --evaluate '10 mm, 50 mm' -o out.csv --powers global",
     (
         "spline curve.csv --every 3 --start-value '0 um' --end-slope '1 um/mm' --at '60 mm' slope 0"

@@ -15,6 +15,7 @@ from pydantic import Field
 
 from ...inputs.extensions import optional_service
 from ...inputs.messages import ExperimentError, Steps
+from ...inputs.problems import Problems
 from ...inputs.quantities import CommonPart
 from ...inputs.settings import Settings, Text, hint, listing, shorten
 from ...inputs.yamltree import Mark
@@ -215,17 +216,21 @@ def uncertainties_of(
             place, f"{len(size)} correlated values; at most {MOST_JOINT_VALUES} are possible"
         )
         return None
+    root = _root_of(matrix, place, problems)
+    return None if root is None else Uncertainties(_frozen(size), root)
+
+
+def _root_of(matrix: tuple[Array, ...], place: Steps, problems: Problems) -> CovarianceRoot | None:
+    """Return the root of a covariance with its rounding, or report that there is none."""
     try:
         root = covariance_root(matrix[0], matrix[1])
     except IndefiniteError as error:
-        problems.add(
-            place,
-            f"is no covariance: its correlations have {error}; correct it, or give more digits",
-        )
+        text = f"is no covariance: its correlations have {error}; correct it, or give more digits"
+        problems.add(place, text)
         return None
-    if text := root.doubt:
-        problems.doubt(place, text)
-    return Uncertainties(_frozen(size), root)
+    if root.doubt:
+        problems.doubt(place, root.doubt)
+    return root
 
 
 def _common(settings: Any, of_values: Array, lengths: Array) -> Array | None:

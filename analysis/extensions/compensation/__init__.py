@@ -1,1 +1,0 @@
-"""Compensation tables of machines: errors at nodes, in the formats that controllers read."""
