@@ -21,7 +21,7 @@ from ballplate.simulator.geometry.motions import without_rigid_motion
 from ballplate.simulator.inputs.extensions import optional_service
 from ballplate.simulator.inputs.quantities import Target
 from ballplate.simulator.inputs.settings import number_of
-from ballplate.simulator.machines import AXIS_ERRORS
+from ballplate.simulator.machines.error_names import AXIS_ERRORS
 from ballplate.simulator.machines.protocol import Array, HasLines, Unit
 
 # Shares of a direction that move points by less than this fraction of its largest are not reported.

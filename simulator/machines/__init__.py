@@ -10,7 +10,7 @@ from ballplate.simulator.inputs.faces import lazily
 if TYPE_CHECKING:
     from .arrangement import ARRANGEMENTS, AXES, Arrangement
     from .bases import Basis
-    from .curves import Points, SmoothedPoints, curves_model
+    from .curves import Points, SmoothedPoints
     from .custom import CustomModelError, module_source
     from .description import (
         Combination,
@@ -22,8 +22,8 @@ if TYPE_CHECKING:
     )
     from .empirical import USUAL_OFFSET, EmpiricalModel
     from .empirical_settings import EmpiricalSettings
-    from .error_names import AXIS_ERRORS, SQUARENESS_ERRORS, SquarenessError
-    from .kinematic import ErrorFunction, KinematicModel, carried_vectors, error_function
+    from .error_names import SQUARENESS_ERRORS, SquarenessError
+    from .kinematic import ErrorFunction, KinematicModel, error_function
     from .kinematic_settings import FunctionsSettings, KinematicSettings
     from .model_kinds import Corner, ErrorModelKind
     from .plane import PlaneModel
@@ -47,7 +47,6 @@ if TYPE_CHECKING:
     )
     from .volumetric import (
         SQUARENESS,
-        Field,
         VolumetricModel,
         meaning,
         squareness_field,
