@@ -27,18 +27,20 @@ def checked_draft(
     (experiment,) = load(path, planning=True, text=text)
     least = _least_hours(experiment)
     if sheet.hours < least:
+        few = (
+            "two positions" if len(sheet.volume) == 2 else "three positions with a change of plane"
+        )
         raise ValueError(
-            f"{sheet.hours:g} h is too short: three positions with a change of plane take"
-            f" {ceil(10 * least) / 10:g} h; give more"
+            f"{sheet.hours:g} h is too short: {few} take {ceil(10 * least) / 10:g} h; give more"
         )
     return text, command, experiment
 
 
 def _least_hours(experiment: Experiment) -> float:
-    """Return the hours of the three quickest positions with a change of plane; fewer positions, or
-    those of one plane, leave something undetermined.
+    """Return the hours of the three quickest positions with a change of plane, in two dimensions of
+    the two quickest; fewer positions, or those of one plane, leave something undetermined.
     """
-    pool = experiment.pool
+    pool, space = experiment.pool, experiment.dimension == 3
     assert pool is not None
-    quickest = sorted(candidate.seconds for candidate in pool.candidates)[:3]
-    return (sum(quickest) + pool.changes.plane) / 3600
+    quickest = sorted(candidate.seconds for candidate in pool.candidates)[: 3 if space else 2]
+    return (sum(quickest) + pool.changes.plane * space) / 3600

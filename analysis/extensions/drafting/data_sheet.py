@@ -44,7 +44,8 @@ NEEDED = tuple(READERS)[:5]
 class DataSheet:
     """Values by the names of `READERS`, in metres; None for usual values.
 
-    :raises ValueError: the repeatability is above the constant part of the MPE.
+    :raises ValueError: the repeatability is above the constant part of the MPE, or there are
+        several tips in two dimensions.
     """
 
     machine_type: str
@@ -63,6 +64,12 @@ class DataSheet:
             raise ValueError(
                 f"repeatability {format_length(self.repeatability)} is above the constant part of"
                 f" the MPE, {format_length(self.mpe.constant)}; correct one of them"
+            )
+
+        if len(self.volume) == 2 and self.tips.form != "one":
+            raise ValueError(
+                f"tips {self.tips.form} are not for a volume of two lengths, which has one probe"
+                ' without an offset; give "one", or three lengths'
             )
 
     @property
@@ -91,4 +98,6 @@ def data_sheet(texts: Mapping[str, str]) -> DataSheet:
     :raises ValueError: a text cannot be read.
     """
     stated = {name: texts.get(name) or table("entries")[name]["default"] for name in READERS}
+    if not texts.get("tips") and len(volume(stated["volume"])) == 2:
+        stated["tips"] = "one"
     return DataSheet(**{name: READERS[name](text) for name, text in stated.items() if text})

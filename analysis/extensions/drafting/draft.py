@@ -31,13 +31,16 @@ def draft(sheet: DataSheet, texts: Mapping[str, str], next_command: str) -> str:
     :raises ValueError: the plate, the tips and the volume do not go together.
     """
     places, tips, mpe = sheet.places, sheet.tips_there, sheet.mpe
-    starts = list(starts_of(places))
+    starts = list(starts_of(tips, places))
     error = ERRORS * float(mpe.at(np.linalg.norm(sheet.volume)))
     usual = LengthFunction(TARGET * mpe.constant, TARGET * mpe.slope)
     target = sheet.target or Target(usual, 2.0)
     balls = [sheet.plate.columns, sheet.plate.rows]
     plate = {"kind": "grid", "balls": balls, "size": [*map(typed_length, sheet.plate.size)]}
-    functions = _flow(dict.fromkeys(table("unseen")[sheet.arrangement], 1))
+    unseen = table("unseen")[sheet.arrangement]
+    if tips.form == "flat":
+        unseen = [name for name in unseen if name in ("ECX", "ECY")]
+    functions = _flow(dict.fromkeys(unseen, 1))
     left_out = f"\n  # A single tip does not show these rotations.\n  functions: {functions}"
     from_mpe = (
         f"a third of the constant part of the MPE, {function_text(mpe)}.\n"
@@ -56,8 +59,8 @@ def draft(sheet: DataSheet, texts: Mapping[str, str], next_command: str) -> str:
         else rounded(REPEATABILITY * mpe.constant, 2),
         repeatability_words="as stated." if sheet.repeatability else from_mpe,
         arrangement=sheet.arrangement,
-        chain=chain_words(sheet.arrangement),
-        functions=left_out if tips.form == "one" else "",
+        chain=chain_words(sheet.arrangement, "xyz"[: len(sheet.volume)]),
+        functions=left_out if len(tips.offsets) == 1 else "",
         position=rounded(error, 2),
         rotation=f"{1e6 * error / max(sheet.volume):.2g} urad",
         probes=_tips(tips, rounded(sheet.tips.uncertainty)),

@@ -48,7 +48,9 @@ def drafted(options: Namespace) -> tuple[str, str] | None:
         lacking = " ".join(f'{_option(name)} "{entries[name]["default"]}"' for name in wanted)
         raise UsageError(f"the data sheet lacks values; add for example {lacking}")
     for name in wanted:
-        texts[name] = _answer(name, texts, options)
+        # In two dimensions one probe is all there is.
+        if name != "tips" or len(READERS["volume"](texts["volume"])) == 3:
+            texts[name] = _answer(name, texts, options)
     try:
         text, command, _ = checked_draft(options.file, data_sheet(texts), texts)
         return text, command

@@ -14,21 +14,22 @@ def design(
     mpe: str,
     plate: str,
     certificate: str,
-    tips: str = "star",
+    tips: str | None = None,
     target: str | None = None,
     repeatability: str | None = None,
     temperature: str | None = None,
 ) -> Experiment:
     """Return an experiment with a pool, drafted from a machine's data sheet as by `ballplate init`.
 
-    All values are texts, quantities with units. The type of machine is moving bridge, fixed
-    bridge, gantry, cantilever, horizontal arm, column, or an arrangement such as MB1; the volume
-    has three edges; of an MPE such as 0.9 um + L/400, L is in mm and the result in um; the
-    certificate is an expanded uncertainty with its k; tips are one, star or head, with or without
-    the length of a stylus and the standard uncertainty of offsets. The target is one of the
-    expanded uncertainty of lengths, by default half the MPE; the repeatability is a standard
-    deviation, by default a third of the constant part of the MPE; the temperature is the standard
-    uncertainty of temperatures, by default exactly known.
+    All values are texts, quantities with units. The type of machine is moving bridge, fixed bridge,
+    gantry, cantilever, horizontal arm, column, or an arrangement such as MB1; the volume has three
+    edges, or two for two dimensions; of an MPE such as 0.9 um + L/400, L is in mm and the result in
+    um; the certificate is an expanded uncertainty with its k; tips are one (in two dimensions,
+    where it is the default), star (default) or head, with or without the length of a stylus and the
+    standard uncertainty of offsets. The target is one of the expanded uncertainty of lengths, by
+    default half the MPE; the repeatability is a standard deviation, by default a third of the
+    constant part of the MPE; the temperature is the standard uncertainty of temperatures, by
+    default exactly known.
 
     :raises ValueError: a text cannot be read, or the plate does not fit into the volume within the
         reach of the tips.
@@ -47,7 +48,7 @@ def design(
         "mpe": mpe,
         "plate": plate,
         "certificate": certificate,
-        "tips": tips,
+        "tips": tips or "",
         "target": target or "",
         "repeatability": repeatability or "",
         "temperature": temperature or "",

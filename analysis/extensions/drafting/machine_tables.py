@@ -50,14 +50,17 @@ def arrangement_of(kind: str, volume: tuple[float, ...]) -> str:
     return names[-1] if volume[0] > volume[1] else names[0]
 
 
-def chain_words(name: str) -> str:
-    """Return which axis of an arrangement carries which.
+def chain_words(name: str, axes: str = "xyz") -> str:
+    """Return which of some axes of an arrangement carries which.
 
     >>> chain_words("MB1"), chain_words("FB1")
     ('y carries x carries z', 'x carries z; y carries the workpiece')
+    >>> chain_words("CX1", "xy")
+    'x carries y carries the workpiece'
     """
     chain = ARRANGEMENTS[name]
-    words = " carries ".join(chain.probe_side)
-    if chain.workpiece_side:
-        words += f"; {' carries '.join(chain.workpiece_side)} carries the workpiece"
-    return words
+    probe, workpiece = (
+        " carries ".join(axis for axis in side if axis in axes)
+        for side in (chain.probe_side, chain.workpiece_side)
+    )
+    return "; ".join(filter(None, [probe, workpiece and f"{workpiece} carries the workpiece"]))

@@ -1,4 +1,7 @@
-"""Tips, and places of a plate that fill a measuring volume within their reach."""
+"""Tips, and places of a plate that fill a measuring volume within their reach.
+
+Places are parts of the free room, so that they follow the sizes of plate and volume.
+"""
 
 from __future__ import annotations
 
@@ -9,7 +12,7 @@ from typing import Any
 
 import numpy as np
 from ballplate.simulator.geometry import AXIS_INDEX, IN_PLANE_AXES, rotation_matrix
-from ballplate.simulator.inputs import format_length, typed_length
+from ballplate.simulator.inputs import format_length
 from ballplate.simulator.machines import Array
 
 from .machine_tables import table
@@ -19,20 +22,24 @@ Settings = dict[str, Any]
 
 # Usual length of a stylus, at most a tenth of the shortest edge of the volume.
 LONGEST = 0.060
-# Of levels and of corners along an axis: more make plans slow, and hardly better.
-MOST_PLACES = 3
+# Of levels and of corners along an axis, by their number: more make plans slow.
+PARTS = ([], ["middle"], ["low", "high"], ["low", "middle", "high"])
 # Play of a plate, as a share of its side, below which it has one place along an axis.
 LITTLE_PLAY = 0.1
+# Below which a plate fits that is larger than its room, in metres.
+ROUNDING = 1e-9
 
 
 @dataclass(frozen=True)
 class Tips:
-    """Tips by name with their ``offsets`` (3,) in metres, the reference first.
+    """Tips by name with their ``offsets`` (d,) in metres, the reference first.
 
-    ``length`` is that of a stylus in metres.
+    ``form`` is one, star, head, or flat in two dimensions; the last carriage moves along the axis
+    ``pointing``; ``length`` is that of a stylus in metres.
     """
 
     form: str
+    pointing: str
     length: float
     offsets: dict[str, Array]
 
@@ -46,22 +53,27 @@ class Tips:
         }
 
     def reach(self, names: list[str], volume: tuple[float, ...]) -> Array:
-        """Return the lowest and highest co-ordinates (2, 3) of balls that all these tips reach.
+        """Return the lowest and highest co-ordinates (2, d) of balls that all these tips reach.
 
         The scale readings, ball less offset, stay within the volume, and so do the balls.
         """
-        along = np.array([(0.0, 0.0, 0.0), *(self.offsets[name] for name in names)])
+        along = np.array([np.zeros(len(volume)), *(self.offsets[name] for name in names)])
         return np.array([along.max(axis=0), volume + along.min(axis=0)])
 
 
 def tips_of(tips: StatedTips, pointing: str, volume: tuple[float, ...]) -> Tips:
-    """Return the tips of a machine of this volume whose last carriage moves along an axis."""
+    """Return the tips of a machine of this volume whose last carriage moves along an axis; in two
+    dimensions the one without an offset.
+    """
+    if len(volume) == 2:
+        return Tips("flat", "z", 0.0, {"probe": np.zeros(2)})
     # Whole tenths of a millimetre.
     length = min(LONGEST, int(1e3 * min(volume)) / 1e4)
     if tips.length is not None:
         length = tips.length if tips.form == "star" else tips.length / 2
     listed = table("tips")[tips.form][pointing].items()
-    return Tips(tips.form, length, {name: length * np.array(offset) for name, offset in listed})
+    offsets = {name: length * np.array(offset) for name, offset in listed}
+    return Tips(tips.form, pointing, length, offsets)
 
 
 def places_of(plate: Plate, tips: Tips, volume: tuple[float, ...]) -> Iterator[Settings]:
@@ -72,53 +84,48 @@ def places_of(plate: Plate, tips: Tips, volume: tuple[float, ...]) -> Iterator[S
         a plane that they read.
     """
     size = f"the plate of {_crossed(plate.size)}"
-    if min(plate.size) > sorted(volume)[1] or max(plate.size) > max(volume):
+    if min(plate.size) > sorted(volume)[-2] or max(plate.size) > max(volume):
         whole = _crossed(volume)
         raise ValueError(f"{size} is larger than the volume, {whole}; correct one of them")
     for plane, names in tips.by_plane.items():
         ends = tips.reach(names, volume)
         places = list(_across(plane, plate, ends))
-        where = f"across {plane}"
+        where = "" if tips.form == "flat" else f"across {plane} "
         if places and tips.form == "one":
             inclined = list(_inclined(plane, plate, ends))
             places = [*places, *inclined] if inclined else []
-            where += " and inclined by 45 degrees to it"
+            where += "and inclined by 45 degrees to it "
         if not places:
             raise ValueError(
-                f"{size} does not fit {where} within the reach of the tips {', '.join(names)},"
+                f"{size} does not fit {where}within the reach of the tips {', '.join(names)},"
                 f" {_crossed(np.maximum(0.0, ends[1] - ends[0]))}; give a smaller plate or"
                 " shorter tips, or correct the volume"
             )
         yield from (place | {"probes": names} for place in places)
 
 
-def starts_of(places: list[Settings]) -> Iterator[Settings]:
-    """Yield positions to start with: a plate at the lower end in each plane, one turned at the
-    upper end, and one of each inclination.
-    """
-    planes = ["".join(place.get("planes", ())) for place in places]
-    for place, plane in zip(places, planes, strict=True):
-        if not plane and place["name"].endswith("low"):
-            yield place
-        for end, word in enumerate(("low", "high") if plane else ()):
-            if place["quarter_turns"] == end or planes.count(plane) == 1:
-                corner = {axis: corners[-end] for axis, corners in place["corners"].items()}
-                start = {"name": f"{plane} {word}", "plane": plane, "level": place["levels"][-end]}
-                start |= {"corner": corner, "quarter_turns": place["quarter_turns"]}
-                yield start | {"probes": place["probes"]}
+def starts_of(tips: Tips, places: list[Settings]) -> Iterator[Settings]:
+    """Yield the usual positions to start with, turned by another quarter where they fit only so."""
+    for start in table("starts")[tips.form][tips.pointing]:
+        fitting = [one for one in places if one.get("planes", []) == [*start.get("plane", "")]]
+        turns = {place.get("quarter_turns") for place in fitting}
+        if start.get("quarter_turns", turns) not in (turns, *turns):
+            start = start | {"quarter_turns": start["quarter_turns"] ^ 1}
+        yield start | {"probes": fitting[0]["probes"]}
 
 
 def _across(plane: str, plate: Plate, ends: Array) -> Iterator[Settings]:
     """Yield the places of a plate across an axis, those turned by a quarter separately."""
-    levels = _spread(ends[:, AXIS_INDEX[plane]], 0.0, min(plate.size))
+    space = ends.shape[1] == 3
+    levels = _parts(ends[:, AXIS_INDEX[plane]], 0.0, min(plate.size)) if space else ["middle"]
     for turn, size in enumerate((plate.size, plate.size[::-1])):
         corners = {
-            axis: _spread(ends[:, AXIS_INDEX[axis]], side, side)
+            axis: _parts(ends[:, AXIS_INDEX[axis]], side, side)
             for axis, side in zip(IN_PLANE_AXES[plane], size, strict=True)
         }
         if levels and all(corners.values()):
-            group = {"planes": [plane], "levels": levels, "corners": corners}
-            yield group | {"quarter_turns": turn}
+            group = {"planes": [plane], "levels": levels} if space else {}
+            yield group | {"corners": corners, "quarter_turns": turn}
 
 
 def _inclined(pointing: str, plate: Plate, ends: Array) -> Iterator[Settings]:
@@ -127,25 +134,21 @@ def _inclined(pointing: str, plate: Plate, ends: Array) -> Iterator[Settings]:
     for angles in table("inclined")[pointing]:
         # The other two corner balls are between these along every axis.
         turned = balls @ rotation_matrix([*np.radians(angles)]).T
-        # Whole tenths of a millimetre, which are not beyond the range.
-        first, last = ends - [turned.min(axis=0) - 1e-4, turned.max(axis=0) + 1e-4]
-        for share, word in enumerate(("low", "middle", "high") if (first <= last).all() else ()):
-            origin = np.round(first + share / 2 * (last - first), 4)
-            pose = {"origin": [*map(typed_length, origin)]}
-            pose["rotation"] = [f"{angle} deg" for angle in angles]
-            yield {"name": f"inclined {' '.join(map(str, angles))} {word}", "pose": pose}
+        fits = (np.ptp(turned, axis=0) <= ends[1] - ends[0]).all()
+        for parts in table("inclined")["origins"] if fits else ():
+            rotation = [f"{angle} deg" for angle in angles]
+            # Without a sign, which names of features do not keep.
+            name = " ".join(map(str, ["inclined", *(angle % 360 for angle in angles), parts[0]]))
+            yield {"name": name, "pose": {"origin": parts, "rotation": rotation}}
 
 
-def _spread(ends: Array, side: float, step: float) -> list[str]:
-    """Return lower ends of a side, as many as it takes to cover a range in steps; none if it does
-    not fit.
+def _parts(ends: Array, side: float, step: float) -> list[str]:
+    """Return lower ends of a side as parts of its room, as many as it takes to cover a range in
+    steps; none if it does not fit.
     """
-    # Whole tenths of a millimetre that are not beyond the range.
-    room = np.floor(1e4 * (ends[1] - side - ends[0]) + 1e-6) * 1e-4
-    most = min(MOST_PLACES, max(2, ceil(np.ptp(ends) / step) + (side == 0.0)))
-    count = most if room > LITTLE_PLAY * step else int(room >= 0.0)
-    shares = np.linspace(0.0, 1.0, count)
-    return [typed_length(round(float(ends[0] + room * share), 4)) for share in shares]
+    room = ends[1] - ends[0] - side
+    most = min(3, max(2, ceil((ends[1] - ends[0]) / step) + (side == 0.0)))
+    return PARTS[most if room > LITTLE_PLAY * step else int(room >= -ROUNDING)]
 
 
 def _crossed(lengths: Iterable[float]) -> str:

@@ -69,8 +69,9 @@ def _words(sheet: DataSheet, experiment: Experiment) -> dict[str, str]:
     """Return in words what a draft makes of entries."""
     tips, target, pool = sheet.tips_there, experiment.target_uncertainty, experiment.pool
     assert target is not None and pool is not None
+    axes = "xyz"[: experiment.dimension]
     words = {
-        "machine_type": f"{chain_words(sheet.arrangement)} ({sheet.arrangement})",
+        "machine_type": f"{chain_words(sheet.arrangement, axes)} ({sheet.arrangement})",
         "certificate": f"u = {function_text(sheet.certificate.standard)}",
         "tips": f"{', '.join(tips.offsets)}; {format_length(tips.length)} long,"
         f" offsets uncertain by {format_length(sheet.tips.uncertainty)}",

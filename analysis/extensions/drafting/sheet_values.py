@@ -80,11 +80,11 @@ def lengths(text: str, count: int = 3) -> tuple[float, ...]:
 
 
 def volume(text: str) -> tuple[float, ...]:
-    """Return the edges of a measuring volume in metres.
+    """Return the edges of a measuring volume in metres, two in two dimensions.
 
-    :raises ValueError: no three lengths of 10 mm to 100 m.
+    :raises ValueError: no three lengths of 10 mm to 100 m, or two.
     """
-    edges = lengths(text)
+    edges = lengths(text, 2 if len(BETWEEN.split(text.strip())) == 2 else 3)
     for edge in edges:
         if not 0.01 <= edge <= 100.0:
             raise ValueError(f'"{text}" has an edge of {format_length(edge)}; give 10 mm to 100 m')

@@ -24,7 +24,8 @@ EXAMPLE = Path("designs/quickstart.yaml")
     [
         ({"machine_type": "bridge"}, wording.UNKNOWN_MACHINE),
         ({"tips": "two"}, wording.UNKNOWN_TIPS),
-        ({"volume": "900 1200 mm"}, wording.TWO_LENGTHS),
+        ({"volume": "900 1200 700 500 mm"}, wording.FOUR_LENGTHS),
+        ({"volume": "900 1200 mm", "tips": "star"}, wording.TIPS_IN_TWO_DIMENSIONS),
         ({"volume": "900 1200 700"}, wording.NO_UNIT_OF_VOLUME),
         ({"volume": "900 1200 0 mm"}, wording.NOTHING_HIGH),
         ({"mpe": "0.9 + L/400"}, wording.NO_UNIT_OF_MPE),

@@ -72,9 +72,9 @@ def test_the_same_answers_give_the_file_of_init(
     ("changed", "messages"),
     [
         (
-            {"volume": "900 1200 mm", "temperature": "20 degC"},
+            {"volume": "900 1200 700 500 mm", "temperature": "20 degC"},
             {
-                "volume": wording.TWO_LENGTHS,
+                "volume": wording.FOUR_LENGTHS,
                 "temperature": wording.NO_UNCERTAINTY_OF_TEMPERATURE,
             },
         ),

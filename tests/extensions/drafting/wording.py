@@ -5,7 +5,7 @@ UNKNOWN_MACHINE = (
     " horizontal arm, column, MB1, MB2, FB1, FB2, FH1, FH2, MH1, MH2, CX1, CY1"
 )
 UNKNOWN_TIPS = 'unknown tips "two"; choose from one, star, head'
-TWO_LENGTHS = '"900 1200 mm" has 2 lengths, not 3; write for example "900 1200 700 mm"'
+FOUR_LENGTHS = '"900 1200 700 500 mm" has 4 lengths, not 3; write for example "900 1200 700 mm"'
 NO_UNIT_OF_VOLUME = '"900" has no unit'
 NOTHING_HIGH = '"0 mm" must be above zero'
 NO_UNIT_OF_MPE = '"0.9" has no unit'
@@ -48,3 +48,4 @@ LACKS_VALUES = (
 NO_DATA_SHEET = "--machine and --example take no data sheet; give only one of them"
 NO_ANSWER = "no answer for --machine-type; nothing is written"
 HALF_THE_MPE = "lengths of the corrected machine: half the MPE."
+TIPS_IN_TWO_DIMENSIONS = "tips star are not for a volume of two lengths"
