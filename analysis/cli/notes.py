@@ -58,7 +58,7 @@ def tell_notes(notes: Iterable[object]) -> None:
 def note_singular_values(options: Namespace, verdict: Verdict) -> None:
     """Print the singular values that decided a rank, if asked to be verbose."""
     if options.verbose and len(verdict.singular_values):
-        from ballplate.results import singular_value_words
+        from ballplate.results.text_blocks import singular_value_words
 
         note(options, singular_value_words(verdict))
 

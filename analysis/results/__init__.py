@@ -28,6 +28,6 @@ if TYPE_CHECKING:
     from .qualifications import Qualification, given_words, qualification_data
     from .residuals import reading_residuals
     from .sigmas_by_campaign import campaign_sigmas, with_sigmas
-    from .text_blocks import scale_lines, singular_value_words, target_lines, verdict_lines
+    from .text_blocks import scale_lines, target_lines, verdict_lines
 
 __getattr__, __dir__ = lazily(__name__, __file__)
