@@ -484,7 +484,6 @@ if TYPE_CHECKING:
         Writer,
         add_force,
         add_output,
-        check_outputs,
         check_overwritten,
         text_writer,
         write,

@@ -9,8 +9,7 @@ from ballplate.simulator.inputs.faces import lazily
 # Public names of this package: extensions import these alone, and its modules are private.
 if TYPE_CHECKING:
     from .changes import node_of
-    from .curve_files import read_curves
-    from .error_tables import LineError, parse_line, parse_point
+    from .error_tables import parse_line, parse_point
     from .exact_values import exact_contradictions
     from .json_schema import DRAFT, schema, tidied
     from .layout import lay_out

@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     from .artefacts import BryanGaugeSettings, GridSettings, SquareSettings, TwoSpheresSettings
     from .axes import PlateAxes, axes_words, plate_axes
     from .ball_layouts import ArtefactSettings, BallLayout, Name, frozen, pairs
-    from .grids import even_grid, grid_points
+    from .grids import even_grid
     from .motions import (
         AXIS_NAMES,
         cross_matrices,
