@@ -20,7 +20,7 @@ from ..inputs.spreadsheets import CsvWriter
 from ..inputs.tables import FileRow
 from ..inputs.yamltree import GivenText, Mark
 from ..machines.protocol import Array, Integers
-from .joined import ReadingKey, reading_keys, rows_of
+from .joining import ReadingKey, reading_keys, rows_of
 from .observed_readings import ObservedReadings, combine_standards
 from .reading_sources import Source, source_rows
 

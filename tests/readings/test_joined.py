@@ -24,7 +24,7 @@ from ballplate.simulator.estimation.gauss_newton import estimate, newton_step
 from ballplate.simulator.estimation.linearisation import linearise
 from ballplate.simulator.inputs.yamltree import to_python, written
 from ballplate.simulator.readings.generate import exact_readings
-from ballplate.simulator.readings.joined import joined, reading_keys
+from ballplate.simulator.readings.joining import joined, reading_keys
 from ballplate.simulator.readings.observed_readings import observe
 from ballplate.simulator.readings.simulated import on_stated_machine
 
