@@ -11,6 +11,7 @@ if TYPE_CHECKING:
     from .fingerprints import position_fingerprints
     from .generate import NoReadingError, exact_readings, scale_readings, true_readings
     from .given_points import ensure_points, probe_places
+    from .joining import joined, reading_keys
     from .observed_readings import ObservedReadings, observe
     from .reading_files import AXES, read_readings
     from .reading_sources import (
@@ -22,7 +23,6 @@ if TYPE_CHECKING:
         named_rows,
         plain_rows,
     )
-    from .row_matching import joined, reading_keys
     from .simulated import Simulated, on_stated_machine, simulated_readings
 
 __getattr__, __dir__ = lazily(__name__, __file__)

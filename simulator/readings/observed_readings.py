@@ -15,7 +15,7 @@ from ..inputs.extensions import MissingExtensionError, service
 from ..inputs.settings import listing
 from ..inputs.yamltree import Mark
 from ..machines.protocol import Array, Integers
-from .row_matching import ReadingKey, reading_keys, rows_of
+from .joining import ReadingKey, reading_keys, rows_of
 
 # Directions of a gauge within this (rad) of the planned ones are taken as planned.
 AS_PLANNED = 0.01

@@ -21,9 +21,9 @@ from ..inputs.spreadsheets import CsvWriter
 from ..inputs.tables import FileRow
 from ..inputs.yamltree import GivenText, Mark
 from ..machines.protocol import Array, Integers
+from .joining import ReadingKey, reading_keys, rows_of
 from .observed_readings import ObservedReadings, combine_standards
 from .reading_sources import Source, source_rows
-from .row_matching import ReadingKey, reading_keys, rows_of
 
 AXES = ("x", "y", "z")
 
