@@ -192,8 +192,8 @@ def trials_data(result: Trials) -> Data:
 def _comparison_data(comparison: MonteCarloComparison) -> Data:
     return {
         **picked(comparison, "unit", "count", "sampled"),
-        "linear": {"maximum": comparison.linear_maximum, "average": comparison.linear_average},
-        "actual": {"maximum": comparison.actual_maximum, "average": comparison.actual_average},
+        "linear": _finite(maximum=comparison.linear_maximum, average=comparison.linear_average),
+        "actual": _finite(maximum=comparison.actual_maximum, average=comparison.actual_average),
         "spread_ratio": _figure(comparison.spread),
         "actual_ratio": _figure(comparison.actual),
         "bias_ratio": _figure(comparison.bias),
@@ -205,5 +205,9 @@ def _comparison_data(comparison: MonteCarloComparison) -> Data:
 
 
 def _figure(figure: MonteCarloEstimate) -> dict[str, float | None]:
-    values = {"value": figure.value, "standard_error": figure.error}
+    return _finite(value=figure.value, standard_error=figure.error)
+
+
+def _finite(**values: float) -> dict[str, float | None]:
+    """Return values by name, None instead of one that is not finite."""
     return {name: value if math.isfinite(value) else None for name, value in values.items()}

@@ -182,8 +182,8 @@ def test_files_are_utf_8_with_line_feeds(
 
 
 def opened(tree: ast.AST) -> list[ast.Call]:
-    """Calls that open text files: open(), and the methods of paths, but those of the module os and
-    of bytes.
+    """Calls that open text files: open(), and the methods of paths, but those of the module os, of
+    an archive, and of bytes.
     """
     found = []
     for node in ast.walk(tree):
@@ -192,7 +192,7 @@ def opened(tree: ast.AST) -> list[ast.Call]:
         if isinstance(node.func, ast.Name):
             is_opened = node.func.id == "open"
         else:
-            is_os = getattr(getattr(node.func, "value", None), "id", "") == "os"
+            is_os = getattr(getattr(node.func, "value", None), "id", "") in ("os", "archive")
             is_opened = (
                 getattr(node.func, "attr", "") in ("open", "read_text", "write_text") and not is_os
             )

@@ -128,7 +128,7 @@ WALK = {
     "next": Walk(
         EXPERIMENT | {"READINGS": "readings.csv", "--watch": "."}, {}, also=("balls.csv",)
     ),
-    "map --curves": Walk({"MAP": "curved-map.yaml"}, {}),
+    "map --curves": Walk({"FILE": "curved-map.yaml"}, {}),
     "diff": Walk(
         {
             "MAP": "map.yaml",

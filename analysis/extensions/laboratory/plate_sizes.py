@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from ballplate.simulator.computing import lstsq
 from ballplate.simulator.design import Design, read_in_positions
 from ballplate.simulator.geometry import AXIS_NAMES, fit_motion
 from ballplate.simulator.inputs import listing
@@ -58,7 +59,7 @@ def _factors(nominal: Array, drawn: Array, places: Array) -> list[Array]:
     the readings do not determine them, NaN if no factors explain them.
     """
     drawn, seen = drawn - drawn.mean(axis=0), places - places.mean(axis=0)
-    changed, _, rank, _ = np.linalg.lstsq(drawn, seen, rcond=None)
+    changed, _, rank, _ = lstsq(drawn, seen)
     if len(np.unique(drawn, axis=0)) <= drawn.shape[1] + 1 or rank < drawn.shape[1]:
         return []
     square = changed @ changed.T
