@@ -289,7 +289,7 @@ def _gain_table(campaign: Campaign) -> list[str]:
         for gain in campaign.gains
     ]
     rows += [
-        ["left out: " + gain.candidate.name, *_gain(campaign, gain)]
+        ["beyond the limit: " + gain.candidate.name, *_gain(campaign, gain)]
         for gain in campaign.left_out[:TOLD]
     ]
     return aligned(rows, [False, True, True, True])

@@ -131,6 +131,7 @@ def _certificate(root: Node, items: list[str]) -> Unknown:
     :raises NotVariableError: no item states one that can be multiplied.
     """
     lengths, rows_skipped, skipped = list[str](), list[str](), list[str]()
+    common = [f"{item}.common" for item in items if node_at(root, f"{item}.common") is not None]
     for item in items:
         path = f"{item}.standard_uncertainty"
         try:
@@ -151,7 +152,7 @@ def _certificate(root: Node, items: list[str]) -> Unknown:
     title = "certificate's standard uncertainty"
     if skipped:
         title += f" (without {listing(skipped)}, which states no standard_uncertainty to multiply)"
-    return _scaled("certificate", title, root, lengths + rows_skipped)
+    return _scaled("certificate", title, root, lengths + rows_skipped + common)
 
 
 def _tips(experiment: Experiment, root: Node) -> Unknown:

@@ -172,3 +172,25 @@ def test_a_pool_alone_is_no_design(tmp_path: Path) -> None:
     (experiment,) = load(path, planning=True)
     with pytest.raises(bp.ExperimentError, match="positions: missing"):
         reach(experiment, parse_goal("U6 average 1 um"), ("hours",))
+
+
+def test_a_certificate_is_varied_with_what_its_values_have_in_common() -> None:
+    """One certificate states both parts; its limit is that of a plate of which all is known."""
+    item = {"kind": "distances", "pairs": "corner sides", "standard_uncertainty": "0.2 um"}
+    stated = bp.quickstart().with_(
+        {
+            "calibration": [{**item, "common": "0.3 um/m"}],
+            "evaluation.points": {"random": 20, "seed": 1},
+        }
+    )
+    exact = {**item, "standard_uncertainty": "0.00002 um", "common": "0.00003 um/m"}
+    least = bp.run(stated.with_({"calibration": [exact]})).quantities["U6"].average
+    present = bp.run(stated).quantities["U6"].average
+    assert least < 0.99 * present
+    goal = f"U6 average {1e6 * (0.4 * present + 0.6 * least):.6f} um"
+    (answer,) = bp.reach(stated, goal, "certificate").answers
+    assert answer.status == "found"
+    own, common = answer.words.split(", ")
+    half = {**item, "standard_uncertainty": own, "common": common}
+    found = bp.run(stated.with_({"calibration": [half]})).quantities["U6"].average
+    assert 0.995 < found / (0.4 * present + 0.6 * least) <= 1.0
