@@ -63,7 +63,7 @@ def hole_plates(points: int = 10) -> Reference:
     """Two hole plates in five positions that leave errors across z weakly determined: data sets
     from ones that two passes bring to their estimate to ones that need a separate one.
     """
-    sections = small_sections(points)
+    sections = small_sections(points, kept=True)
     plate = {"kind": "grid", "balls": [4, 4], "reads": "in plane", "flatness": "5 um"}
     sections["artefacts"] = {
         name: {**plate, "size": [size, size]}

@@ -70,7 +70,10 @@ def _sentence(text: str) -> Sentence:
             every = re.findall(rf"(E\w\w) \(([^()]*)\) by ({NUMBER}) (µm|µrad)", part)
             assert every, part
             for name, meaning, peak, unit in every:
-                functions[name] = meaning.rpartition(", ")[2], peak, unit
+                # A straightness in proportion to its axis is a squareness.
+                is_slope = len(name) == 3 and meaning.startswith("squareness")
+                shape = "linear" if is_slope else meaning.rpartition(", ")[2]
+                functions[name] = shape, peak, unit
     more = [bool(re.search(rf"and \d+ {word}more", words)) for word in ("errors ", "")]
     assert end.startswith("changes") == (len(plates) + bool(positions) + bool(functions) == 1), text
     return Sentence(functions, plates, positions, *more)

@@ -19,7 +19,12 @@ def judge_text(text: str, expected: Expected) -> None:
     """
     rows = table(text, "    standard uncertainty of")
     end = next(
-        (k for k, row in enumerate(rows) if row[0].startswith("within the target")), len(rows)
+        (
+            k
+            for k, row in enumerate(rows)
+            if row[0].startswith(("within the target", "assumed:", "warning:"))
+        ),
+        len(rows),
     )
     of_table = rows[:end]
     assert len(of_table) == len(expected.split)

@@ -15,10 +15,15 @@ from ballplate.planning.information import pool_information
 from ballplate.planning.search import Losses, SelectionProblem, value
 from ballplate.results.checked_designs import predict
 from ballplate.results.prediction import Prediction
+from ballplate.simulator.estimation.functions import displacements
+from ballplate.simulator.estimation.linearisation import linearise
+from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.experiment.model import Experiment, Position
 from ballplate.simulator.experiment.pool import with_chosen
 from ballplate.simulator.inputs.messages import ExperimentError
+from ballplate.uncertainty.pairs import pairs_of
+from ballplate.uncertainty.quantities import functions_of
 
 from tests.planning import wording
 
@@ -184,8 +189,13 @@ def test_what_no_candidate_determines_is_left_out(tmp_path: Path) -> None:
         criterion(information, experiment, "A")
     problem = problem_of(experiment, "U5")
     assert problem.criterion.excluded == full.quantities["U5"].undetermined
+    at = linearise(lay_out(with_chosen(experiment, candidates)))
+    (balls,) = functions_of("U5", at.design, at.layout)
+    every = np.stack(np.triu_indices(len(balls.places.index), 1), axis=1)
+    tile = pairs_of(displacements(at, balls.places), every)
+    assert tile.is_open.sum() == full.quantities["U5"].undetermined > 0
     assert value(problem, range(len(candidates))) == pytest.approx(
-        full.quantities["U5"].average, rel=1e-9
+        tile.uncertainties[~tile.is_open].mean(), rel=1e-9
     )
 
 

@@ -14,17 +14,11 @@ from ballplate.cli import main
 from ballplate.simulator.experiment.loading import load
 
 from tests.extensions.sweeps import wording
+from tests.reference.small_quickstart import in_lengths
 
 TEXT = Path("designs/quickstart.yaml").read_text(encoding="utf-8")
 AXES = {"z": "xy", "x": "yz", "y": "zx"}
 LOST = "plates span x 0 to {0} of 1000 mm, y 0 to {0} of 1000 mm, z 0 to {0} of 1000 mm; {1}"
-
-
-def in_lengths(text: str) -> str:
-    """The quickstart with its places as lengths."""
-    text = text.replace("30 %", "250 mm").replace("80 %", "750 mm")
-    text = text.replace("2/9", "250 mm").replace("7/9", "750 mm")
-    return re.sub(r"\b([xyz]): low", r"\1: 0 mm", re.sub(r"\b([xyz]): high", r"\1: 250 mm", text))
 
 
 LENGTHS = in_lengths(TEXT)
