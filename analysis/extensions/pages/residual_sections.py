@@ -157,7 +157,7 @@ def answers_section(fit: QuotedData) -> Html:
         noticed = joined([size, f" {unit}"]) if each.data["noticed_from"] is not None else "-"
         not_seen = listing(each.data["not_seen"], 4)
         rows.append([each.text("assumed"), each.number("chance", digits=2), noticed, not_seen])
-    heads = ["asked of the readings", "chance", "noticed from", "not seen"]
+    heads = ["assumption tested", "p-value", "smallest effect that would show", "cannot be tested"]
     words = "Noticed in four of five campaigns; chance: of a larger effect if the assumption holds."
     return joined([first, table("answers", "Assumptions", heads, rows, (0, 3)), note(words)])
 

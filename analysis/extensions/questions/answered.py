@@ -94,10 +94,12 @@ class Answers:
     def lines(self) -> list[str]:
         lines = [f"contradicted: {each.words}" for each in self.contradicted]
         columns = {
-            "asked of the readings": "assumed",
-            "chance": ("chance", chance_words),
-            "noticed from": [_amount(each.noticed_from, each.unit) for each in self.asked],
-            "not seen": [listing(each.not_seen, 2) for each in self.asked],
+            "assumption tested": "assumed",
+            "p-value": ("chance", chance_words),
+            "smallest effect that would show": [
+                _amount(each.noticed_from, each.unit) for each in self.asked
+            ],
+            "cannot be tested": [listing(each.not_seen, 2) for each in self.asked],
         }
         return [*lines, *table_lines(columns, self.asked)]
 
