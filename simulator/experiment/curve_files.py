@@ -30,6 +30,9 @@ EXAMPLE = "position_mm,EXX_um,EYX_um,EAX_urad"
 BANDWIDTH = "_bandwidth"
 # Far more than are measured along an axis.
 MOST_POINTS = 100_000
+# Of the smallest step of a run: what a machine misses a target by is far less, and no curve's
+# shape is lost between positions so near.
+SAME_TARGET = 1 / 200
 
 
 def read_curves(path: Path) -> dict[str, Points]:
@@ -47,7 +50,8 @@ def read_numbered_curves(
     """The same with the number of each point's line, and a note on means; with `bandwidths` columns
     such as EXX_bandwidth_um are curves too.
 
-    Positions that occur several times, as in runs there and back, have the mean of both directions.
+    Target positions that occur several times, as in runs there and back, have the mean of both
+    directions, in position too: runs meet a target within `SAME_TARGET` of their smallest step.
 
     :raises ExperimentError: as `read_curves`.
     """
@@ -83,21 +87,24 @@ def read_numbered_curves(
     if messages:
         raise ExperimentError(messages)
     table = np.array([row for _, row in rows]).reshape(-1, len(names))
-    positions, first, index = np.unique(
-        table[:, names.index(POSITION)], return_index=True, return_inverse=True
-    )
+    column = names.index(POSITION)
+    targets = _targets(table[:, column])
+    positions, first, index = np.unique(targets, return_index=True, return_inverse=True)
     if len(positions) < 2:
         raise refused(file, "a curve needs at least two points; add rows", line=lines[0].number)
-    means, reversal = _means(table[:, names.index(POSITION)], index, table)
-    points = tuple(positions.tolist())
+    # Equal positions stay exactly what they are.
+    table[:, column] -= targets
+    means, reversal, one_way = _means(targets, index, table)
+    points = tuple((positions + means[:, column]).tolist())
     curves = {
         name: Points(points, tuple(means[:, k].tolist()))
         for k, name in enumerate(names)
         if name != POSITION
     }
-    note = ""
+    note = f"means of {len(rows)} values at {len(points)} positions" * (len(points) < len(rows))
+    if places := listing(f"{1e3 * points[k]:.6g} mm" for k in one_way.nonzero()[0].tolist()):
+        note += f"{'; ' * bool(note)}read in one direction only: {places}"
     if len(points) < len(rows):
-        note = f"means of {len(rows)} values at {len(points)} positions"
         sizes = (
             f"{name} {1e6 * size:.3g} {'µrad' if AXIS_ERRORS[name].is_rotation else 'µm'}"
             for name, size in zip(names, reversal.tolist(), strict=True)
@@ -108,9 +115,27 @@ def read_numbered_curves(
     return curves, tuple(rows[k][0] for k in first.tolist()), note
 
 
-def _means(x: Array, index: Integers, table: Array) -> tuple[Array, Array]:
+def _targets(x: Array) -> Array:
+    """Return, for each position (n,), the least of those that are one target position with it."""
+    step = np.diff(x)
+    step = step[step != 0]
+    turn = (step[:-1] * step[1:] < 0).nonzero()[0]
+    if not len(step) or not (len(turn) or (np.diff(np.sort(x)) == 0).any()):
+        return x
+    # The shorter step at a turn may lead from one run to the next, to the same target.
+    between = turn + (abs(step[turn]) > abs(step[turn + 1]))
+    inside = np.delete(abs(step), between)
+    nearest = inside.min() if len(inside) else 0.0
+    positions, index = np.unique(x, return_inverse=True)
+    is_new = np.r_[True, np.diff(positions) > SAME_TARGET * nearest]
+    least: Array = positions[is_new][np.cumsum(is_new) - 1][index]
+    return least
+
+
+def _means(x: Array, index: Integers, table: Array) -> tuple[Array, Array, Array]:
     """Return the means of the rows (n, c) at each position by its `index` (n,), of both directions
-    if there are two, and their largest difference (c,), else NaN (ISO 230-2: reversal value).
+    if there are two; their largest difference (c,), else NaN (ISO 230-2: reversal value); and
+    which positions only one of two directions has.
     """
     step = np.diff(x)
     before, after = np.r_[0.0, step], np.r_[step, 0.0]
@@ -125,7 +150,9 @@ def _means(x: Array, index: Integers, table: Array) -> tuple[Array, Array]:
         forwards, backwards = sums[1] / counts[1], sums[-1] / counts[-1]
     both = (forwards + backwards) / 2
     means = np.where(np.isnan(both), sums.sum(axis=0) / counts.sum(axis=0), both)
-    return means, np.fmax.reduce(abs(forwards - backwards))
+    there, back = counts[1, :, 0] > 0, counts[-1, :, 0] > 0
+    one_way = (there != back) & (there & back).any()
+    return means, np.fmax.reduce(abs(forwards - backwards)), one_way
 
 
 def _columns(

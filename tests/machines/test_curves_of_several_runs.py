@@ -85,6 +85,39 @@ def test_several_curves_and_one_position(tmp_path: Path) -> None:
         read_numbered_curves(path)
 
 
+def test_targets_met_within_hundredths_are_one(tmp_path: Path) -> None:
+    """Forwards and backwards differ in position, at the turn to either side, twice there and back;
+    position and value are means of both directions."""
+    for miss in (0.02, -0.02):
+        back = [(x + miss, value) for x, value in DOWN]
+        for rows, shift in (
+            (UP + back, 0.0),
+            (back + UP, 0.0),
+            (UP + back + again(UP) + again(back), SHIFT / 2),
+        ):
+            positions, values, note = read(tmp_path, rows)
+            np.testing.assert_allclose(positions, np.array(PLACES) + miss / 2, atol=1e-9)
+            np.testing.assert_allclose(values, np.array(MEAN) + shift, atol=1e-9)
+            assert f"{len(rows)} values at 5 positions" in note and note.endswith("EXX 0.4 µm")
+            assert "one direction" not in note
+
+
+def test_a_fine_run_keeps_its_points(tmp_path: Path) -> None:
+    x = [0.0, 0.01, 0.02, 100.0, 400.0]
+    positions, values, note = read(tmp_path, [*zip(x, THERE, strict=True)])
+    np.testing.assert_allclose(positions, x, atol=1e-9)
+    np.testing.assert_allclose(values, THERE, atol=1e-9)
+    assert not note
+
+
+def test_targets_of_one_direction_are_named(tmp_path: Path) -> None:
+    """The turn once; and a turn at two places, too far from each other for one target."""
+    assert "; read in one direction only: 400 mm; " in read(tmp_path, UP + DOWN[1:])[2]
+    positions, _, note = read(tmp_path, [*UP, (401.0, 2.1), *DOWN[1:]])
+    np.testing.assert_allclose(positions, [*PLACES, 401.0], atol=1e-9)
+    assert "; read in one direction only: 400 mm, 401 mm; " in note
+
+
 MACHINE = """\
 title: measured there and back
 arrangement: MB2
