@@ -306,6 +306,27 @@ def test_nominal_values_never_stand_in_for_unread_ones(tmp_path: Path) -> None:
     assert '"six" is not a number' in problems_of(tmp_path, side_by_side(NOMINALS, wrong))
 
 
+@pytest.mark.parametrize("side", ["basic_measuredValue", "basic_measurementError"])
+def test_a_list_with_fewer_or_more_values_than_labels_is_refused(tmp_path: Path, side: str) -> None:
+    kind = {"basic_measuredValue": "measured", "basic_measurementError": "error"}[side]
+    for values, told in ((MM[:1], f"1 {kind} value for"), ([*MM, "1"], f"5 {kind} values for")):
+        text = side_by_side(NOMINALS, (side, values, MILLI, []))
+        (message,) = problems_of(tmp_path, text).splitlines()
+        assert f"{told} 4 labels" in message and "c.xml:" in message
+        # Who asks for nominal values gets them.
+        chosen = {"quantity": "basic_nominalValue", "standard_uncertainty": "1 um"}
+        np.testing.assert_array_equal(found(tmp_path, text, **chosen).values, 0.6)
+
+
+def test_nominal_values_alone_are_taken_only_when_chosen(tmp_path: Path) -> None:
+    with_uncertainties = ("basic_nominalValue", NOMINAL, MILLI, IN_MM)
+    text = side_by_side(with_uncertainties)
+    for words in (refusal(tmp_path, text), problems_of(tmp_path, side_by_side(NOMINALS))):
+        assert 'only a nominal one; write quantity: "basic_nominalValue" if' in words
+    one = found(tmp_path, text, quantity="basic_nominalValue")
+    np.testing.assert_array_equal(one.values, 0.6)
+
+
 def problems_of(folder: Path, text: str) -> str:
     with pytest.raises(ExperimentError) as caught:
         found(folder, text, standard_uncertainty="1 um")

@@ -71,6 +71,9 @@ class DigitalValue:
     factor: float
     problem: str = ""
 
+    # Labels of the list that a value stands in, where there are more or fewer than values.
+    unmatched: tuple[str, ...] = ()
+
     @property
     def is_length(self) -> bool:
         """True if its unit is one of length."""
@@ -270,6 +273,11 @@ def _values(
     labels = block.text_at(f"label{LIST}").split()
     units = _units(block)
     uncertainty = _uncertainty(block)
+    columns = [labels] if labels else [list(neighbour) for neighbour in beside if neighbour]
+    unmatched: tuple[str, ...] = ()
+    if columns and len(values) not in map(len, columns):
+        alike = [column for column in columns if len(column) == len(columns[-1])]
+        unmatched = tuple(map(" ".join, zip(*alike, strict=True)))
     for k, value in enumerate(values[: MOST_NAMES + 1]):
         labels_of_value: tuple[str, ...] = (labels[k],) if len(labels) == len(values) else ()
         if not labels:
@@ -297,7 +305,8 @@ def _values(
                 [amounts or ""],
                 [factors] if factors else [],
             )
-        yield _value(block.mark, labels_of_value, contexts, value, own_unit, mine)
+        length = _value(block.mark, labels_of_value, contexts, value, own_unit, mine)
+        yield replace(length, unmatched=unmatched)
 
 
 def _one_of(texts: list[str], k: int, count: int) -> str | None:

@@ -61,6 +61,17 @@ def read_digital(
         return None
     result, matches = found
     before, values, sources = len(problems.messages), [], []
+    forms = _forms(wanted)
+    for length in result.lengths:
+        is_asked = settings.quantity in (None, *length.names, *length.contexts)
+        is_wanted = is_asked and any(_words(label) in forms for label in length.unmatched)
+        if is_wanted and length.is_length:
+            labels = len(length.unmatched)
+            count = sum(other.mark == length.mark for other in result.lengths)
+            text = " ".join(filter(None, (str(count), _kind(length), "value")))
+            text += f"{'s' * (count != 1)} for {labels} label{'s' * (labels != 1)}"
+            problems.add_at(length.mark, place, f"{text}; state one value for each label")
+            return None
     for k, names in enumerate(wanted):
         called = value_name(names, is_pair)
         measured = _measured(result, matches[k])
@@ -72,6 +83,11 @@ def read_digital(
             problems.add_at(some[1].mark, place, text)
             return None
         value, source = measured
+        if value.names == ("nominal",) and settings.quantity is None:
+            label = _label(result.lengths[matches[k][0]])
+            text = f"{called} has no measured value, only a nominal one; write quantity: {label}"
+            problems.add_at(value.mark, place, f"{text} if nominal values are meant")
+            return None
         # Who states the uncertainty needs none of the file.
         is_stated = value.problem == RELATIVE and settings.standard_uncertainty is not None
         if value.problem and not is_stated:

@@ -137,6 +137,31 @@ def test_each_run_is_a_position(tmp_path: Path, kind: str, runs: int) -> None:
     assert not any(one.startswith("warning") for one in read.remarks)
 
 
+DMIS_NAMES = {
+    "file names": (("a", ""), ("b", ""), ["a 1", "b 2"]),
+    "serial numbers": (("x", "a"), ("x", "b"), ["x a", "x b"]),
+    "the same number twice": (("x", "a"), ("x", "a"), ["x 1", "x 2"]),
+    "a comma and a blank": (("a, b", ""), ("a, b", ""), ["a, b 1", "a, b 2"]),
+}
+
+
+@pytest.mark.parametrize("kind", DMIS_NAMES)
+def test_files_of_dmis_are_named_without_quotes_and_versions(tmp_path: Path, kind: str) -> None:
+    first, second, expected = DMIS_NAMES[kind]
+    lines = list[str]()
+    for run, (name, serial) in enumerate((first, second)):
+        lines += [f"FILNAM/'{name}',04.0", "UNITS/MM,ANGDEC"]
+        lines += [f"PS(p)=PARTSN/'{serial}'"] if serial else []
+        for ball in of_run(run):
+            x, y, z = ball.centre
+            lines.append(f"FA({ball.name})=FEAT/SPHERE,OUTER,CART,{x},{y},{z},22.0")
+        lines.append("ENDFIL")
+    path = tmp_path / "report.dmo"
+    path.write_text("\n".join([*lines, ""]), encoding="utf-8")
+    positions = bp.read_report(path).to_frame()["position"]
+    assert list(positions.unique()) == [f"report {text}" for text in expected]
+
+
 @pytest.mark.parametrize("form", ["calypso", "pcdmis", "dmis", "qif"])
 def test_runs_that_nothing_tells_apart_are_counted(tmp_path: Path, form: str) -> None:
     texts = {
