@@ -105,6 +105,21 @@ def test_variants_with_plates_that_stay_are_noted(tmp_path: Path) -> None:
     assert not any(notes(tmp_path, TEXT, variants.replace("550 mm", "high")))
 
 
+def test_some_places_in_lengths_are_noted(tmp_path: Path) -> None:
+    """Plates that follow at one end do not make good for those that stay at the other."""
+    mixed = re.sub(r"\b([xyz]): high", r"\1: 250 mm", TEXT)
+    variants = f"  small: {{{SIZE.format(450)}}}\n  noisy: {{machine.repeatability: 1 um}}\n"
+    small, noisy = notes(tmp_path, mixed, variants)
+    assert small[0].endswith(LOST.format(700, wording.THE_PLACES_ARE_LENGTHS.format("x: high")))
+    assert not noisy
+    # Nothing is lost along axes where plates that follow reach both ends still.
+    ends = TEXT.replace("{x: high, y: high}", "{x: 250 mm, y: 250 mm}")
+    assert notes(tmp_path, ends, variants) == [(), ()]
+    # `reach` searches sizes with the same places.
+    (stays,) = bp.reach(written(tmp_path, mixed), "U6 average 0.13 um", "size").answers
+    assert any("plates span x 0 to " in remark for remark in stays.remarks)
+
+
 def test_the_edge_is_a_size_too(tmp_path: Path) -> None:
     edged = LENGTHS.replace("[750 mm, 750 mm]", "[700 mm, 700 mm]")
     edged = edged.replace(": 0 mm", ": 25 mm")
