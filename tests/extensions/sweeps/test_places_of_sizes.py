@@ -4,6 +4,8 @@ of both.
 
 from __future__ import annotations
 
+import csv
+import io
 import json
 import re
 from pathlib import Path
@@ -156,6 +158,13 @@ def test_sweeps_note_it_in_text_table_json_and_page(
     assert (tmp_path / "s.csv").read_text(encoding="utf-8").count(texts[0]) == 2
     page = bp.sweep_report(tmp_path / "s.sqlite")
     assert all(page.count(f"Places do not follow the size: {text}.") == 1 for text in texts)
+    main(["sweep", "--report", str(tmp_path / "s.sqlite"), "--format", "text"])
+    shown = " ".join(capsys.readouterr().out.split())
+    for text, cells in zip(texts, ("0 to 1", "2 to 3"), strict=True):
+        assert f"Places do not follow the size in cases {cells}: {text}." in shown
+    main(["sweep", "--report", str(tmp_path / "s.sqlite"), "--format", "csv"])
+    rows = list(csv.DictReader(io.StringIO(capsys.readouterr().out)))
+    assert rows and all(row["given"] and text in row["unspanned"] for row in rows for text in texts)
     # Plates that follow have neither note nor column.
     (tmp_path / "quickstart.yaml").write_text(TEXT, encoding="utf-8")
     followed = bp.sweep(tmp_path / "s.yaml", tmp_path / "t.sqlite")
