@@ -114,11 +114,18 @@ def as_csv(title: str, tables: Sequence[Table]) -> str:
         writer = CsvWriter(stream)
         first = [table.block] if table.block else []
         headings = [heading or "figure" for heading in table.headings]
-        writer.writerow([*first, *map(ascii_units, [*headings, *table.spanned])])
+        rows = [row for block in table.blocks for row in block.rows]
+        further = [*dict.fromkeys(name for row in rows for name, text in row.texts.items() if text)]
+        writer.writerow([*first, *map(ascii_units, [*headings, *table.spanned]), *further])
         for block in table.blocks:
             label = [block.title.removeprefix(f"{table.block} ")] if table.block else []
             writer.writerows(
-                [*label, *map(ascii_units, row.headings), *(e.text for e in row.entries)]
+                [
+                    *label,
+                    *map(ascii_units, row.headings),
+                    *(entry.text for entry in row.entries),
+                    *(row.texts.get(name, "") for name in further),
+                ]
                 for row in block.rows
             )
         parts.append(stream.getvalue())

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 
 
 @dataclass(frozen=True)
@@ -17,10 +18,11 @@ class Entry:
 
 @dataclass(frozen=True)
 class Row:
-    """A row: its headings, then its entries."""
+    """A row: its headings, then its entries; `texts` are further columns of CSV."""
 
     headings: tuple[str, ...]
     entries: tuple[Entry, ...]
+    texts: Mapping[str, str] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from ..design.objects import SLIGHTLY
@@ -10,7 +12,7 @@ from ..inputs.messages import ExperimentError
 from ..inputs.number_arrays import Array
 from ..inputs.yamltree import Node
 from .bounds import TOLERANCE
-from .model import Experiment
+from .model import Experiment, Position
 from .variants import node_at
 
 SIZES = ("artefacts", "machine.volume", "pool.limits")
@@ -20,18 +22,22 @@ def unspanned(tree: Node, changed: Experiment) -> str:
     """Return which part of the volume plates span, where that is less than in the experiment of
     another `tree`, which shares all nodes that do not differ.
 
-    Empty unless artefacts, the volume or the edge differ, and outermost places are lengths.
+    Empty unless artefacts, the volume or the edge differ, and the outermost plates of a side would
+    reach further if the places that are lengths followed.
     """
     if all(node_at(tree, path) is node_at(changed.tree, path) for path in SIZES):
         return ""
     try:
-        before = _room(changed.builder(tree))
+        before = changed.builder(tree)
     except ExperimentError:
         return ""
-    volume, room = changed.machine.volume, _room(changed)
-    if room.shape != before.shape:
+    if before.dimension != changed.dimension:
         return ""
-    is_lost = room > before + SLIGHTLY * volume.size
+    volume, plates = changed.machine.volume, _plates(changed)
+    places = {at.name: at for at in before.positions}
+    room = _least(changed, [np.abs(at.room) for at in plates])
+    followed = _least(changed, [_followed(at, places.get(at.name)) for at in plates])
+    is_lost = room > followed + SLIGHTLY * volume.size
     ends = 1e3 * np.array([volume.lower + room[0], volume.upper - room[1], volume.size])
     spans = [
         f"{'xyz'[k]} {first:.6g} to {last:.6g} of {size:.6g} mm"
@@ -47,14 +53,33 @@ def unspanned(tree: Node, changed: Experiment) -> str:
     )
 
 
-def _room(experiment: Experiment) -> Array:
-    """Return the least room (2, d) outwards of plates that lie along each axis, or of all if none
-    does; none where the file states a part of it.
+def _plates(experiment: Experiment) -> list[Position]:
+    artefacts = experiment.artefacts
+    return [at for at in experiment.positions if artefacts[at.artefact].role == "plate"]
+
+
+def _least(experiment: Experiment, rooms: Sequence[Array]) -> Array:
+    """Return the least of the rooms (2, d) of plates that lie along each axis, or of all if none
+    does.
     """
-    d, artefacts = experiment.dimension, experiment.artefacts
-    places = [at for at in experiment.positions if artefacts[at.artefact].role == "plate"]
-    balls = [ball_coordinates(at.pose, experiment.layouts[at.artefact]) for at in places]
+    d = experiment.dimension
+    balls = [
+        ball_coordinates(at.pose, experiment.layouts[at.artefact]) for at in _plates(experiment)
+    ]
     lie = np.array([np.ptp(rows, axis=0) > TOLERANCE for rows in balls], bool).reshape(-1, 1, d)
-    rooms = [np.abs(at.room) * [axis not in at.parts for axis in "xyz"[:d]] for at in places]
     where = lie | ~lie.any(axis=0)
     return np.min(np.reshape(rooms, (-1, 2, d)), axis=0, where=where, initial=np.inf)
+
+
+def _followed(now: Position, before: Position | None) -> Array:
+    """Return the room (2, d) that a position would have, if those of its co-ordinates that are
+    lengths had followed its free room.
+    """
+    room = np.abs(now.room)
+    if before is None:
+        return room
+    earlier = np.abs(before.room)
+    free, earlier_free = room.sum(axis=0), earlier.sum(axis=0)
+    growth = np.maximum(1.0, free / np.where(earlier_free > 0.0, earlier_free, np.inf))
+    is_part = [axis in now.parts for axis in "xyz"[: room.shape[1]]]
+    return np.where(is_part, room, earlier * growth)

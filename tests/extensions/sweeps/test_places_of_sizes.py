@@ -4,6 +4,8 @@ of both.
 
 from __future__ import annotations
 
+import csv
+import io
 import json
 import re
 from pathlib import Path
@@ -99,6 +101,21 @@ def test_variants_with_plates_that_stay_are_noted(tmp_path: Path) -> None:
     assert not any(notes(tmp_path, TEXT, variants.replace("550 mm", "high")))
 
 
+def test_some_places_in_lengths_are_noted(tmp_path: Path) -> None:
+    """Plates that follow at one end do not make good for those that stay at the other."""
+    mixed = re.sub(r"\b([xyz]): high", r"\1: 250 mm", TEXT)
+    variants = f"  small: {{{SIZE.format(450)}}}\n  noisy: {{machine.repeatability: 1 um}}\n"
+    small, noisy = notes(tmp_path, mixed, variants)
+    assert small[0].endswith(LOST.format(700, wording.THE_PLACES_ARE_LENGTHS.format("x: high")))
+    assert not noisy
+    # Nothing is lost along axes where plates that follow reach both ends still.
+    ends = TEXT.replace("{x: high, y: high}", "{x: 250 mm, y: 250 mm}")
+    assert notes(tmp_path, ends, variants) == [(), ()]
+    # `reach` searches sizes with the same places.
+    (stays,) = bp.reach(written(tmp_path, mixed), "U6 average 0.13 um", "size").answers
+    assert any("plates span x 0 to " in remark for remark in stays.remarks)
+
+
 def test_the_edge_is_a_size_too(tmp_path: Path) -> None:
     edged = LENGTHS.replace("[750 mm, 750 mm]", "[700 mm, 700 mm]")
     edged = edged.replace(": 0 mm", ": 25 mm")
@@ -135,6 +152,13 @@ def test_sweeps_note_it_in_text_table_json_and_page(
     assert (tmp_path / "s.csv").read_text(encoding="utf-8").count(texts[0]) == 2
     page = bp.sweep_report(tmp_path / "s.sqlite")
     assert all(page.count(f"Places do not follow the size: {text}.") == 1 for text in texts)
+    main(["sweep", "--report", str(tmp_path / "s.sqlite"), "--format", "text"])
+    shown = " ".join(capsys.readouterr().out.split())
+    for text, cells in zip(texts, ("0 to 1", "2 to 3"), strict=True):
+        assert f"Places do not follow the size in cases {cells}: {text}." in shown
+    main(["sweep", "--report", str(tmp_path / "s.sqlite"), "--format", "csv"])
+    rows = list(csv.DictReader(io.StringIO(capsys.readouterr().out)))
+    assert rows and all(row["given"] and text in row["unspanned"] for row in rows for text in texts)
     # Plates that follow have neither note nor column.
     (tmp_path / "quickstart.yaml").write_text(TEXT, encoding="utf-8")
     followed = bp.sweep(tmp_path / "s.yaml", tmp_path / "t.sqlite")

@@ -15,7 +15,7 @@ from ballplate.simulator.machines import Array, Integers
 
 from .axis_worth import AxisWorth, axis_worths
 from .measures import column_unit
-from .results import ReportedSweep, best_first, criterion, given_sentences
+from .results import ReportedSweep, best_first, criterion, given_sentences, texts_of_cell
 
 # Settings in the answer's table.
 LISTED = 8
@@ -223,7 +223,9 @@ def _table(results: ReportedSweep, rows: Integers, column: str) -> Table:
             if name == "observations":
                 text = "-" if np.isnan(value) else f"{value:.0f}"
             entries.append(Entry(text, value, results.cell(row), name))
-        listed.append(Row(results.labels(row), tuple(entries)))
+        listed.append(
+            Row(results.labels(row), tuple(entries), texts_of_cell(results, results.cell(row)))
+        )
     headings = tuple(axis.name for axis in results.axes)
     names = tuple(name for name, _, _ in columns)
     costs = "Observations are readings and certified values; other costs are not included."

@@ -167,14 +167,45 @@ def _axis(stored: dict[str, Any]) -> ReportAxis:
 
 def given_sentences(results: ReportedSweep) -> list[str]:
     """Return a sentence on each condition that figures of finished cells take for granted."""
+    return [f"Given {text}: {cells}." for text, cells in _with_cells(results, "given")]
+
+
+def unspanned_sentences(results: ReportedSweep) -> list[str]:
+    """Return a sentence on each part of the volume that plates of finished cells leave out."""
+    return [
+        f"Places do not follow the size in {cells}: {text}."
+        for text, cells in _with_cells(results, "unspanned")
+    ]
+
+
+def texts_of_all(results: ReportedSweep) -> dict[str, str]:
+    """Return conditions, and what plates span, with the cells that they are of."""
+    return {
+        name: "; ".join(f"{cells}: {text}" for text, cells in _with_cells(results, name))
+        for name in ("given", "unspanned")
+    }
+
+
+def texts_of_cell(results: ReportedSweep, cell: int) -> dict[str, str]:
+    """Return a cell's conditions, and what its plates span."""
+    return {name: "; ".join(_texts(results, cell, name)) for name in ("given", "unspanned")}
+
+
+def _texts(results: ReportedSweep, cell: int, name: str) -> list[str]:
+    found = results.texts.get(cell, {}).get(name, ())
+    return [found] if isinstance(found, str) else [str(text) for text in found]
+
+
+def _with_cells(results: ReportedSweep, name: str) -> list[tuple[str, str]]:
+    """Return the texts of finished cells, each with words for its cells."""
     cells_of: dict[str, list[int]] = {}
     done = [results.cell(row) for row in np.flatnonzero(results.done).tolist()]
     for cell in done:
-        for given in results.texts.get(cell, {}).get("given", ()):
-            cells_of.setdefault(str(given), []).append(cell)
+        for text in _texts(results, cell, name):
+            cells_of.setdefault(text, []).append(cell)
     return [
-        f"Given {given}: {'all cases' if len(cells) == len(done) else f'cases {cell_list(cells)}'}."
-        for given, cells in cells_of.items()
+        (text, "all cases" if len(cells) == len(done) else f"cases {cell_list(cells)}")
+        for text, cells in cells_of.items()
     ]
 
 

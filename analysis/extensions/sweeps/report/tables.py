@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 
 from ballplate.montecarlo import MonteCarloEstimate, with_error
 from ballplate.presentation import Block, Entry, Row, Table, number, percent
@@ -17,7 +18,13 @@ from .measures import (
     trial_measures,
     uncertainty_measures,
 )
-from .results import ReportedSweep, given_sentences
+from .results import (
+    ReportedSweep,
+    given_sentences,
+    texts_of_all,
+    texts_of_cell,
+    unspanned_sentences,
+)
 
 DIGITS = 3
 
@@ -54,7 +61,9 @@ def report_tables(results: ReportedSweep) -> tuple[Table, ...]:
 def text_tables(results: ReportedSweep) -> tuple[Table, ...]:
     """Return the tables of a report without a page; those of many cases begin with the best."""
     found = None if _fits_columns(results) else answer(results)
-    return (*([found.settings] if found else []), *report_tables(results))
+    tables = (*([found.settings] if found else []), *report_tables(results))
+    lost = tuple(unspanned_sentences(results))
+    return (*(replace(table, notes=(*lost, *table.notes)) for table in tables[:1]), *tables[1:])
 
 
 def _fits_columns(results: ReportedSweep) -> bool:
@@ -95,6 +104,7 @@ def _columns_table(
     rows = {int(cell): row for row, cell in enumerate(results.frame["cell"])}
     axis = results.axes[-1]
     firsts = range(len(results.axes[0].labels)) if len(results.axes) == 2 else [None]
+    texts = texts_of_all(results)
     blocks = []
     for first in firsts:
         here = [
@@ -108,6 +118,7 @@ def _columns_table(
                     Entry("") if cell is None else _entry(results, measure, cell, rows.get(cell))
                     for cell in here
                 ),
+                texts,
             )
             for measure in measures
         ]
@@ -130,7 +141,9 @@ def _rows_table(
     for row in range(min(len(results.frame), MOST_ROWS)):
         cell = results.cell(row)
         entries = tuple(_entry(results, measure, cell, row) for measure in measures)
-        cell_rows.append(Row((str(cell), *results.labels(row)), entries))
+        cell_rows.append(
+            Row((str(cell), *results.labels(row)), entries, texts_of_cell(results, cell))
+        )
     more = len(results.frame) - len(cell_rows)
     if more > 0:
         notes = (
