@@ -23,7 +23,7 @@ Settings = dict[str, Any]
 # Usual length of a stylus, at most a tenth of the shortest edge of the volume.
 LONGEST = 0.060
 # Of levels and of corners along an axis, by their number: more make plans slow.
-PARTS = ([], ["middle"], ["low", "high"], ["low", "middle", "high"])
+PARTS: tuple[list[str], ...] = ([], ["middle"], ["low", "high"], ["low", "middle", "high"])
 # Play of a plate, as a share of its side, below which it has one place along an axis.
 LITTLE_PLAY = 0.1
 # Below which a plate fits that is larger than its room, in metres.
