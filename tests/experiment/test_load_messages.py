@@ -333,7 +333,7 @@ CALIBRATION = [
         "{x: 0.2 um}"]),
     ("kind: distances, artefact: plate, pairs: corner sides",
      "kind: coordinates, artefact: plate, balls: [r1c1, r9c9], dimensions: 3", [
-        "14:63: calibration[0].dimensions: unknown key; known: covariance, result, coverage_factor, common, "
+        "14:63: calibration[0].dimensions: unknown key; known: covariance, result, quantity, coverage_factor, common, "
         "correlation, axes, values"]),
 ]  # fmt: skip
 PLANE_CASES = [
