@@ -64,7 +64,7 @@ if TYPE_CHECKING:
         sticks,
     )
     from .table import Block, Entry, Row, Table
-    from .table_columns import ROUNDING, MainTable, by_axis, table_csv, table_lines
+    from .table_columns import ROUNDING, MainTable, by_axis, table_csv, table_lines, table_rows
     from .vectors import Vectors, draw_vectors
 
 __getattr__, __dir__ = lazily(__name__, __file__)

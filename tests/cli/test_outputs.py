@@ -172,9 +172,7 @@ WALK = {
         ("--y", "semi_finish_error", "--points", "12-32"),
     ),
     "sweep --export": Walk({"STORE": "store.sqlite"}, {"-o": "t.parquet"}, prints=False),
-    "sweep --report": Walk(
-        {"STORE": "store.sqlite", "--compare": "other.sqlite"}, {"-o": "t.md"}, prints=False
-    ),
+    "sweep --report": Walk({"STORE": "store.sqlite"}, {"-o": "t.md"}, prints=False),
     "check": Walk(EXPERIMENT, {}),
     "run": Walk(EXPERIMENT, {"--report": "design.html"}, also=("balls.csv",)),
     "reach": Walk(EXPERIMENT, {}, ("--by", "repeatability")),
@@ -201,7 +199,7 @@ KINDS = [
 KINDS += [("correct", "--covariance")]
 # Those that are read only where they are asked for, and not needed to walk through.
 LEFT_OUT = ("--from", "--done", "--nominal", "--store", "--folder", "--results", "--designs")
-LEFT_OUT += ("--tasks", "--readings", "--compare", "--watch")
+LEFT_OUT += ("--tasks", "--readings", "--watch")
 
 
 @pytest.fixture(scope="module")
@@ -228,8 +226,7 @@ def shelf(tmp_path_factory: pytest.TempPathFactory) -> Path:
     }
     rows = [done(k, figures) for k in range(2)]
     sizes = axis("size", ["1 mm", "2 mm"], [1e-3, 2e-3], "m")
-    for name in ("store.sqlite", "other.sqlite"):
-        made_up(folder / name, "made up", [sizes], rows).close()
+    made_up(folder / "store.sqlite", "made up", [sizes], rows).close()
     readings, certificate = folder / "readings.csv", folder / "certificate.csv"
     arguments = [
         "simulate",

@@ -107,7 +107,6 @@ RECIPES = (
     "'sweep --export' trials.sqlite -o out.parquet --sweep 1",
     "'sweep --export' trials.sqlite -o -",
     "'sweep --report' sweep.sqlite -o out.html",
-    "'sweep --report' trials.sqlite --format csv",
     "'sweep --report' sweep.sqlite --format markdown",
     "'sweep --report' trials.sqlite --format latex",
     "'sweep --report' trials.sqlite --format text",
