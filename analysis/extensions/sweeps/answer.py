@@ -13,7 +13,7 @@ from ballplate.simulator.machines import Array, Integers
 from ballplate.uncertainty import RECORDED
 from numpy.typing import NDArray
 
-from .result import SweepResult, column_unit
+from .cases import SweepCases, column_unit
 
 # Cases in the table of the best.
 LISTED = 8
@@ -38,7 +38,7 @@ class SweepAnswer:
     is_good: bool
 
 
-def answer(result: SweepResult) -> SweepAnswer | None:
+def answer(result: SweepCases) -> SweepAnswer | None:
     """Return the answer of a sweep; None if no case is done, or no criterion is recorded."""
     column, done = criterion(result), np.flatnonzero(result.done)
     if column is None or not len(done):
@@ -62,7 +62,7 @@ def answer(result: SweepResult) -> SweepAnswer | None:
     return SweepAnswer(tuple(sentences), best, int(result.table["cell"][best[0]]), is_good)
 
 
-def criterion(result: SweepResult) -> str | None:
+def criterion(result: SweepCases) -> str | None:
     """Return the column of the average that cases are judged by; None without one."""
     for name in CRITERIA:
         for column in result.table.columns:
@@ -89,7 +89,7 @@ def best_first(*keys: NDArray[np.generic]) -> Integers:
 
 
 def _sentences_with_target(
-    result: SweepResult,
+    result: SweepCases,
     done: Integers,
     column: str,
     share: Array,
@@ -124,7 +124,7 @@ def _sentences_with_target(
 
 
 def _cheapest_sentence(
-    result: SweepResult,
+    result: SweepCases,
     done: Integers,
     column: str,
     candidates: Integers,
@@ -151,7 +151,7 @@ def _cheapest_sentence(
 
 
 def _sentences_without_target(
-    result: SweepResult, done: Integers, column: str, value: Array, partly: Flags
+    result: SweepCases, done: Integers, column: str, value: Array, partly: Flags
 ) -> list[str]:
     """Return sentences on cases without a target."""
     if WITHIN.partition("_")[0] in result.definition["record"]:
@@ -176,7 +176,7 @@ def _first_of_best(value: Array, places: Integers) -> tuple[int, int]:
     return int(places[best]), int((values == values[best]).sum()) - 1
 
 
-def _sentences_on_others(result: SweepResult, done: Integers) -> list[str]:
+def _sentences_on_others(result: SweepCases, done: Integers) -> list[str]:
     """Return sentences on cases that are deficient, or without results."""
     sentences = []
     deficient = int((result.figure("rank_deficiency")[done] > 0).sum())
@@ -194,7 +194,7 @@ def _sentences_on_others(result: SweepResult, done: Integers) -> list[str]:
     return sentences + [f"Places do not follow the size: {text}." for text in lost]
 
 
-def _with_cases(result: SweepResult, name: str) -> list[str]:
+def _with_cases(result: SweepCases, name: str) -> list[str]:
     """Return the texts of finished cases in a column, each with its number of cases."""
     if name not in result.table:
         return []

@@ -17,7 +17,7 @@ from ballplate.simulator.machines import Array, Integers
 from ballplate.uncertainty import DESCRIPTIONS
 
 from .answer import best_first, quantity
-from .result import SweepResult, column_unit
+from .cases import SweepCases, column_unit
 
 # Styles of lines, which differ without colours, too.
 STYLES = ("s0", "s1 dashed", "s2 dotted", "s3 heavy", "s4 heavy dashed", "s5 heavy dotted")
@@ -26,7 +26,7 @@ STYLES = ("s0", "s1 dashed", "s2 dotted", "s3 heavy", "s4 heavy dashed", "s5 hea
 MOST_TEXTS, MOST_POINTS = 30, 1000
 
 
-def curves(result: SweepResult, column: str) -> list[Html]:
+def curves(result: SweepCases, column: str) -> list[Html]:
     """Return a chart of a column of averages along each axis with several values, if known."""
     if not np.isfinite(result.figure(column)).any():
         return []
@@ -37,7 +37,7 @@ def curves(result: SweepResult, column: str) -> list[Html]:
     ]
 
 
-def _chart(result: SweepResult, column: str, k: int) -> Html:
+def _chart(result: SweepCases, column: str, k: int) -> Html:
     axis, value = result.axes[k], 1e6 * result.figure(column)
     x = np.array(axis.numbers or range(len(axis.labels)), float)[result.chosen[:, k]]
     kind = "line" if axis.numbers else "dots"
@@ -64,7 +64,7 @@ def _chart(result: SweepResult, column: str, k: int) -> Html:
 
 
 def lines_along(
-    result: SweepResult, k: int, x: Array, value: Array
+    result: SweepCases, k: int, x: Array, value: Array
 ) -> tuple[list[tuple[str, Integers]], str]:
     """Return rows of cases that differ in axis `k` only, sorted along it, with the values of the
     other axes; those with the smallest averages if there are too many.

@@ -21,8 +21,8 @@ from ballplate.extensions.pages.interface import (
 from ballplate.presentation import number, table_rows
 
 from .answer import SweepAnswer, answer, criterion
+from .cases import IN_TEXT, MOST_ROWS, SHOWN, SweepCases, columns_of
 from .curves import curves
-from .result import IN_TEXT, MOST_ROWS, SHOWN, SweepResult, columns_of
 
 # Values of an axis in the list of facts.
 LISTED = 12
@@ -33,7 +33,7 @@ MADE_IN_STUDIO = ".ballplate-sweep.yaml"
 FOOT = "Standard uncertainties throughout; ballplate sweep --export has all figures and digits."
 
 
-def sweep_page(result: SweepResult) -> str:
+def sweep_page(result: SweepCases) -> str:
     """Return the page of a sweep."""
     found, judged = answer(result), criterion(result)
     charts = [] if found is None or judged is None else curves(result, judged)
@@ -52,7 +52,7 @@ def sweep_page(result: SweepResult) -> str:
     return written(Page(result.title, sentence(f"{result.headline()}."), sections, FOOT))
 
 
-def _answer(result: SweepResult, found: SweepAnswer) -> Html:
+def _answer(result: SweepCases, found: SweepAnswer) -> Html:
     first, *further = found.sentences
     verdict = element("p", first, class_="verdict" if found.is_good else "verdict bad")
     best = _table("best", "The best cases", result, found.best, IN_TEXT)
@@ -63,7 +63,7 @@ def _answer(result: SweepResult, found: SweepAnswer) -> Html:
 def _table(
     name: str,
     caption: str,
-    result: SweepResult,
+    result: SweepCases,
     rows: Sequence[int],
     shown: Collection[str] = SHOWN,
 ) -> Html:
@@ -89,7 +89,7 @@ def _source(path: str) -> tuple[str, str]:
     return "Sweep file", path
 
 
-def _facts(result: SweepResult) -> list[tuple[str, str]]:
+def _facts(result: SweepCases) -> list[tuple[str, str]]:
     stored = result.definition
     base = stored["experiment"].get("title", "") if isinstance(stored["experiment"], dict) else ""
     facts = [

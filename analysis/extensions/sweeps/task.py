@@ -23,7 +23,7 @@ from ballplate.montecarlo import (
 from ballplate.results import Prediction, Qualification, predict, qualifications_of
 from ballplate.simulator.computing import single_threaded, versions, want_of_memory
 from ballplate.simulator.experiment import Experiment, unspanned
-from ballplate.simulator.inputs import ExperimentError, UnusableError, listing
+from ballplate.simulator.inputs import ExperimentError, UnusableError
 
 from .fingerprint import fingerprint
 from .load import base_tree, experiment_of
@@ -164,7 +164,7 @@ def _given(qualifications: Iterable[Qualification]) -> list[str]:
     for each in qualifications:
         (assumed if each.kind == "assumption" else given).append(each.given)
     # Too slow for each cell.
-    return given + [f"{listing(assumed)} (assessed for the best case only)"] * bool(assumed)
+    return given + [f"{' and '.join(assumed)} (assessed for the best case only)"] * bool(assumed)
 
 
 def lost(sweep: Sweep, task: CellTask) -> CellResult:

@@ -123,7 +123,7 @@ def test_assumptions_are_assessed_for_the_best_case(tmp_path: Path) -> None:
         if one.kind == "assumption"
     ]
     assert given
-    expected = {best: f"{', '.join(given)} (assessed for the best case only)"}
+    expected = {best: f"{' and '.join(given)} (assessed for the best case only)"}
     assert [expected.get(cell, "") for cell in table["cell"]] == table["given"].tolist()
 
 

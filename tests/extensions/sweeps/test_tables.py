@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 from ballplate.cli import main
-from ballplate.extensions.sweeps.result import MOST_ROWS, columns_of
+from ballplate.extensions.sweeps.cases import MOST_ROWS, columns_of
 
 from tests.extensions.sweeps import wording
 from tests.extensions.sweeps.stores import axis, done, failed, made_up, made_up_result
