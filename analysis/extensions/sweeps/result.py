@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -33,12 +34,13 @@ class SweepResult(SweepCases, Result):
         return sweep_page(self)
 
     def lines(self) -> list[str]:
-        found, rows = answer(self), range(min(len(self.table), MOST_ROWS))
+        found, rows = answer(self), range(len(self.table))
         lines = [self.heading, self.headline(), *(found.sentences if found else ())]
-        if found and len(self.table) > MOST_ROWS:
-            rows = found.best
-            lines.append(f"The best cases of {len(self.table)}; --export has all:")
-        return [*lines, "", *table_lines(columns_of(self, rows, IN_TEXT))]
+        shown: Sequence[int] = rows[:MOST_ROWS]
+        if found and len(rows) > MOST_ROWS:
+            shown = found.best
+            lines.append(f"The best cases of {len(rows)}; --export has all:")
+        return [*lines, "", *table_lines(columns_of(self, shown, IN_TEXT))]
 
     def data(self) -> Data:
         return {

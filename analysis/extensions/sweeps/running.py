@@ -141,7 +141,7 @@ def computed(
 
 def shortcomings(path: Path, rows: Sequence[StoredRow]) -> tuple[str, ...]:
     """Return notes on the rows of a sweep: different versions, parts of the volume that are no
-    longer spanned, and reasons of failed cells.
+    longer spanned, differences of Monte Carlo from linear theory, and reasons of failed cells.
     """
     notes = []
     versions = {tuple(row.versions.items()) for row in rows}
@@ -150,10 +150,17 @@ def shortcomings(path: Path, rows: Sequence[StoredRow]) -> tuple[str, ...]:
         notes.append(in_one_line(f"{path}: {text}"))
     reasons: dict[str, list[int]] = {}
     for row in rows:
-        of_size = row.details.get("unspanned")
-        if row.status == "failed" or of_size:
-            text = f": {of_size}" if of_size else f" failed: {row.reason}"
-            reasons.setdefault(text, []).append(row.number)
+        flags = row.details.get("flags", {}).items()
+        differences = "; ".join(f"{symbol} {', '.join(names)}" for symbol, names in flags)
+        texts = {
+            " failed: ": row.reason,
+            ": ": row.details.get("unspanned"),
+            ": no Monte Carlo: ": row.details.get("monte_carlo"),
+            ": Monte Carlo differs from linear theory: ": differences,
+        }
+        for start, text in texts.items():
+            if text:
+                reasons.setdefault(f"{start}{text}", []).append(row.number)
     for reason, cells in list(reasons.items())[:MOST_REASONS]:
         more = f" and {len(cells) - 1} more" if len(cells) > 1 else ""
         notes.append(f"case {cells[0]}{more}{reason}")

@@ -131,11 +131,11 @@ def _reason(error: Exception) -> str:
 
 def _whole(sweep: Sweep, experiment: Experiment, task: CellTask, key: str, seed: int) -> CellResult:
     planned = predict(experiment)
-    figures, details = plan_figures(planned, sweep.record)
+    figures = plan_figures(planned, sweep.record)
     without_assumptions = qualifications_of(
         planned.verdict.deficiency, planned.scale, None, experiment
     )
-    details["given"] = _given(without_assumptions)
+    details: dict[str, Any] = {"given": _given(without_assumptions)}
     if lost := unspanned(base_tree(sweep, task.number), experiment):
         details["unspanned"] = lost
     if sweep.trials is not None:
@@ -143,16 +143,14 @@ def _whole(sweep: Sweep, experiment: Experiment, task: CellTask, key: str, seed:
             replicates = Trials(seed, combined(experiment, task.total))
         else:
             replicates = trials(experiment, sweep.trials, seed)
-        if replicates.outcome is None:
-            details["monte_carlo"] = replicates.reason
-        else:
-            figures |= trial_figures(replicates.outcome, sweep.record)
-            if replicates.outcome.reason:
-                details["monte_carlo"] = replicates.outcome.reason
-            details["not_converged"] = list(replicates.outcome.failed)
+        outcome = replicates.outcome
+        if outcome is None or outcome.reason:
+            details["monte_carlo"] = replicates.reason if outcome is None else outcome.reason
+        if outcome is not None:
+            figures |= trial_figures(outcome, sweep.record)
             details["flags"] = {
-                name: list(comparison.flags)
-                for name, comparison in replicates.outcome.comparisons.items()
+                symbol: list(comparison.flags)
+                for symbol, comparison in outcome.comparisons.items()
                 if comparison.flags
             }
     return CellResult(task.number, 0, key, "done", "", seed, figures, details)
@@ -160,10 +158,10 @@ def _whole(sweep: Sweep, experiment: Experiment, task: CellTask, key: str, seed:
 
 def _given(qualifications: Iterable[Qualification]) -> list[str]:
     """Return the conditions of a cell's figures, the assumptions in one of them."""
-    given, assumed = [], []
-    for each in qualifications:
-        (assumed if each.kind == "assumption" else given).append(each.given)
+    found = list(qualifications)
+    given = [each.given for each in found if each.kind != "assumption"]
     # Too slow for each cell.
+    assumed = [each.given for each in found if each.kind == "assumption"]
     return given + [f"{' and '.join(assumed)} (assessed for the best case only)"] * bool(assumed)
 
 
@@ -200,10 +198,8 @@ def seed_of(sweep: Sweep, key: str) -> int:
     return int.from_bytes(hashlib.blake2b(text.encode(), digest_size=6).digest(), "big")
 
 
-def plan_figures(
-    planned: Prediction, record: tuple[str, ...]
-) -> tuple[dict[str, float], dict[str, Any]]:
-    """Return values and texts of a plan."""
+def plan_figures(planned: Prediction, record: tuple[str, ...]) -> dict[str, float]:
+    """Return the values of a plan."""
     verdict = planned.verdict
     determined = verdict.singular_values[: len(verdict.singular_values) - verdict.deficiency]
     figures = {
@@ -225,16 +221,7 @@ def plan_figures(
         figures[f"{name}_count"] = float(quantity.count)
         if quantity.within_target is not None:
             figures[f"{name}_within_target"] = quantity.within_target
-    details = {
-        "undetermined": [str(direction) for direction in verdict.null],
-        "weak": [str(direction) for direction in verdict.weak],
-        "largest_at": {
-            symbol: quantity.largest
-            for symbol, quantity in planned.quantities.items()
-            if quantity.largest
-        },
-    }
-    return figures, details
+    return figures
 
 
 def trial_figures(outcome: MonteCarloOutcome, record: tuple[str, ...]) -> dict[str, float]:

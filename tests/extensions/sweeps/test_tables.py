@@ -150,3 +150,14 @@ def test_wrong_usage_is_told(
     assert status == 3 and wording.THERE_IS_NO_SUCH_STORE in err
     status, err = told(str(small), "-o", str(tmp_path / "no folder" / "a.html"))
     assert status == 3 and "cannot be written" in err
+
+
+def test_notes_state_what_monte_carlo_says(tmp_path: Path) -> None:
+    axes = [axis("k", ["1", "2", "3"], [1.0, 2.0, 3.0], "1")]
+    rows = [done(k, figures(1.0), flags={"U4": ["spread", "bias"]}) for k in range(2)]
+    rows.append(done(2, figures(1.0), monte_carlo="something is undetermined"))
+    notes = made_up_result(tmp_path / "m.sqlite", "m", axes, rows, trials=100).notes
+    assert notes == (
+        "case 0 and 1 more: Monte Carlo differs from linear theory: U4 spread, bias",
+        "case 2: no Monte Carlo: something is undetermined",
+    )
