@@ -8,7 +8,6 @@ from ballplate.extensions.pages.interface import (
     Html,
     Trace,
     chart_svg,
-    element,
     figure,
     legend,
 )
@@ -60,7 +59,7 @@ def _chart(result: SweepCases, column: str, k: int) -> Html:
     )
     caption = f"{symbol} average, {DESCRIPTIONS.get(symbol, '')}, against {axis.name}.{note}"
     shown = [legend(*entries)] if len(entries) > 1 else []
-    return element("div", figure(caption, *shown, chart_svg(chart)))
+    return figure(caption, *shown, chart_svg(chart))
 
 
 def lines_along(
@@ -78,14 +77,13 @@ def lines_along(
         return [("", rows[:: -(-len(rows) // MOST_POINTS)])], note
     least = np.full(len(settings), np.inf)
     np.minimum.at(least, which, value[rows])
-    drawn = (
-        best_first(least)[: len(STYLES)] if len(settings) > len(STYLES) else range(len(settings))
-    )
+    # In the order of the file.
+    drawn = sorted(best_first(least)[: len(STYLES)].tolist())
     lines = []
     for i in drawn:
         line = rows[which == i]
         line = line[np.argsort(x[line], kind="stable")]
-        lines.append((result.words(int(line[0]), others) or "linearised", line))
+        lines.append((result.words(int(line[0]), others) or "average", line))
     if len(settings) <= len(STYLES):
         return lines, ""
     combinations = number_of(len(settings), "combination")

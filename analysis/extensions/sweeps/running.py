@@ -154,8 +154,8 @@ def shortcomings(path: Path, rows: Sequence[StoredRow]) -> tuple[str, ...]:
         differences = "; ".join(f"{symbol} {', '.join(names)}" for symbol, names in flags)
         texts = {
             " failed: ": row.reason,
-            ": ": row.details.get("unspanned"),
-            ": no Monte Carlo: ": row.details.get("monte_carlo"),
+            ": ": row.details.get("unspanned", ""),
+            ": no Monte Carlo: ": row.details.get("monte_carlo", ""),
             ": Monte Carlo differs from linear theory: ": differences,
         }
         for start, text in texts.items():
