@@ -25,7 +25,6 @@ from .pool_sections import GroupSettings, ListedSettings, PoolSettings, PricedSe
 from .position_sections import PositionSettings
 from .probe_sections import AnyProbe, StarSettings
 from .sections import AnyPrior, ExperimentSettings
-from .variants import ALIASES
 
 # Sections whose entries are validated one by one: form of the section and type of an entry.
 ENTRIES: dict[str, tuple[type[Mapping] | type[Sequence], Any]] = {
@@ -55,7 +54,7 @@ OTHER_FILES = {
 }
 
 # Keys that are no extension's.
-KEYS = (*ExperimentSettings.model_fields, *OTHER_FILES, *ALIASES)
+KEYS = (*ExperimentSettings.model_fields, *OTHER_FILES)
 
 # Values of nodes that are valid, by their types. Trees that differ in a few nodes, such as those of
 # a sweep's cells, share all others.
@@ -108,10 +107,7 @@ def validate_sections(root: Node, problems: Problems, planning: bool = False) ->
                 raise UnusableError(f"SETTINGS of the section {key} is no Settings")
             values |= _validate([type_adapter(settings)], node, (key,), problems)
             continue
-        text = f"unknown key; {_known_key(key, absent)}"
-        if key in ALIASES:
-            text = f"this is the earlier name of {ALIASES[key]}, which is there too; remove one"
-        problems.add((key,), text, True)
+        problems.add((key,), f"unknown key; {_known_key(key, absent)}", True)
         misspelt.add(nearest(key, absent))
     for key, field in fields.items():
         node_or_none = root.items.get(key)

@@ -786,14 +786,6 @@ PAIRS: dict[str, Pair] = {
     "probe of the task": Pair(
         {"evaluation.tasks.0.probe": "left"}, {"evaluation.tasks.0.probes": ["left", "left"]}
     ),
-    "target by its earlier name": Pair(
-        {},
-        {
-            "target_uncertainty": None,
-            "target_accuracy": "0.5 um + 1 um/m",
-            "evaluation.tasks.0.target_uncertainty": "0.5 um + L/1000000",
-        },
-    ),
 }
 
 

@@ -7,7 +7,6 @@ BEYOND_WHAT_CAN_BE_COMPUTED = "beyond what can be computed with; write 0, or a l
 BRYAN_GAUGES_ARE_READ_TIMES = (
     "8:1: positions: Bryan gauges are read 25000 times; at most 20000 lengths are possible"
 )
-CONTRADICT_ONE_ANOTHER = "contradict one another: r1c1–r5c5"
 DISTANCES_OF_HAVE_BALLS_IN_COMMON = (
     '12:45: calibration[0].pairs: 3160 distances of "bar" have balls in common; at most '
     "3000 such are possible: calibrate fewer of them"
@@ -49,8 +48,6 @@ IS_PART_OF_THE_SAME_PLACE = "e.yaml:15:5: variants.B[positions[0].level]: overla
 MISSING_ADD_POSITIONS = (
     "1:1: positions: missing; add positions, or choose some from the pool with: ballplate plan FILE"
 )
-MM_IN = "r1c1–r1c5 750.0001 mm in calibration[1]"
-MM_IN_MM = "r1c1–r1c3 375 mm in calibration[0], r1c3–r1c1 375.001 mm in calibration[1]"
 MM_IS_FAR_FROM_THE_MM = (
     "d.csv:4:1: calibration[0].values: 5 mm is far from the 500 mm of the artefact's "
     "drawing; correct one of the two"
