@@ -129,8 +129,11 @@ def _binary(source: Path) -> tuple[Node, dict[str, Array]]:
         with zipfile.ZipFile(io.BytesIO(content)) as archive:
             head = json.loads(str(_array(archive, "map")))
             arrays = {name: _array(archive, name) for name in ("covariance", "undetermined")}
-        if not all(array.dtype == float and array.ndim == 2 for array in arrays.values()):
-            raise ValueError("its arrays are no matrices of doubles")
+        if not all(
+            array.dtype == float and array.ndim == 2 and np.isfinite(array).all()
+            for array in arrays.values()
+        ):
+            raise ValueError("its arrays are no matrices of finite doubles")
         root = node_of({**head, "covariance": [""]}, Mark(str(source), 0, 0))
     except (OSError, ValueError, TypeError, KeyError, EOFError, zipfile.BadZipFile) as error:
         text = f"is no map, or damaged ({shorten(str(error))}); write it again with fit -o"

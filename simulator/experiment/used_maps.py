@@ -9,17 +9,17 @@ from datetime import date
 import numpy as np
 
 from ..design.lookup import References
-from ..design.objects import Machine
+from ..design.objects import Machine, Volume
+from ..geometry.grids import even_grid
 from ..inputs.days import parse_day
 from ..inputs.messages import ExperimentError, Steps, format_path
 from ..inputs.quantities import format_length
 from ..inputs.settings import listing
 from ..inputs.yamltree import mark_of, read_bytes
-from ..machines.protocol import ErrorModel, TrueMachine
+from ..machines.protocol import Array, ErrorModel, TrueMachine
 from ..machines.true_machine_settings import TrueMapSettings
 from ..maps.fitted_map import FittedMap
 from ..maps.map_prior import MapShare, campaign_of, determined_combinations, marginal_of
-from .map_content import corner_corrections
 from .map_files import read_map
 from .model import Prior, Probe
 from .sections import MapPriorSettings
@@ -141,7 +141,7 @@ def _read(file: str, steps: Steps, references: References) -> FittedMap | None:
     except ExperimentError as error:
         references.problems.take(error, steps)
         return None
-    if caution := fitted.known_lack_of_fit.caution:
+    if caution := fitted.lack_of_fit.caution:
         references.problems.doubt(steps, caution)
     return fitted
 
@@ -194,8 +194,8 @@ def _is_same(
         )
         add(steps, text)
         return False
-    there = corner_corrections(fitted.model, fitted.values, fitted.volume)
-    here = corner_corrections(model, fitted.values, fitted.volume)
+    there = _corner_corrections(fitted.model, fitted.values, fitted.volume)
+    here = _corner_corrections(model, fitted.values, fitted.volume)
     if (np.abs(there - here) > SAME + SAME_PART * np.abs(there)).any():
         text = (
             "is of another error model, which has the same parameters and corrects otherwise; fit"
@@ -229,3 +229,14 @@ def _check_ends(
             references.problems.add(steps, text)
             is_right = False
     return is_right
+
+
+def _corner_corrections(model: ErrorModel, values: Array, volume: Volume) -> Array:
+    """Corrections (2^d + 1, d) at the corners and the centre, with a probe of a tenth of the
+    volume.
+    """
+    d = len(volume.lower)
+    corners = even_grid(np.zeros(d), np.ones(d), [2] * d)
+    points = volume.lower + volume.size * np.concatenate([corners, np.full((1, d), 0.5)])
+    offsets = np.broadcast_to(0.1 * volume.size, points.shape)
+    return np.asarray(model.error(points, values, offsets))

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import re
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -274,30 +273,6 @@ def test_stated_uncertainties_cancel(tmp_path: Path) -> None:
             ]
         )
     assert results[1] == pytest.approx(results[0], rel=1e-5)
-
-
-def without_sums(path: Path) -> None:
-    """A map file as it was written before it stated its sum of squares."""
-    text = re.sub(r', "sum_of_squares": [^}]*', "", path.read_text(encoding="utf-8"))
-    path.write_text(re.sub("\nchecksum: .*", "", text), encoding="utf-8")
-
-
-@pytest.mark.parametrize("sigma", ["estimated", "given"])
-def test_an_older_map_says_what_it_lacks(sigma: str, tmp_path: Path) -> None:
-    campaigns = Campaigns("metric", tmp_path)
-    campaigns.factor = 2.0
-    campaigns.map_of_first(sigma=sigma)
-    later = {"sigma": "estimated", "priors": [{"kind": "map", "file": "first.yaml"}]}
-    second = campaigns.experiment("B", campaigns.second, **later)
-    new: Any = bp.fit(second, campaigns.readings[~campaigns.of_first])
-    without_sums(tmp_path / "first.yaml")
-    second = campaigns.experiment("B", campaigns.second, **later)
-    old: Any = bp.fit(second, campaigns.readings[~campaigns.of_first])
-    lack = "the map is older and does not state its sum of squares"
-    assert lack not in "".join(new.lines()) and lack in "".join(old.lines())
-    # It follows from an estimated sigma; otherwise nothing can be tested.
-    assert (old.sigma == pytest.approx(new.sigma, rel=1e-12)) == (sigma == "estimated")
-    assert (wording.ITS_RESIDUALS_ARE_UNKNOWN in "".join(old.lines())) == (sigma == "given")
 
 
 def test_predictions_say_how_a_map_is_scaled(tmp_path: Path) -> None:

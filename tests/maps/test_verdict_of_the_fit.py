@@ -29,7 +29,6 @@ VERDICTS = {
     "clean": "not significant",
     "significant": "significant",
     "beyond": "beyond the limit",
-    "old": "not stated",
 }
 
 
@@ -45,15 +44,11 @@ def fit(name: str, **options: Any) -> bp.Fit:
 
 @pytest.fixture(scope="module")
 def maps(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
-    """Map files of each verdict, and one as earlier versions wrote it."""
+    """Map files of each verdict."""
     folder = tmp_path_factory.mktemp("maps")
     found = {name: folder / f"{name}.yaml" for name in VERDICTS}
     for name in SHIFTS:
         bp.write_map(fit(name).to_map(), found[name])
-    text = found["clean"].read_text()
-    old = re.sub("^(lack_of_fit|checksum):.*\n", "", text, flags=re.MULTILINE)
-    assert text.count("\n") == old.count("\n") + 2
-    found["old"].write_text(old)
     (folder / "points.csv").write_text("name,x_mm,y_mm,z_mm\na,100,100,100\nb,600,500,400\n")
     return found
 
@@ -213,7 +208,7 @@ def test_maps_made_of_a_map_carry_it(
     # By hand it is not taken off.
     text = maps["beyond"].read_text()
     Path("edited.yaml").write_text(re.sub("^lack_of_fit:.*\n", "", text, flags=re.MULTILINE))
-    with pytest.raises(bp.ExperimentError, match="checksum"):
+    with pytest.raises(bp.ExperimentError, match="lack_of_fit: missing"):
         bp.load_map("edited.yaml")
 
 

@@ -29,6 +29,7 @@ from ballplate.results.map_of_fit import map_of
 from ballplate.simulator.estimation.gauss_newton import estimate, linearised_fit
 from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.machines.spatial_metric import SpatialMetricModel
+from ballplate.simulator.maps.fit_verdict import LackOfFit
 from ballplate.simulator.maps.fitted_map import FittedMap
 from ballplate.simulator.readings.observed_readings import observe
 from ballplate.simulator.readings.simulated import simulated_readings
@@ -85,7 +86,7 @@ def map_of_campaign(true: Real, seed: int) -> FittedMap:
         sigma_is_estimated=False,
         degrees_of_freedom=freedom,
         sum_of_squares=at.factor.sum_of_squares,
-        lack_of_fit=None,
+        lack_of_fit=LackOfFit(at.factor.sum_of_squares, 0),
         assumptions=None,
         estimates=(),
         functions=estimated_functions(at, False),
