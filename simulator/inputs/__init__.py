@@ -42,12 +42,11 @@ if TYPE_CHECKING:
     from .problems import Problems
     from .quantities import (
         ANGLE_UNITS,
-        BASE_UNITS,
         DURATION_UNITS,
+        KINDS,
         LENGTH_UNITS,
         QUANTITY,
         SMALLEST,
-        UNITS,
         CommonPart,
         Length,
         LengthDrift,

@@ -768,7 +768,7 @@ PAIRS: dict[str, Pair] = {
     ),
     "uncertainty that grows": Pair(
         {DISTANCES + ".standard_uncertainty": "0.1 um + L/1000000"},
-        {DISTANCES + ".standard_uncertainty": "(0.1 + L/1000) um with L in mm"},
+        {DISTANCES + ".standard_uncertainty": "0.1 um + L/1000000"},
     ),
     "uncertainty of one length": Pair(
         {DISTANCES + ".standard_uncertainty": "0.1 um + 1 ppm"},

@@ -30,13 +30,13 @@ EXPECTED_A_WHOLE = (
     'e.yaml:13:11: seed: expected a whole number, found the text "x" (seed of simulated '
     "readings; default 1) (in variant B)"
 )
-GROWS_BY_PER_METRE_OF_LENGTH = '"0.2 um + L/1e-3" grows by 1000 m per metre of length'
+GROWS_BY_PER_METRE_OF_LENGTH = '"0.2 um + L/1e-3" grows by 1e+09 um/m'
 GROWS_TOO_SLOWLY = "grows too slowly; leave out the growth, or give 1e-18 m/m or more"
 HAS_NO_UNIT = (
     'e.yaml:12:27: positions[0].level: "5" has no unit; write for example "5 mm" or "5 '
     'um" (in variant B)'
 )
-HAS_NO_UNIT_WRITE = '"5e-6" has no unit; write for example "5e-6 ppm"'
+HAS_NO_UNIT_WRITE = '"5e-6" has no unit; write "5e-6 m/m" if it is in m/m'
 HAS_THE_UNKNOWN_UNIT = 'e.yaml:2:51: machine.repeatability: "1 mu" has the unknown unit "mu"'
 HAVE_BALLS_IN_COMMON = "have balls in common; at most 2 such"
 IS_BEYOND_WHAT_CAN_BE_COMPUTED = (
@@ -71,7 +71,7 @@ NO_CO_ORDINATES_FOR_ADD_THEM = (
     "leave them out of balls"
 )
 NO_POSITION_READS_BALLS = "6:3: artefacts.plate: no position reads balls r1c2"
-PER_METRE_OF_LENGTH = "per metre of length; give less than 100 um/m"
+PER_METRE_OF_LENGTH = "um/m; give less than 100 um/m"
 POINTS_ARE_TOO_MANY = "eyx.csv:5:1: 3 points are too many; at most 2 are possible"
 PUTS_THE_SCALES = "moves the scales to"
 THERE_ARE_READINGS_UP_TO_HERE = (
