@@ -71,9 +71,7 @@ if TYPE_CHECKING:
         parse_positive_temperature_difference,
         parse_ratio,
         parse_ratio_drift,
-        plain_number,
         plain_unit,
-        power_of_ten,
         typed_length,
     )
     from .settings import Forms, NonEmpty, Settings, hint, listed, listing, number_of, shorten

@@ -127,8 +127,6 @@ NUMBER = r"[+-]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][+-]?[0-9]{1,6})?"
 QUANTITY = re.compile(rf"({NUMBER})\s*((?:(?<=\s)1/|[^\s0-9.+-]).*)?")
 # A constant, and what is added for each metre: a divisor of L, or a ratio.
 GROWING = re.compile(rf"(.+?)\+\s*(?:L\s*/\s*({NUMBER})|({NUMBER}\s*[^\s0-9.+-][^+]*))\s*")
-# Too few digits for a number other than zero to vanish.
-PLAIN = re.compile(r"[+-]?[0-9]{1,15}(?:\.[0-9]{1,30})?")
 # A faster growth comes of a data sheet's L in millimetres.
 STEEPEST = Fraction(1, 10**4)
 # A smaller number without a unit is one of the base unit, as programs use.
@@ -175,31 +173,6 @@ def metres_or_radians(number: str, factor: Fraction, kind: str = "length") -> fl
             f"write 0, or {_article(kind)} of {SMALLEST_FLOAT:g} {unit} to {LARGEST:g} {unit}"
         )
     return value
-
-
-def power_of_ten(factor: Fraction) -> str:
-    """Return the exponent of a unit's factor; empty if it is no power of ten.
-
-    >>> power_of_ten(LENGTH_UNITS["mm"]), power_of_ten(LENGTH_UNITS["in"])
-    ('e-3', '')
-    """
-    exponent = round(math.log10(factor))
-    return f"e{exponent}" if factor == Fraction(10) ** exponent else ""
-
-
-def plain_number(number: str, power: str) -> float | None:
-    """Return `metres_or_radians` of digits with or without a decimal point, but sooner.
-
-    `power` is a unit's `power_of_ten`. None for other notations and numbers out of range.
-
-    >>> plain_number("750", "e-3"), plain_number("7.5e2", "e-3")
-    (0.75, None)
-    """
-    if not power or not PLAIN.fullmatch(number):
-        return None
-    # Adding zero removes its sign.
-    value = float(number + power) + 0.0
-    return value if value == 0.0 or SMALLEST_FLOAT <= abs(value) <= LARGEST else None
 
 
 def parse_quantity(
