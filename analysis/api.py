@@ -436,7 +436,7 @@ def plan(
 
 
 def load_map(path: PathLike) -> FittedMap:
-    """The map of a file that a fit left behind, YAML or .npz.
+    """The map of a file that a fit left behind.
 
     >>> from tempfile import TemporaryDirectory
     >>> with TemporaryDirectory() as folder:
@@ -452,12 +452,12 @@ def load_map(path: PathLike) -> FittedMap:
 
 
 def write_map(fitted: FittedMap, path: PathLike) -> None:
-    """Write what `to_map()` of a fit gives into a file: YAML, or arrays of NumPy where its name
-    ends in .npz. Numbers keep all their digits; a file of that name is overwritten.
+    """Write what `to_map()` of a fit gives into a file in YAML. Numbers keep all their digits; a
+    file of that name is overwritten.
 
     >>> from tempfile import TemporaryDirectory
     >>> with TemporaryDirectory() as folder:
-    ...     path = f"{folder}/map.npz"
+    ...     path = f"{folder}/map.yaml"
     ...     write_map(fit(quickstart(), simulate(quickstart())).to_map(), path)
     ...     load_map(path).degrees_of_freedom
     580

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -36,9 +35,7 @@ from .own_sections import check_installed
 
 
 # In one piece: what is checked needs what was found right before it.
-def map_of_tree(
-    root: Node, arrays: Mapping[str, Array], source: Path, problems: Problems, trust: Trust
-) -> FittedMap | None:
+def map_of_tree(root: Node, source: Path, problems: Problems, trust: Trust) -> FittedMap | None:
     """The map of a tree, or None after reporting faults."""
     if not isinstance(root, MappingNode) or "map" not in root.items:
         description = (
@@ -77,14 +74,9 @@ def map_of_tree(
     if problems.messages:
         return None
     size = len(values) + int(probes.free.sum())
-    covariance, undetermined = (
-        (arrays["covariance"], arrays["undetermined"])
-        if arrays
-        else (_triangle(settings, size, problems), _directions(settings, size, problems))
-    )
-    if covariance.shape != (size, size) or undetermined.shape[:1] != (size,):
-        problems.add(("covariance",), f"is not of {size} parameters and estimated offsets")
-    elif (np.diagonal(covariance) < 0.0).any():
+    covariance = _triangle(settings, size, problems)
+    undetermined = _directions(settings, size, problems)
+    if (np.diagonal(covariance) < 0.0).any():
         problems.add(("covariance",), "has a variance below zero; write the map again")
     elif not problems.messages:
         _check_unchanged(settings.checksum, root, covariance, undetermined, problems)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import re
 from collections.abc import Callable
 from pathlib import Path
@@ -22,8 +21,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     found = tmp_path_factory.mktemp("damaged")
     write_files(found)
     for kind, name in (("spatial metric", "map"), ("kinematic", "open")):
-        for ending in ("yaml", "npz"):
-            bp.write_map(fit_of(kind, found).to_map("2026-11-22"), found / f"{name}.{ending}")
+        bp.write_map(fit_of(kind, found).to_map("2026-11-22"), found / f"{name}.yaml")
     return found
 
 
@@ -185,10 +183,9 @@ def same(one: FittedMap, other: FittedMap) -> bool:
     )
 
 
-@pytest.mark.parametrize("name", ["open.yaml", "open.npz"])
-def test_damage_anywhere_is_found(name: str, folder: Path, tmp_path: Path) -> None:
-    whole, path = (folder / name).read_bytes(), tmp_path / name
-    right = bp.load_map(folder / name)
+def test_damage_anywhere_is_found(folder: Path, tmp_path: Path) -> None:
+    whole, path = (folder / "open.yaml").read_bytes(), tmp_path / "open.yaml"
+    right = bp.load_map(folder / "open.yaml")
     generator = np.random.default_rng(4)
     found = 0
     for k in range(40):
@@ -206,7 +203,7 @@ def test_damage_anywhere_is_found(name: str, folder: Path, tmp_path: Path) -> No
             assert all(str(one).startswith(str(path)) for one in error.messages)
             found += 1
         else:
-            # Bytes of a title, or of the archive that say nothing.
+            # Bytes of a title.
             assert same(again, right)
     assert found > 30
 
@@ -219,7 +216,6 @@ def test_damage_anywhere_is_found(name: str, folder: Path, tmp_path: Path) -> No
         (b"- 1\n", "map.yaml", "is no map file (a list)"),
         (b"map: [1\n", "map.yaml", "never closed"),
         (b"\xff\xfe", "map.yaml", "not UTF-8"),
-        (b"map: 1\n", "map.npz", "is no map, or damaged"),
         (None, "map.yaml", "there is no such file"),
     ],
 )
@@ -233,34 +229,6 @@ def test_what_is_no_map_is_told(
     assert main(["correct", str(path), str(tmp_path / "points.csv")]) == 3
     captured = capsys.readouterr()
     assert told in captured.err and str(path) in captured.err and not captured.out
-
-
-def test_arrays_by_another_ending_and_pickles_are_refused(folder: Path, tmp_path: Path) -> None:
-    (tmp_path / "map.yaml").write_bytes((folder / "map.npz").read_bytes())
-    with pytest.raises(bp.ExperimentError, match=wording.GIVE_IT_THE_ENDING_NPZ):
-        bp.load_map(tmp_path / "map.yaml")
-    with np.load(folder / "map.npz") as whole:
-        parts = dict(whole)
-    np.savez(tmp_path / "pickle.npz", **(parts | {"map": np.array([{}], object)}))
-    np.savez(tmp_path / "part.npz", covariance=parts["covariance"])
-    head = json.loads(str(parts["map"]))
-    del head["checksum"]
-    for name, value in (("infinite", np.inf), ("negative", -1.0)):
-        covariance = parts["covariance"].copy()
-        covariance[0, 0] = value
-        changes = {"map": np.array(json.dumps(head)), "covariance": covariance}
-        np.savez(tmp_path / f"{name}.npz", **(parts | changes))
-    small = parts["covariance"][:-1, :-1]
-    np.savez(tmp_path / "small.npz", **(parts | {"covariance": small}))
-    for name, told in (
-        ("pickle", "is no map, or damaged"),
-        ("part", "is no map, or damaged"),
-        ("infinite", "no matrices of finite doubles"),
-        ("negative", "a variance below zero"),
-        ("small", "is not of 6 parameters"),
-    ):
-        with pytest.raises(bp.ExperimentError, match=told):
-            bp.load_map(tmp_path / f"{name}.npz")
 
 
 def test_what_a_model_rests_on_may_not_change(folder: Path, tmp_path: Path) -> None:
@@ -297,7 +265,7 @@ def test_fit_writes_a_map_of_the_full_estimator_only(
 ) -> None:
     design, readings = "designs/quickstart.yaml", tmp_path / "readings.csv"
     assert main(["simulate", design, "-o", str(readings), "--seed", "1"]) == 0
-    out = tmp_path / "map.npz"
+    out = tmp_path / "map.yaml"
     fit = ["fit", design, str(readings), "-o", str(out)]
     assert main([*fit, "--date", "2026-11-22"]) == 0
     found = bp.load_map(out)

@@ -450,16 +450,15 @@ def test_combinations_are_lengths_by_name(tmp_path: Path) -> None:
 def test_files_nobody_has_looked_at_run_no_map_of_a_model_in_python(tmp_path: Path) -> None:
     write_files(tmp_path)
     experiment = bp.experiment(IN_SPACE | {"error_model": model_of("python", tmp_path)}, tmp_path)
-    for name in ("own.yaml", "own.npz"):
-        bp.write_map(bp.fit(experiment, bp.simulate(experiment)).to_map(), tmp_path / name)
-        sections = IN_SPACE | {
-            "error_model": {"kind": "metric"},
-            "true_machine": {"kind": "map", "file": name},
-        }
-        (tmp_path / "file.yaml").write_text(json.dumps(sections), encoding="utf-8")
-        assert load(tmp_path / "file.yaml")
-        with pytest.raises(bp.ExperimentError, match=wording.OWN_IS_CODE_IN_PYTHON):
-            load(tmp_path / "file.yaml", trust=UNKNOWN)
+    bp.write_map(bp.fit(experiment, bp.simulate(experiment)).to_map(), tmp_path / "own.yaml")
+    sections = IN_SPACE | {
+        "error_model": {"kind": "metric"},
+        "true_machine": {"kind": "map", "file": "own.yaml"},
+    }
+    (tmp_path / "file.yaml").write_text(json.dumps(sections), encoding="utf-8")
+    assert load(tmp_path / "file.yaml")
+    with pytest.raises(bp.ExperimentError, match=wording.OWN_IS_CODE_IN_PYTHON):
+        load(tmp_path / "file.yaml", trust=UNKNOWN)
 
 
 def test_stored_cells_know_maps_by_their_content(tmp_path: Path) -> None:
@@ -497,8 +496,8 @@ def test_readings_that_count_twice_are_told(tmp_path: Path) -> None:
     assert rows[1] == pytest.approx(rows[0] / np.sqrt(2.0), rel=0.05)
     # A map that rests on another one is no independent campaign either.
     later = bp.fit(known, second).to_map()  # type: ignore[attr-defined]
-    bp.write_map(later, tmp_path / "later.npz")
-    found = bp.diff(tmp_path / "map.yaml", tmp_path / "later.npz", grid=2)
+    bp.write_map(later, tmp_path / "later.yaml")
+    found = bp.diff(tmp_path / "map.yaml", tmp_path / "later.yaml", grid=2)
     assert found.in_common == "some" and found.is_changed is None
     apart = bp.fit(plain, second).to_map()  # type: ignore[attr-defined]
     assert bp.diff(tmp_path / "map.yaml", apart, grid=2).is_changed is False

@@ -141,7 +141,7 @@ OF_MAPS = [
     ["map", "--curves", "MAP"],
     ["map", "--convert", "MAP", "--to", "metric"],
     ["adjust", "MAP", "--scale", "x=10 um/m"],
-    ["diff", "MAP", "clean.npz"],
+    ["diff", "MAP", "clean.yaml"],
 ]
 
 
@@ -162,8 +162,8 @@ def test_every_command_repeats_it(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.chdir(maps[name].parent)
-    if not Path("clean.npz").exists():
-        bp.write_map(fit("clean").to_map(), "clean.npz")
+    if not Path("clean.yaml").exists():
+        bp.write_map(fit("clean").to_map(), "clean.yaml")
     given = [f"{name}.yaml" if one == "MAP" else one for one in arguments]
     assert main(given) in (0, 1)
     told = capsys.readouterr()
@@ -199,12 +199,12 @@ def test_maps_made_of_a_map_carry_it(
     monkeypatch.chdir(tmp_path)
     before = bp.load_map(maps["beyond"])
     if kind == "conversion":
-        main(["map", "--convert", str(maps["beyond"]), "--to", "empirical", "-o", "new.npz"])
+        main(["map", "--convert", str(maps["beyond"]), "--to", "empirical", "-o", "new.yaml"])
     elif kind == "adjustment":
-        main(["adjust", str(maps["beyond"]), "--scale", "x=10 um/m", "-o", "new.npz"])
+        main(["adjust", str(maps["beyond"]), "--scale", "x=10 um/m", "-o", "new.yaml"])
     else:
-        bp.write_map(before, "new.npz")
-    assert bp.load_map("new.npz").lack_of_fit == before.lack_of_fit
+        bp.write_map(before, "new.yaml")
+    assert bp.load_map("new.yaml").lack_of_fit == before.lack_of_fit
     # By hand it is not taken off.
     text = maps["beyond"].read_text()
     Path("edited.yaml").write_text(re.sub("^lack_of_fit:.*\n", "", text, flags=re.MULTILINE))

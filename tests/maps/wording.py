@@ -3,7 +3,6 @@
 AGAINST_A_LEVEL_OF_THE_MAP = "against a level of 0.25: the map is scaled with that"
 AGREE_WITH_ITS_MODEL_BUT = "agree with its model except for rounding"
 FITTED_HERE_TOO = "fitted here too (x high): they count twice"
-GIVE_IT_THE_ENDING_NPZ = "give it the ending .npz"
 HAS_CHANGED_SINCE_THE_MAP_WAS = "has changed since the map was written"
 IN_THE_FIT = "in the fit of"
 IN_THE_FIT_OF_THE_MAP = "in the fit of the map"
