@@ -22,7 +22,6 @@ from .calibrations import resolve_calibration
 from .changes import node_of
 from .checks import (
     check_calibration_read,
-    check_derivatives,
     check_error_model,
     check_inside,
     check_names,
@@ -238,10 +237,9 @@ def _build(
     pool = resolve_pool(sections, candidates, calibrations, references)
     priors = resolve_priors(sections, machine, named, probes, references)
     influences = resolve_influences(sections, named, references)
-    check_size(sections, machine, enabled, calibrations, probes, references)
     noise = resolve_noise(sections.get("noise"), problems)
     evaluation = resolve_evaluation(sections, machine, probes, references)
-    check_derivatives(sections, machine, evaluation, references)
+    check_size(sections, machine, enabled, calibrations, probes, evaluation, references)
     check_readings(sections, references)
     stars = resolve_stars(sections, probes, references)
     own_sections = resolve_own_sections(sections, references)

@@ -10,7 +10,6 @@ import numpy as np
 from ..design.objects import Probes, Volume
 from ..inputs.messages import ExperimentError
 from ..inputs.problems import Problems
-from ..inputs.quantities import format_length
 from ..inputs.settings import describe, listing, shorten
 from ..inputs.trust import Trust
 from ..inputs.validation import validated
@@ -32,6 +31,7 @@ from .map_content import AXES, checksum_of
 from .map_sections import MapSettings
 from .model_files import absolute, fingerprints
 from .own_sections import check_installed
+from .volumes import check_ends
 
 
 # In one piece: what is checked needs what was found right before it.
@@ -57,11 +57,7 @@ def map_of_tree(root: Node, source: Path, problems: Problems, trust: Trust) -> F
     if settings is None:
         return None
     ends = settings.volume.stated.values()
-    for axis, (low, high) in settings.volume.stated.items():
-        if low >= high:
-            text = f"ends at {format_length(high)}, not above its beginning, {format_length(low)}"
-            problems.add(("volume", axis), text)
-    if problems.messages:
+    if not check_ends(settings.volume.stated, ("volume",), problems):
         return None
     lower, upper = (np.array(end) for end in zip(*ends, strict=True))
     volume = Volume(lower, upper)

@@ -13,7 +13,6 @@ from ..design.objects import Machine, Volume
 from ..geometry.grids import even_grid
 from ..inputs.days import parse_day
 from ..inputs.messages import ExperimentError, Steps, format_path
-from ..inputs.quantities import format_length
 from ..inputs.settings import listing
 from ..inputs.yamltree import mark_of, read_bytes
 from ..machines.protocol import Array, ErrorModel, TrueMachine
@@ -23,10 +22,8 @@ from ..maps.map_prior import MapShare, campaign_of, determined_combinations, mar
 from .map_files import read_map
 from .model import Prior, Probe
 from .sections import MapPriorSettings
+from .volumes import check_within
 
-AXES = ("x", "y", "z")
-# Ends of volumes that are the same, in metres.
-TOLERANCE = 1e-9
 YEAR = 365.25
 # The same corrections, in metres, and in parts of them.
 SAME, SAME_PART = 1e-12, 1e-9
@@ -57,7 +54,7 @@ def read_true_map(truth: TrueMapSettings, machine: Machine | None, references: R
         text = f"is of {true_map.dimension} axes, but machine.volume of {machine.dimension}"
         references.problems.add(steps, f"{text}; name another map")
         return
-    _check_ends(true_map, machine, steps, references, outside_only=True)
+    check_within(*true_map.volume.corners, machine, steps, references)
 
 
 def resolve_map_prior(
@@ -182,7 +179,8 @@ def _is_same(
     if machine.dimension != fitted.dimension:
         add(steps, f"is of {fitted.dimension} axes, but machine.volume of {machine.dimension}")
         return False
-    if not _check_ends(fitted, machine, steps, references, outside_only=False):
+    remedy = "make them the same, or convert the map"
+    if not check_within(*fitted.volume.corners, machine, steps, references, remedy, is_same=True):
         return False
     model_parameters = [(parameter.name, parameter.unit) for parameter in model.parameters]
     map_parameters = [(parameter.name, parameter.unit) for parameter in fitted.model.parameters]
@@ -204,31 +202,6 @@ def _is_same(
         add(steps, text)
         return False
     return True
-
-
-def _check_ends(
-    fitted: FittedMap, machine: Machine, steps: Steps, references: References, outside_only: bool
-) -> bool:
-    """True if the volume is that of the map, or within it if `outside_only`; others are
-    reported.
-    """
-    mapped, volume, is_right = fitted.volume, machine.volume, True
-    for k, axis in enumerate(AXES[: fitted.dimension]):
-        ends = float(mapped.lower[k]), float(mapped.upper[k])
-        low, high = float(volume.lower[k]), float(volume.upper[k])
-        if outside_only:
-            is_wrong = low < ends[0] - TOLERANCE or high > ends[1] + TOLERANCE
-        else:
-            is_wrong = abs(low - ends[0]) > TOLERANCE or abs(high - ends[1]) > TOLERANCE
-        if is_wrong:
-            remedy = "stay within it" if outside_only else "make them the same, or convert the map"
-            text = (
-                f"its volume is {format_length(ends[0])} to {format_length(ends[1])} in {axis},"
-                f" but machine.volume is {format_length(low)} to {format_length(high)}; {remedy}"
-            )
-            references.problems.add(steps, text)
-            is_right = False
-    return is_right
 
 
 def _corner_corrections(model: ErrorModel, values: Array, volume: Volume) -> Array:

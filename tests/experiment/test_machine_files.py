@@ -186,7 +186,7 @@ probing: 0 um
         (
             "y: [0 mm, 1200 mm]",
             "y: [1 m, 1 m]",
-            "m.yaml:3:36: volume.y: begins and ends at 1000 mm; give an end",
+            "m.yaml:3:36: volume.y: ends at 1000 mm, not above its beginning, 1000 mm",
         ),
         (
             ", z: [0 mm, 1200 mm]}",
