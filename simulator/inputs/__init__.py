@@ -21,7 +21,6 @@ if TYPE_CHECKING:
         NamedMatrix,
         half_digit,
         matrix_problems,
-        unit_of_area,
     )
     from .days import stated_day
     from .decoding import LINE_END, decoded, refuse_controls, text_and_encoding
