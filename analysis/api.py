@@ -12,6 +12,7 @@ from __future__ import annotations
 import os
 import sys
 from collections.abc import Iterable, Mapping, Sequence
+from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, overload
 
@@ -471,12 +472,12 @@ def write_map(fitted: FittedMap, path: PathLike) -> None:
 
 
 def _shown_in_notebook(experiment: Experiment) -> str:
-    """Return the notebook view of an experiment: its table and its picture, which the experiment
+    """Return the notebook view of an experiment: its title and its picture, which the experiment
     itself cannot draw.
     """
     view = optional_function("view")
     picture = "" if view is None else view(experiment)._repr_html_()
-    return experiment._repr_html_() + picture
+    return f"<p>{escape(repr(experiment))}</p>\n{picture}"
 
 
 def _teach_notebook() -> None:

@@ -210,15 +210,7 @@ def uncertainties_of(
     assert matrix is not None
     size = np.sqrt(np.diag(matrix[0]))
     if covariance is not None and not len(without):
-        wrong = np.abs(size - uncertainties_read) > AGREE * np.maximum(size, uncertainties_read)
-        if (wrong & (np.abs(size - uncertainties_read) > 1e-12)).any():
-            k = int(wrong.argmax())
-            text = (
-                f"the covariance has the standard uncertainty {1e6 * size[k]:.4g} µm for"
-                f" {value_name(names[k], is_pair)}, beside it stands"
-                f" {1e6 * uncertainties_read[k]:.4g} µm; is one of the two expanded? State standard"
-                " uncertainties and their covariance"
-            )
+        if text := _disagreement(names, is_pair, size, uncertainties_read):
             problems.add(place, text)
             return None
     if len(size) > MOST_JOINT_VALUES:
@@ -228,6 +220,24 @@ def uncertainties_of(
         return None
     root = _root_of(matrix, place, problems)
     return None if root is None else Uncertainties(_frozen(size), root)
+
+
+def _disagreement(
+    names: Sequence[tuple[str, str]], is_pair: bool, size: Array, uncertainties_read: Array
+) -> str:
+    """Return the fault of uncertainties (m,) in a covariance that differ from those beside it;
+    possibly empty.
+    """
+    apart = np.abs(size - uncertainties_read)
+    wrong = np.flatnonzero(apart > AGREE * np.maximum(size, uncertainties_read) + 1e-12)
+    if not len(wrong):
+        return ""
+    k = int(wrong[0])
+    return (
+        f"the covariance has the standard uncertainty {1e6 * size[k]:.4g} µm for"
+        f" {value_name(names[k], is_pair)}, beside it stands {1e6 * uncertainties_read[k]:.4g} µm;"
+        " is one of the two expanded? State standard uncertainties and their covariance"
+    )
 
 
 def _root_of(matrix: tuple[Array, ...], place: Steps, problems: Problems) -> CovarianceRoot | None:
