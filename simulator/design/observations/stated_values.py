@@ -209,10 +209,10 @@ def uncertainties_of(
         matrix = common, np.zeros_like(common)
     assert matrix is not None
     size = np.sqrt(np.diag(matrix[0]))
-    if covariance is not None and not len(without):
-        if text := _disagreement(names, is_pair, size, uncertainties_read):
-            problems.add(place, text)
-            return None
+    has_both = covariance is not None and not len(without)
+    if has_both and (text := _disagreement(names, is_pair, size, uncertainties_read)):
+        problems.add(place, text)
+        return None
     if len(size) > MOST_JOINT_VALUES:
         problems.add(
             place, f"{len(size)} correlated values; at most {MOST_JOINT_VALUES} are possible"
