@@ -205,11 +205,7 @@ def __getattr__(name: str) -> Any:
         try:
             value = function(name)
         except KeyError:
-            from ballplate.simulator.inputs.moved import MOVED
-
-            successor = MOVED.get(f"bp.{name}")
-            moved = "" if successor is None else f"; it is now {successor}"
-            message = f"module {__name__!r} has no attribute {name!r}{moved}"
+            message = f"module {__name__!r} has no attribute {name!r}"
             raise AttributeError(message) from None
         except MissingExtensionError as error:
             raise MissingNameError(f"{__name__}.{name}: {error}") from None

@@ -27,10 +27,6 @@ from .protocol import Array, ErrorModel, Line, Parameter, Reported
 GROUP = "ballplate.error_models"
 MEMBERS = ("dimension", "parameters", "error", "jacobian", "reported")
 
-# Former names of ballplate's packages, and the line that replaces their imports in old models.
-FORMER_PACKAGES = ("simulator", "analysis")
-NEW_LINE = "from ballplate.models import Parameter, Reported"
-
 # Parameters are tried at random values that move points by about this much, in metres, and are
 # changed by as much.
 USUAL_ERROR = 1e-4
@@ -172,12 +168,6 @@ def _imported(name: str, folder: Path | None) -> Any:
         module = attempt(f"{name} cannot be imported", lambda: importlib.import_module(name))
     except CustomModelError as error:
         absent = error.__cause__.name if isinstance(error.__cause__, ModuleNotFoundError) else None
-        if absent is not None and absent.partition(".")[0] in FORMER_PACKAGES:
-            text = (
-                f"{name} imports {absent}, which is no longer a package of its own; write:"
-                f" {NEW_LINE}"
-            )
-            raise CustomModelError(text) from None
         if absent in name.split("."):
             where = "" if folder is None else f" nor in {folder}"
             raise CustomModelError(

@@ -85,7 +85,7 @@ WALK = {
     ),
     "fit": Walk(
         EXPERIMENT | {"READINGS": "readings.csv", "--certificate": "certificate.csv"},
-        {"--plot": "fit.svg", "-o": "fit.npz", "--report": "fit.html"},
+        {"--plot": "fit.svg", "-o": "fitted.yaml", "--report": "fit.html"},
         also=("balls.csv",),
     ),
     "certificate": Walk(

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import importlib.metadata
 import json.decoder
-import subprocess
-import sys
 from pathlib import Path
 from typing import Any
 
@@ -180,31 +178,6 @@ def test_missing_modules_are_named(tmp_path: Path) -> None:
     assert f"no module nobody_has_this.at_all is installed nor in {tmp_path}" in line
     file.write_text(EXPERIMENT.replace("MODEL", "nobody"), encoding="utf-8")
     assert wording.FOR_AN_OBJECT_OF_A_MODULE in refusal(file)
-
-
-@pytest.mark.parametrize("former", ["simulator.machines.protocol", "analysis.study"])
-def test_a_model_of_the_former_packages_is_told_what_to_write(tmp_path: Path, former: str) -> None:
-    """In a process of its own, which does not find the folders of a checkout as packages."""
-    file, _ = written(
-        tmp_path, GOOD.replace("from ballplate.models import", f"from {former} import")
-    )
-    command = [sys.executable, "-m", "ballplate", "check", file.name]
-    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=60)
-    assert done.returncode == 3
-    assert former.partition(".")[0] in done.stderr
-    assert "write: from ballplate.models import Parameter, Reported" in done.stderr
-
-
-def test_a_package_that_is_a_former_one_is_told(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """In this process, with a package that no folder is named after."""
-    monkeypatch.setattr(custom, "FORMER_PACKAGES", ("package_of_old",))
-    source = GOOD.replace("import numpy as np", "import numpy as np\nimport package_of_old.model")
-    line = refusal(written(tmp_path, source)[0])
-    assert wording.IMPORTS_PACKAGE_OF_OLD in line
-    line = refusal(written(tmp_path, source.replace("_of_old", "_of_nobody"))[0])
-    assert wording.CANNOT_BE_IMPORTED in line and "no longer" not in line
 
 
 def test_the_file_of_a_module_is_found_without_running_it(tmp_path: Path) -> None:

@@ -103,7 +103,6 @@ READ: dict[str, dict[str, Any]] = {
     "a machine file's table": {"error_model": {"kind": "machine", "file": "machine.yaml"}},
     "a map of a machine file": {"true_machine": {"kind": "map", "file": "machine-map.yaml"}},
     "a map in Python": {"true_machine": {"kind": "map", "file": "map.yaml"}},
-    "a map in Python, as arrays": {"true_machine": {"kind": "map", "file": "map.npz"}},
     "a map as prior": {"priors": [{"kind": "map", "file": "map.yaml"}]},
     # Found where Python looks for modules.
     "an installed module": {"error_model": {"kind": "python", "object": "canary:build"}},
@@ -231,25 +230,8 @@ def house(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, fitted: bp.FittedMap)
     ):
         for folder in (inside, outside):
             changed = re.sub(r"(?m)^error_model: .*$", f"error_model: {json.dumps(settings)}", text)
-            (folder / name).write_text(
-                re.sub(r"(?m)^(checksum|check|files):.*\n(- .*\n)*", "", changed)
-            )
-    python_map(inside)
+            (folder / name).write_text(re.sub(r"(?m)^(checksum|files):.*\n(- .*\n)*", "", changed))
     return inside
-
-
-def python_map(folder: Path) -> None:
-    """The map in Python as arrays."""
-    import numpy as np
-
-    bp.write_map(bp.load_map(folder / "plain.yaml"), folder / "map.npz")
-    with np.load(folder / "map.npz") as found:
-        arrays = {name: found[name] for name in found.files}
-    head = json.loads(str(arrays["map"])) | {"error_model": python(".")}
-    arrays["map"] = np.array(
-        json.dumps({key: head[key] for key in head if key not in ("checksum", "check", "files")})
-    )
-    np.savez(folder / "map.npz", **arrays)
 
 
 def checked(folder: Path, sections: dict[str, Any], *options: str) -> None:

@@ -18,7 +18,6 @@ from ballplate.simulator.experiment import (
     override,
     python_models,
     variant_trees,
-    with_present_keys,
 )
 from ballplate.simulator.inputs import (
     OPENED,
@@ -190,7 +189,7 @@ def _trees(base: Path) -> Trees:
 
     :raises ExperimentError: the file cannot be read, or a variant is invalid.
     """
-    root = with_present_keys(read_tree(base))
+    root = read_tree(base)
     problems = Problems(root)
     variants = variant_trees(root, problems)
     if problems.messages:
