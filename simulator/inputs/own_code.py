@@ -20,8 +20,18 @@ from .unusable import UnusableError
 
 # Packages that the program uses, by their folders.
 LIBRARIES = frozenset(
-    ("distributed", "filelock", "joblib", "matplotlib", "numpy", "pandas", "pyarrow")
-    + ("pydantic", "pydantic_core", "scipy", "threadpoolctl", "tqdm", "yaml", "dask", "tornado")
+    ("distributed", "filelock", "jinja2", "joblib", "matplotlib", "numpy", "pandas", "pyarrow")
+    + (
+        "pydantic",
+        "pydantic_core",
+        "scipy",
+        "tabulate",
+        "threadpoolctl",
+        "tqdm",
+        "yaml",
+        "dask",
+        "tornado",
+    )
 )
 # Folders of the standard library.
 STANDARD = (Path(traceback.__file__).parent, Path(sysconfig.get_path("platstdlib")))
