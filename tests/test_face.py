@@ -368,7 +368,7 @@ def test_a_notebook_shows_the_first_rows_of_a_long_table() -> None:
     rows, whole, shown = len(found.rows()), found.to_html(), found._repr_html_()
     assert rows > 60
     # One row of headings.
-    assert whole.count("<tr>") == rows + 1 and shown.count("<tr>") == 61
+    assert whole.count("<tr") == rows + 1 and shown.count("<tr") == 61
     assert f"and {rows - 60} more rows" in shown and "more rows" not in whole
 
 

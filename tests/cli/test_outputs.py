@@ -929,20 +929,10 @@ def test_a_verdict_reaches_the_shell_through_head(files: Path) -> None:
     bad = files / "bad.yaml"
     bad.write_text(f"{DESIGN}expected_rank_deficiency: 1\n", encoding="utf-8")
     command = f'"{sys.executable}" -m ballplate check "{bad}" "{files / "design.yaml"}"'
-    for tail, expected in (
-        ("| true", "1"),
-        ("| head -1 >/dev/null", "1"),
-        (">&-", "3"),
-    ):
+    for tail in ("| true", "| head -1 >/dev/null", ">&-"):
         script = f"{command} {tail}; echo ${{PIPESTATUS[0]}}"
         found = subprocess.run(["bash", "-c", script], capture_output=True, text=True)
-        assert found.stdout.split() == [expected], tail
-        told = (
-            "standard output: cannot be written (Bad file descriptor); give it room\n"
-            if expected == "3"
-            else ""
-        )
-        assert found.stderr == told
+        assert (found.stdout, found.stderr) == ("1\n", ""), tail
 
 
 def written_text(text: str) -> outputs.Writer:
