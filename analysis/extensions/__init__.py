@@ -85,7 +85,6 @@ SHIPPED = (
         services={
             **_from("campaign_picture", "draw_campaign"),
             **_from("sheet", "Sheet"),
-            **_from("drift_orders", "DriftOrders"),
             **_from("earlier", "begun"),
         },
     ),
