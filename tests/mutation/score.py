@@ -26,7 +26,7 @@ ROOMS = {
     **{name: name for name in ("uncertainty", "rank", "montecarlo", "results", "planning")},
 }
 # Tests of what runs as a process or in a browser, or would run all others, do not see a mutant.
-BLIND = ("benchmarks", "docs", "mutation", "robustness", "studio", "sweeps")
+BLIND = ("docs", "mutation", "robustness", "studio", "sweeps")
 
 
 @dataclass(frozen=True)
