@@ -242,7 +242,7 @@ SHIPPED = (
         commands={
             "reproduce": Command(
                 "reproduce_command",
-                "compute published experiments or certified problems, and compare the figures",
+                "compute published experiments, and compare the figures",
             ),
         },
         functions=_from("interface", "reproduce"),

@@ -181,11 +181,7 @@ WALK = {
     "sweep": Walk(
         {"FILE": "sweep.yaml", "--store": "new.sqlite", "--folder": "."}, {}, ("--dry-run",)
     ),
-    "reproduce": Walk(
-        {"--designs": "certified", "--results": "results.json"},
-        {},
-        ("certified", "--experiment", "two-dimensions"),
-    ),
+    "reproduce": Walk({"--designs": "npl"}, {}, ("npl", "--experiment", "5.2", "--quick")),
     "schema": Walk({}, {}),
 }
 WRITING = [(command, option) for command, walk in WALK.items() for option in walk.writes]

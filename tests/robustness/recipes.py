@@ -137,8 +137,6 @@ RECIPES = (
         " --straight 1 --straight 2 --knots none --compensated out.csv"
     ),
     "reproduce npl --designs npl --experiment 5.2 --quick",
-    "reproduce certified --designs certified --experiment weak --json",
-    "reproduce certified --designs certified --experiment weak --results results.json",
     "schema machine",
     "schema sweep",
     "'run --budget' small.yaml --by position",

@@ -3,7 +3,7 @@ to read.
 
 Run with
 
-    python -m pytest tests/benchmarks/bench_sweep.py
+    python -m pytest benchmarks/bench_sweep.py
 
 Two thousand small cells go through the command as a user starts it. What a cell takes is what its
 worker counts from the cell's first line of Python to the last; the share of that in wall time times
@@ -25,7 +25,7 @@ from ballplate.extensions.sweeps.running import stored_result
 from ballplate.extensions.sweeps.store import add_rows, add_sweep, open_store
 from ballplate.extensions.sweeps.task import CellTask, compute
 
-ROOT = Path(__file__).parents[2]
+ROOT = Path(__file__).parents[1]
 SWEEP = """\
 title: two thousand small cells
 base: {base}

@@ -3,7 +3,7 @@
 Run with
 
     pip install -e '.[benchmark]'
-    python -m pytest tests/benchmarks/bench_rivals.py
+    python -m pytest benchmarks/bench_rivals.py
 
 It takes about ten minutes and 8 GB of memory. The table is printed at the end. Experiment 6.2.1 of
 NPL Report CISE 15/98 is taken on grids of n x n balls with the sides between the corners

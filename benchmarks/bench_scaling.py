@@ -2,7 +2,7 @@
 
 Run with
 
-    python -m pytest tests/benchmarks/bench_scaling.py
+    python -m pytest benchmarks/bench_scaling.py
 
 Each size is measured in a process of its own, whose peak resident memory is read off after the
 elimination with U1 to U4 and U6, and again after U5, the distances between all pairs of balls.
@@ -21,7 +21,7 @@ import numpy as np
 import pytest
 
 SIZES = (25, 50, 100)
-ROOT = Path(__file__).parents[2]
+ROOT = Path(__file__).parents[1]
 MEBIBYTE = 2.0**20
 
 
@@ -76,7 +76,7 @@ def measure(n: int) -> dict[str, float]:
 def measured() -> dict[int, dict[str, float]]:
     found = {}
     for n in SIZES:
-        command = [sys.executable, "-m", "tests.benchmarks.bench_scaling", str(n)]
+        command = [sys.executable, "-m", "benchmarks.bench_scaling", str(n)]
         run = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True)
         found[n] = json.loads(run.stdout)
     return found

@@ -2,7 +2,7 @@
 
 Run with
 
-    python -m pytest tests/benchmarks/bench_start.py
+    python -m pytest benchmarks/bench_start.py
 
 Processes take turns, round by round; what is printed is the least time that each took of the
 processor, its own and the system's for it, and the same less that of a Python that does nothing.
@@ -25,7 +25,7 @@ from ballplate.extensions.sweeps.task import CellTask, compute
 
 from .bench_sweep import written
 
-ROOT = Path(__file__).parents[2]
+ROOT = Path(__file__).parents[1]
 ROUNDS = 10
 CELLS = 100
 COMMANDS = {

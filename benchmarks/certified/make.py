@@ -1,4 +1,4 @@
-"""Writes the certified problems: `python -m tests.certified.make [NAME …]`, into designs/certified.
+"""Writes the certified problems: `python -m benchmarks.certified.make [NAME …]`, into designs/certified.
 
 Readings are built so that their answer is known beforehand: noise, projected on what no change of
 parameters can follow, is added to the readings of a chosen state, which is then the least-squares

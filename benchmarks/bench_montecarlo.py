@@ -2,7 +2,7 @@
 
 Run with
 
-    python -m pytest tests/benchmarks/bench_montecarlo.py
+    python -m pytest benchmarks/bench_montecarlo.py
 
 Experiment 6.2.1 of NPL Report CISE 15/98 on grids of n x n balls, on a machine with errors of some
 micrometres. SciPy's least_squares is given the same residuals and derivatives, and its answers must
@@ -42,7 +42,7 @@ from tests.reference.designs import grid_experiment
 
 from .bare import bare_batch
 
-ROOT = Path(__file__).parents[2]
+ROOT = Path(__file__).parents[1]
 LINES: list[str] = []
 BARE: list[str] = []
 
@@ -250,7 +250,7 @@ def test_memory_does_not_grow_with_replicates() -> None:
     """A run of a hundred thousand, and a million if asked for, in a process of its own."""
     peaks = {}
     for count in (1024, 100_000):
-        command = [sys.executable, "-m", "tests.benchmarks.bench_montecarlo", str(count)]
+        command = [sys.executable, "-m", "benchmarks.bench_montecarlo", str(count)]
         done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True)
         peaks[count] = json.loads(done.stdout)
         seconds, peak = peaks[count]["seconds"], peaks[count]["peak"]

@@ -3,7 +3,7 @@ docs/reference/limits.md.
 
 Run with
 
-    python -m pytest tests/benchmarks/bench_limits.py
+    python -m pytest benchmarks/bench_limits.py
 
 or with -k and the name of a case. Each case is a command in a process of its own, whose processor
 time and largest memory the system tells when it has ended; processes that it starts are counted in
@@ -27,7 +27,7 @@ from ballplate.extensions.sweeps.task import CellResult
 
 from tests.extensions.sweeps.stores import axis, done, made_up
 
-ROOT = Path(__file__).parents[2]
+ROOT = Path(__file__).parents[1]
 QUICKSTART = ROOT / "designs" / "quickstart.yaml"
 CAMPAIGN = ROOT / "designs" / "planning" / "campaign.yaml"
 MACHINE = ROOT / "designs" / "park" / "machines" / "gec-like.yaml"
