@@ -125,9 +125,7 @@ WALK = {
         also=("balls.csv",),
     ),
     "run --errors": Walk(EXPERIMENT, {}, also=("balls.csv",)),
-    "next": Walk(
-        EXPERIMENT | {"READINGS": "readings.csv", "--watch": "."}, {}, also=("balls.csv",)
-    ),
+    "next": Walk(EXPERIMENT | {"READINGS": "readings.csv"}, {}, also=("balls.csv",)),
     "map --curves": Walk({"FILE": "curved-map.yaml"}, {}),
     "diff": Walk(
         {
@@ -201,7 +199,7 @@ KINDS = [
 KINDS += [("correct", "--covariance")]
 # Those that are read only where they are asked for, and not needed to walk through.
 LEFT_OUT = ("--from", "--done", "--nominal", "--store", "--folder", "--results", "--designs")
-LEFT_OUT += ("--tasks", "--readings", "--compare", "--watch")
+LEFT_OUT += ("--tasks", "--readings", "--compare")
 
 
 @pytest.fixture(scope="module")
