@@ -12,6 +12,7 @@ from __future__ import annotations
 import os
 import sys
 from collections.abc import Iterable, Mapping
+from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, overload
 
@@ -429,7 +430,7 @@ def plan(
 
 
 def load_map(path: PathLike) -> FittedMap:
-    """The map of a file that a fit left behind, YAML or .npz.
+    """The map of a file that a fit left behind.
 
     >>> from tempfile import TemporaryDirectory
     >>> with TemporaryDirectory() as folder:
@@ -445,12 +446,12 @@ def load_map(path: PathLike) -> FittedMap:
 
 
 def write_map(fitted: FittedMap, path: PathLike) -> None:
-    """Write what `to_map()` of a fit gives into a file: YAML, or arrays of NumPy where its name
-    ends in .npz. Numbers keep all their digits; a file of that name is overwritten.
+    """Write what `to_map()` of a fit gives into a file in YAML. Numbers keep all their digits; a
+    file of that name is overwritten.
 
     >>> from tempfile import TemporaryDirectory
     >>> with TemporaryDirectory() as folder:
-    ...     path = f"{folder}/map.npz"
+    ...     path = f"{folder}/map.yaml"
     ...     write_map(fit(quickstart(), simulate(quickstart())).to_map(), path)
     ...     load_map(path).degrees_of_freedom
     580
@@ -464,12 +465,12 @@ def write_map(fitted: FittedMap, path: PathLike) -> None:
 
 
 def _shown_in_notebook(experiment: Experiment) -> str:
-    """Return the notebook view of an experiment: its table and its picture, which the experiment
+    """Return the notebook view of an experiment: its title and its picture, which the experiment
     itself cannot draw.
     """
     view = optional_function("view")
     picture = "" if view is None else view(experiment)._repr_html_()
-    return experiment._repr_html_() + picture
+    return f"<p>{escape(repr(experiment))}</p>\n{picture}"
 
 
 def _teach_notebook() -> None:

@@ -162,11 +162,8 @@ def _campaign(
         influences=tuple(some for some in experiment.influences if not some.in_order),
     )
 
-    def report_earlier(step: ProgressStep) -> None:
-        report(replace(step, is_last=False))
-
     information = pool_information(
-        steady, whole, is_about_balls(request.criterion), completed_by, report_earlier
+        steady, whole, is_about_balls(request.criterion), completed_by, report
     )
     gap = None
     gap_of = optional_service("pool_gap") if information.deficiency else None
@@ -197,7 +194,7 @@ def _campaign(
     _refuse_impossible(experiment, limits, candidates)
     problem = SelectionProblem(information, wanted, limits)
 
-    best, relaxed = _search(problem, drawn, request.seed, workers, report_earlier)
+    best, relaxed = _search(problem, drawn, request.seed, workers, report)
     if relaxed is not None:
         relaxed.check(request.criterion, best.value)
     _refuse_lacking(experiment, problem, best, begun)
@@ -242,7 +239,7 @@ def _campaign(
         + (", with what is kept" if set(reference) - set(drawn) else ""),
         limits.spent(reference) if drawn else None,
         wanted.target,
-        _gains(problem, best, candidates, report_earlier if request.curve else report),
+        _gains(problem, best, candidates, report),
         _left_out(unlimited, best, candidates),
         predict(replace(planned, expected_rank_deficiency=expected or None)),
         sheet,

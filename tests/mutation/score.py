@@ -36,7 +36,7 @@ def _rooms() -> dict[str, str]:
 
 ROOMS = _rooms()
 # Tests of what runs as a process or in a browser, or would run all others, do not see a mutant.
-BLIND = ("benchmarks", "docs", "mutation", "robustness")
+BLIND = ("docs", "mutation", "robustness")
 
 
 @dataclass(frozen=True)
