@@ -41,8 +41,6 @@ table { border-collapse: collapse; width: 100%; }
 th { text-align: left; font-weight: normal; color: #555; }
 td, th { padding: 0.2em 0.8em 0.2em 0; border-bottom: 1px solid #ddd; vertical-align: top;
   overflow-wrap: break-word; }
-td.number, th.number { text-align: right; white-space: nowrap; }
-td.name { font-weight: bold; }
 th { white-space: nowrap; }
 tr { break-inside: avoid; }
 .wide { overflow-x: auto; }
