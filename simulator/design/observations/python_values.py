@@ -211,7 +211,7 @@ def read_python_values(
     )
     if uncertainties is None:
         return None
-    root = uncertainties.root or covariance_root(np.diag(uncertainties.standard**2))
+    standard, root = uncertainties
     return PythonCalibration(
         artefact,
         settings.object,
@@ -221,8 +221,8 @@ def read_python_values(
         np.asarray(balls, np.int64),
         frozen(values),
         settings.values is not None,
-        uncertainties.standard,
-        root,
+        standard,
+        root or covariance_root(np.diag(standard**2)),
     )
 
 
