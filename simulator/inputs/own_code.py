@@ -20,8 +20,9 @@ from .unusable import UnusableError
 # Packages that are not the user's own.
 OTHERS = frozenset(
     {"ballplate", *sys.stdlib_module_names}
-    | {"distributed", "filelock", "joblib", "matplotlib", "numpy", "pandas", "pyarrow", "pydantic"}
-    | {"pydantic_core", "scipy", "threadpoolctl", "tqdm", "yaml", "dask", "tornado"}
+    | {"distributed", "filelock", "jinja2", "joblib", "matplotlib", "numpy", "pandas", "pyarrow"}
+    | {"pydantic", "pydantic_core", "scipy", "tabulate", "threadpoolctl", "tqdm", "yaml", "dask"}
+    | {"tornado"}
 )
 
 
@@ -98,7 +99,8 @@ def own_array(
         fault = "returns values that are not finite numbers"
     if fault:
         raise _failed(_definition(call), getattr(call, "__name__", ""), fault)
-    return np.asarray(result, float)
+    # A copy: the code may return the same array again.
+    return np.array(result, float)
 
 
 def _failed(where: str, name: str, text: str) -> OwnCodeError:

@@ -7,7 +7,6 @@ import json.decoder
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pytest
 from ballplate.results.checked_designs import check
 from ballplate.simulator.experiment.layout import lay_out
@@ -139,12 +138,13 @@ def test_an_installed_entry_point(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
         ),
         ('"rad", name', '"urad", name', 'the unit of "squareness xy" is "urad"'),
         ("name, span)", "name, 0.0)", "the effect of"),
-        ("a) + p", "a)", "error(x, 0, p) is not p"),
         ("a) + p", "a) + p * np.nan", "not finite numbers"),
         ("return result", "return result[:, :2]", "operands could not be broadcast"),
-        ("a) + p", "a)[:3] + p[:3]", "the shape (3, 3); return (7, 3)"),
-        ("a) + p", "a * (1 + 100 * a)) + p", "jacobian is not the derivative of error by"),
-        ("return result", "return result.astype(np.float32)", "no new array of floats"),
+        (
+            "a) + p",
+            "a)[:3] + p[:3]",
+            "in error, code of your own: returns the shape (3, 3); (7, 3) is needed",
+        ),
         ("np.eye(len(names)))", "np.eye(2))", "one row for each name"),
     ],
 )
@@ -203,14 +203,6 @@ def test_a_true_machine_of_a_users_own(tmp_path: Path) -> None:
         text.replace("5 urad}}", f"5 urad}}, {own.replace('build', 'buidl')}}}"), encoding="utf-8"
     )
     assert ": true_machine.error_model.object: " in refusal(file)
-
-
-def test_a_jacobian_is_compared_with_differences_of_full_rotations() -> None:
-    from ballplate.simulator.machines.arrangement import ARRANGEMENTS
-    from ballplate.simulator.machines.kinematic import kinematic_model
-
-    model = kinematic_model(ARRANGEMENTS["CX1"], 5, 5, (0, 0, 0), (1, 1, 1), True)
-    custom._checked("own", model, np.zeros(3), np.ones(3))
 
 
 def test_priors_about_a_model_of_ones_own(tmp_path: Path) -> None:

@@ -107,7 +107,6 @@ RECIPES = (
     "'sweep --export' trials.sqlite -o out.parquet --sweep 1",
     "'sweep --export' trials.sqlite -o -",
     "'sweep --report' sweep.sqlite -o out.html",
-    "'sweep --report' trials.sqlite --format csv",
     "'sweep --report' sweep.sqlite --format markdown",
     "'sweep --report' trials.sqlite --format latex",
     "'sweep --report' trials.sqlite --format text",
@@ -138,8 +137,6 @@ RECIPES = (
         " --straight 1 --straight 2 --knots none --compensated out.csv"
     ),
     "reproduce npl --designs npl --experiment 5.2 --quick",
-    "reproduce certified --designs certified --experiment weak --json",
-    "reproduce certified --designs certified --experiment weak --results results.json",
     "schema machine",
     "schema sweep",
     "'run --budget' small.yaml --by position",

@@ -20,9 +20,6 @@ from ballplate.extensions.studio.jobs import JOBS
 from ballplate.extensions.studio.session import Session
 from ballplate.simulator.inputs.yamltree import parse_tree, to_list, to_python
 
-from tests.extensions.sweeps.odd_stores import signed
-from tests.extensions.sweeps.stores import axis, done, made_up
-
 BASE = to_list(
     to_python(parse_tree(Path(shipped("quickstart.yaml")).read_text(), "quickstart.yaml"))
 )
@@ -244,30 +241,6 @@ def checked(folder: Path, sections: dict[str, Any], *options: str) -> None:
     )
 
 
-def reported(folder: Path, sections: dict[str, Any]) -> None:
-    """A page of a store that came from elsewhere, with all files of the folder in it."""
-    figures = {"U4_maximum_m": 2e-6, "U4_average_m": 1e-6, "U4_undetermined": 0.0}
-    store = made_up(
-        folder / "own.sqlite", "own", [axis("k", ["1 um"], [1e-6], "m")], [done(0, figures)]
-    )
-    sweep = (
-        "title: own\nbase: base.yaml\naxes:\n  k: {path: machine.repeatability, values: [1 um]}\n"
-    )
-    contents = {"made-up.yaml": sweep.encode(), "base.yaml": json.dumps(sections).encode()}
-    contents |= {
-        path.name: path.read_bytes() for path in folder.iterdir() if path.suffix == ".yaml"
-    }
-    rows = [(1, name, content) for name, content in contents.items()]
-    store.connection.executemany("INSERT INTO bundle (sweep, path, content) VALUES (?, ?, ?)", rows)
-    store.close()
-    signed(store.path)
-    assert main(["sweep", "--report", "own.sqlite", "-o", "own.html"]) == 0
-    page = (folder / "own.html").read_text(encoding="utf-8")
-    # Readings are for a fit, and nothing of them is read for a drawing.
-    refused = "modules are not allowed here" in page or "files are read from here" in page
-    assert refused != ("readings" in sections and "files" in sections["readings"])
-
-
 def looked_at(folder: Path, sections: dict[str, Any]) -> None:
     """A design that is chosen from the list of the studio, which was opened for another one."""
     (folder / "first.yaml").write_text(json.dumps(BASE))
@@ -288,16 +261,13 @@ DOORS: dict[str, Callable[[Path, dict[str, Any]], None]] = {
     "check": checked,
     "check --suggest": lambda folder, sections: checked(folder, sections, "--suggest"),
     "check --fix": lambda folder, sections: checked(folder, sections, "--fix"),
-    "report": reported,
     "studio": looked_at,
 }
 
 
 IN_PYTHON = [key for key in READ if re.search("[Pp]ython|module|folder", key)]
 # Repairs read the same files as the plain check, and the studio's user has chosen the file: it may read others.
-TRIED = [
-    (door, key) for door in DOORS for key in (READ if door in ("check", "report") else IN_PYTHON)
-]
+TRIED = [(door, key) for door in DOORS for key in (READ if door == "check" else IN_PYTHON)]
 
 
 @pytest.mark.parametrize(("door", "key"), TRIED)

@@ -49,11 +49,10 @@ MOST_CELLS = 1_000_000
 
 def load_sweep(
     path: str | os.PathLike[str],
-    base: Path | None = None,
     folders: tuple[Path, ...] = (),
     trust: Trust = OPENED,
 ) -> Sweep:
-    """Load a sweep file and the experiment file that it starts from, or `base` instead.
+    """Load a sweep file and the experiment file that it starts from.
 
     Files that it names must be below its folder, that of its base, or one of `folders`.
 
@@ -70,7 +69,7 @@ def load_sweep(
     settings = _settings(root, problems)
     if settings is None:
         raise ExperimentError(sorted(problems.messages))
-    base = source.parent / settings.base if base is None else base
+    base = source.parent / settings.base
     try:
         trees = _trees(base)
     except ExperimentError as error:
