@@ -220,8 +220,6 @@ PARSERS: Mapping[str, Callable[[object], float]] = {
     "rad": parse_angle,
     "1": parse_ratio,
 }
-parse_length_drift = partial(parse_quantity, kind="length per time")
-parse_ratio_drift = partial(parse_quantity, kind="ratio per time")
 parse_positive_length = partial(parse_quantity, kind="length", above_zero=True)
 parse_positive_angle = partial(parse_quantity, kind="angle", above_zero=True)
 parse_positive_temperature_difference = partial(
