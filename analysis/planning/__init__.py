@@ -18,10 +18,10 @@ if TYPE_CHECKING:
         checked_design,
     )
     from .choice import Selection
-    from .constraints import HOUR, Budget, Spent
-    from .criteria import DESCRIPTIONS
+    from .constraints import HOUR, Budget, Constraints, Spent
+    from .criteria import DESCRIPTIONS, criterion
     from .drift_times import in_time, without_drift
-    from .information import Information
+    from .information import Frames, pool_information
     from .orders import LEAST_CHANGE_OVER, ORDERS, OrderName, ReadingOrder, with_probes
     from .remaining_candidates import Offer, offer
     from .run_sheet_tables import price, sheet_data, sheet_lines, summary, times
@@ -34,6 +34,7 @@ if TYPE_CHECKING:
         place_words,
         run_sheet,
     )
+    from .search import Losses, SelectionProblem
     from .selection import Campaign
     from .set_ups import REST, SetUp, base_name, position_of, renamed
     from .short_names import names_of_plan

@@ -172,14 +172,7 @@ def _campaign(
     information = pool_information(
         steady, whole, is_about_balls(request.criterion), completed_by, report_earlier
     )
-    gap = None
-    gap_of = optional_service("pool_gap") if information.deficiency else None
-    if gap_of is not None:
-        gap = gap_of(steady, pool.candidates, information)
-    try:
-        wanted = criterion(information, experiment, request.criterion)
-    except ExperimentError as error:
-        raise error if gap is None else gap.refusing(error) from None
+    wanted = criterion(information, experiment, request.criterion)
     drawn_candidates = [
         offered.now(k) for k, candidate in enumerate(pool.candidates) if candidate.drawn
     ]
@@ -257,7 +250,6 @@ def _campaign(
         order=order,
         orders=orders,
         names=names,
-        gap=gap,
     )
 
 

@@ -9,7 +9,6 @@ from typing import Any, Protocol
 import numpy as np
 from ballplate.presentation.formatting import Data
 from ballplate.simulator.experiment.model import Candidate, Experiment, Pool
-from ballplate.simulator.inputs.messages import ExperimentError
 
 from ..results.prediction import Prediction
 from .constraints import Budget, Spent
@@ -28,20 +27,6 @@ class DriftInOrders(Protocol):
     def lines(self, campaign: Any) -> list[str]: ...
 
     def data(self) -> Data: ...
-
-
-class OpenPool(Protocol):
-    """Parameters that all candidates together leave undetermined, and a cure as text."""
-
-    @property
-    def words(self) -> str: ...
-
-    @property
-    def remedy(self) -> str: ...
-
-    def to_dict(self) -> Data: ...
-
-    def refusing(self, error: ExperimentError) -> ExperimentError: ...
 
 
 @dataclass(frozen=True)
@@ -81,8 +66,7 @@ class Selection:
     missing. `drawn` is the criterion of the experiment's own positions, or of an earlier choice,
     within the limits or not, described by `drawn_words`. `prediction` evaluates the full choice in
     this `order`. `orders` give the effect of drift in each order, if requested. `names` are short
-    names of composed positions. `gap` describes parameters that the whole pool leaves
-    undetermined.
+    names of composed positions.
     """
 
     experiment: Experiment
@@ -111,7 +95,6 @@ class Selection:
     order: ReadingOrder = LEAST_CHANGE_OVER
     orders: DriftInOrders | None = None
     names: Mapping[str, str] = field(default_factory=dict)
-    gap: OpenPool | None = None
 
     def title_of(self, candidate: Candidate) -> str:
         """The name of a candidate, after its short name if it has one."""

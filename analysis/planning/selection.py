@@ -146,8 +146,6 @@ class Campaign(Selection, Result):
                 f"left out of {self.criterion}: {self.excluded} that no choice from this pool"
                 " determines"
             )
-        if self.gap is not None:
-            lines += [self.gap.words, self.gap.remedy]
         lines += _interrupted(self)
         if self.gains:
             lines += ["", *_gain_table(self)]
@@ -171,7 +169,6 @@ class Campaign(Selection, Result):
             "interrupted": [picked(position, "name", "readings") for position in self.interrupted],
             "completed": self.completed and self.completed.whole.name,
             "left_open": self.left_open,
-            "whole_pool": self.gap and self.gap.to_dict(),
             "ignored": _names(self.ignored),
             "gains": list(map(_gain_data, self.gains)),
             "left_out": list(map(_gain_data, self.left_out)),

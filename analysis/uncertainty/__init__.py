@@ -20,6 +20,7 @@ if TYPE_CHECKING:
         lengths_with_offsets,
         scale_of,
         stretches,
+        with_offsets,
     )
     from .summaries import Quantity, point_pairs, summarise, uncertainties
     from .tasks import expansion

@@ -351,7 +351,7 @@ def test_repairs_leave_an_angle_alone(told: dict[str, Any]) -> None:
     assert "calibrate the corner" not in text and '"calibration[1]' not in text
     edits = [
         edit
-        for one in told["offered"]["repairs"]["partial"]
+        for one in told["offered"]["repairs"]
         for edit in one["edits"]
         if edit["path"] == "calibration"
     ]

@@ -207,9 +207,6 @@ def _rank(run: QuotedData, contents: DesignContents) -> Html:
             summary = "Directions without a picture" if pictures else "Directions"
             list_of_others = folded(summary, element("ol", *items), is_open=len(items) <= 20)
             parts.append(list_of_others)
-    if run.data["reasons"]:
-        reasons = (element("li", direction.text()) for direction in run.at("reasons").each())
-        parts += [element("h3", "Reasons"), element("ul", *reasons)]
     if not parts:
         return sentence("No direction is undetermined or weakly determined.")
     return joined(parts)

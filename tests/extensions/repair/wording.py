@@ -3,6 +3,7 @@
 ADD_OF_THE_POOL = 'add "turned" of the pool (1.5 h)'
 ADD_OF_THE_POOL_MIN = 'add "aside" of the pool (30 min)'
 A_COMMENT_HERE_WOULD = "a comment here would be lost"
+A_PLAN_CANNOT_WEIGH = "which a plan cannot weigh"
 A_NEW_PROBE = "a new probe too"
 CANNOT_BE_WRITTEN_AS_IT_WAS = "cannot be written in this form"
 ADD_CANDIDATES = "add candidates that determine them"
