@@ -578,16 +578,3 @@ def _amount(value: float, unit: str) -> str:
     if "e+" in text and abs(amount) < 1e6:
         text = f"{float(text):.0f}"
     return f"{text} {SHOWN[unit]}"
-
-
-def changed_names(direction: Direction) -> list[str]:
-    """Return errors that a direction changes, or else artefacts, lengths, probes and positions."""
-    if direction.functions:
-        return [part.name for part in direction.functions]
-    parts: tuple[ArtefactPart | LengthPart | PositionPart, ...] = (
-        *direction.artefacts,
-        *direction.lengths,
-        *direction.probes,
-        *direction.positions,
-    )
-    return [part.name for part in parts]

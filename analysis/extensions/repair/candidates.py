@@ -44,8 +44,9 @@ from .written import plane_of
 PLANES: tuple[Axis, ...] = ("x", "y", "z")
 AXES = "xyz"
 TURNS = {1: "one quarter-turn", 2: "half a turn", 3: "three quarter-turns"}
-# New positions: along the normal of their plane, in fractions of the volume; across it, in pitches.
-LEVELS, SHIFTS = (0.25, 0.75, 0.5), (0.0, 0.5)
+# New positions: along the normal of their plane, in fractions of the volume; across it, in pitches;
+# quarter-turns.
+LEVELS, SHIFTS, NEW_TURNS = (0.25, 0.75, 0.5), (0.0, 0.5), (0, 1)
 # Candidates of each kind: as many as plan's matrices have room for.
 MOST_OF_A_KIND = 250
 # Shifts below this, in metres, change nothing; others are to a tenth of a millimetre.
@@ -75,8 +76,8 @@ def _thinned(changes: list[Change]) -> list[Change]:
 
 
 def moves(experiment: Experiment) -> Iterator[Change]:
-    """Plates turned in their plane, shifted along an axis by half a pitch or one, or turned and
-    shifted as far as there is room.
+    """Plates turned in their plane, shifted along an axis by half a pitch, or turned and shifted as
+    far as there is room.
     """
     for place in experiment.positions:
         if not _is_plate(experiment, place.artefact):
@@ -85,9 +86,8 @@ def moves(experiment: Experiment) -> Iterator[Change]:
         plane = plane_of(place.pose.rotation)
         normal = -1 if plane is None or experiment.dimension == 2 else AXIS_INDEX[plane[0]]
         across = [axis for axis in range(experiment.dimension) if axis != normal]
-        shifts = [{axis: by * step} for axis in across for by in (0.5, -0.5, 1.0, -1.0)]
-        levels = [{normal: by * step} for by in (0.5, -0.5, 1.0, -1.0) if normal >= 0]
-        plain = [(0, shift) for shift in (*shifts, *levels)]
+        axes = across if normal < 0 else (*across, normal)
+        plain = [(0, {axis: by * step}) for axis in axes for by in (0.5, -0.5)]
         found: dict[tuple[float, ...], Change] = {}
         for turns, by_axis in (*plain, *_at_ends(experiment, place, across, normal)):
             shift = {axis: by for axis, by in by_axis.items() if abs(by) >= LEAST_SHIFT}
@@ -116,7 +116,9 @@ def _at_ends(
         room = np.stack([volume.lower - readings.min(axis=0), volume.upper - readings.max(axis=0)])
         # A part of a step is rounding.
         room = np.trunc(np.round(room / STEP, 3)) * STEP
-        for ends in product((None, 0, 1), repeat=len(across)):
+        yield turns, {}
+        # Turned ones in the corners alone, which keeps their number down.
+        for ends in product((0, 1) if turns else (None, 0, 1), repeat=len(across)):
             by_axis = zip(across, ends, strict=True)
             yield turns, {axis: room[end, axis] for axis, end in by_axis if end is not None}
         if not turns and normal >= 0:
@@ -253,7 +255,7 @@ def _plate_poses(experiment: Experiment, artefact: str) -> Iterator[tuple[str, A
     layout, d = experiment.layouts[artefact], experiment.dimension
     volume, step = experiment.machine.volume, pitch(layout)
     middle = middle_of(layout)[:d]
-    for shift, turns in product(SHIFTS, range(4)):
+    for shift, turns in product(SHIFTS, NEW_TURNS):
         for level, plane in product(LEVELS if d == 3 else (0.5,), PLANES if d == 3 else PLANES[2:]):
             rotation = plane_rotation(plane, turns, d)
             origin = 0.5 * (volume.lower + volume.upper) + np.round(shift * step, 4)

@@ -107,7 +107,9 @@ def repairs(experiment: Experiment, report: Report = unreported) -> Repairs:
     try:
         pool = change_pool(experiment, candidates(experiment))
     except ExperimentError as error:
-        return Repairs((), error.messages[0].text)
+        return Repairs((), f"no changes were searched for: {error.messages[0].text}")
+    if pool is None:
+        return Repairs((), NOTHING_FOUND)
     search = _Search(experiment, base, u6, target, pool)
     found: list[Repair] = []
     kinds: tuple[ChangeKind, ...] = ()

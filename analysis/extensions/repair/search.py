@@ -23,6 +23,7 @@ from ballplate.planning import (
 from ballplate.simulator.computing import comparable, eigh
 from ballplate.simulator.experiment import AtMost, Candidate, ChangeTimes, Experiment, Position
 from ballplate.simulator.geometry import even_grid
+from ballplate.simulator.inputs import ExperimentError
 from ballplate.simulator.machines import Array, Integers
 from ballplate.uncertainty import OFFSET_TRIAL, with_offsets
 
@@ -72,8 +73,8 @@ class ChangePool:
         return tuple(self.changes[k] for k in sorted(members))
 
 
-def change_pool(experiment: Experiment, changes: Sequence[Change]) -> ChangePool:
-    """Return the pool of changes of an experiment.
+def change_pool(experiment: Experiment, changes: Sequence[Change]) -> ChangePool | None:
+    """Return the pool of changes of an experiment, unless they determine no distance.
 
     :raises ExperimentError: a plan cannot weigh it.
     """
@@ -105,7 +106,10 @@ def change_pool(experiment: Experiment, changes: Sequence[Change]) -> ChangePool
         matrices=matrices,
         frames=_frames(whole.frames, count),
     )
-    wanted = criterion(information, steady, "U6")
+    try:
+        wanted = criterion(information, steady, "U6")
+    except ExperimentError:
+        return None
     # Only what excludes each other is limited.
     n = len(changes)
     none = np.zeros(n, np.int64)

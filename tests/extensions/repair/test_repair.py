@@ -359,6 +359,7 @@ def test_single_changes_are_those_of_a_complete_search(
     changes = candidates(experiment)[::3]
     every = everything(experiment, [one for one in changes if one.kind is kind], 1)
     pool = change_pool(experiment, changes)
+    assert pool is not None
 
     def is_sound(members: frozenset[int]) -> bool:
         verdict = check(changed(experiment, pool.of(members))).verdict
@@ -376,22 +377,24 @@ def test_single_changes_are_those_of_a_complete_search(
 
 
 def test_pairs_of_moves_are_those_of_a_complete_search(tmp_path: Path) -> None:
-    """Two dimensions, a target that one move does not meet."""
-    said = flat_metric() | {
-        "positions": [
-            {"name": name, "corner": {"x": f"{x} mm", "y": f"{y} mm"}}
-            for name, x, y in (("a", 100, 200), ("b", 120, 210), ("c", 150, 180))
-        ],
-        "evaluation": {"points": {"random": 20, "seed": 1}},
-    }
+    """With a target that one move does not meet."""
+    said = example()
+    said["artefacts"]["plate"]["balls"] = [3, 3]
+    said["evaluation"]["points"]["random"] = 20
+    said["error_model"] |= {"position_coefficients": 3, "rotation_coefficients": 3}
     experiment = loaded(said, tmp_path)
-    moves = [one for one in candidates(experiment) if one.kind is ChangeKind.MOVE]
+    moves = [one for one in candidates(experiment) if one.kind is ChangeKind.MOVE][::6]
     best = [min(u6 for _, u6, _ in everything(experiment, moves, size)) for size in (1, 2)]
     assert best[1] < 0.95 * best[0]
-    target = 0.5 * (best[0] + best[1])
-    said["target_uncertainty"] = f"{1e6 * target} um"
-    (first, *_) = repairs(loaded(said, tmp_path)).repairs
-    assert len(first.changes) == 2 and first.loosened == pytest.approx(best[1], rel=1e-6)
+    pool = change_pool(experiment, moves)
+    assert pool is not None
+    for limit, size in ((0.5 * sum(best), 2), (1.01 * best[0], 1)):
+        aimed = replace(pool, limit=limit)
+        losses = Losses(pool.problem)
+        members, is_enough = best_set(aimed, (ChangeKind.MOVE,), lambda members: True, losses)
+        assert is_enough and len(members) == size
+        found = loosened(changed(experiment, pool.of(members)))
+        assert found == pytest.approx(best[size - 1], rel=1e-6)
 
 
 @pytest.mark.parametrize("chosen", [(), (0,), (3, 40), (7, 90, 200), (250,)])
@@ -400,6 +403,7 @@ def test_information_of_changes_is_that_of_the_changed_design(chosen: tuple[int,
     experiment = load(Path("designs/quickstart.yaml"))[0]
     changes = candidates(experiment)[::2]
     pool = change_pool(experiment, changes)
+    assert pool is not None
     members = frozenset(k % len(changes) for k in chosen)
     after = changed(experiment, pool.of(members))
     assert Losses(pool.problem).of(members) == pytest.approx(loosened(after), rel=1e-6)
@@ -420,7 +424,7 @@ def test_moves_of_positions_replace_invented_distances(tmp_path: Path) -> None:
     experiment = loaded(example(), tmp_path)
     by_hand = example()
     by_hand["positions"][3]["quarter_turns"] = 1
-    by_hand["positions"][5]["corner"]["z"] = "0 mm"
+    by_hand["positions"][5]["corner"]["x"] = "0 mm"
     of_hand = loosened(loaded(by_hand, tmp_path))
     assert 1e6 * of_hand == pytest.approx(0.274, abs=0.001)
     found = repairs(experiment)
@@ -474,7 +478,7 @@ def test_weak_directions(variant: str, tmp_path: Path) -> None:
 
 
 def test_nothing_to_repair() -> None:
-    assert repairs(design("npl/6.1.1", "A")) == Repairs()
+    assert repairs(design("npl/6.1.1", "C")) == Repairs()
 
 
 @pytest.mark.parametrize(
@@ -487,7 +491,7 @@ def test_where_nothing_helps_nothing_is_proposed(file: str, variant: str) -> Non
 
 
 def test_what_a_plan_cannot_weigh_is_said(tmp_path: Path) -> None:
-    prior = {"parameter": "z low: origin x", "standard_uncertainty": "1 um"}
+    prior = {"parameter": "z high: origin x", "standard_uncertainty": "1 um"}
     experiment = loaded(one_plane() | {"priors": [prior]}, tmp_path)
     (line,) = repairs(experiment).lines()
     assert wording.A_PLAN_CANNOT_WEIGH in line
@@ -537,16 +541,17 @@ def pool_of(
 
 
 def test_the_cheapest_of_a_pool_within_its_limits() -> None:
-    """What costs nothing comes before what the pool has a price for."""
-    experiment = design("npl/6.1.1", "B")
-    for limits, words in (
-        ((), wording.ADD_OF_THE_POOL_MIN),
-        ((AtMost((4, 6), 0),), wording.ADD_OF_THE_POOL),
-    ):
-        pool = pool_of(experiment, [60.0, 5400.0, 1800.0], limits)
-        moved, read, *_ = repairs(replace(experiment, pool=pool)).repairs
+    """What costs nothing comes before what the pool has a price for, and without a target that
+    before what takes longer.
+    """
+    experiment = replace(design("npl/6.1.1", "B"), target_uncertainty=None)
+    for limits, is_offered in (((), True), ((AtMost((4, 6), 0),), False)):
+        pool = pool_of(experiment, [60.0, 5400.0, 600.0], limits)
+        moved, read = repairs(replace(experiment, pool=pool)).repairs
         assert [one.kind for one in moved.changes] == [ChangeKind.MOVE]
-        assert [one.words for one in read.changes] == [words]
+        (change,) = read.changes
+        assert (change.words == wording.ADD_OF_THE_POOL) == is_offered
+        assert read.seconds == (600.0 if is_offered else 855.0)
 
 
 def test_other_additions_than_the_pools_are_not_offered() -> None:
