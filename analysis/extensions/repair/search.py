@@ -18,7 +18,6 @@ from ballplate.planning import (
     SelectionProblem,
     criterion,
     pool_information,
-    without_drift,
 )
 from ballplate.simulator.computing import comparable, eigh
 from ballplate.simulator.experiment import AtMost, Candidate, ChangeTimes, Experiment, Position
@@ -80,11 +79,11 @@ def change_pool(experiment: Experiment, changes: Sequence[Change]) -> ChangePool
     """
     tips = {change.probe.name: change.probe for change in changes if change.probe is not None}
     # All offsets are as uncertain as those that a repair is judged with.
-    steady = without_drift(
-        with_offsets(replace(experiment, probes={**experiment.probes, **tips}), OFFSET_TRIAL)
-    )
+    loose = with_offsets(replace(experiment, probes={**experiment.probes, **tips}), OFFSET_TRIAL)
+    # Drift depends on the order of readings, which changes do not state.
+    influences = tuple(some for some in experiment.influences if not some.in_order)
     evaluation = replace(experiment.evaluation, points=_points(experiment))
-    steady = replace(steady, evaluation=evaluation)
+    steady = replace(loose, influences=influences, evaluation=evaluation)
 
     own = [Candidate(place.name, place, 0.0, "", "", True, {}) for place in experiment.positions]
     offered = []
