@@ -259,7 +259,7 @@ def test_suggestions_in_every_format(
     before = json.loads(capsys.readouterr().out)
     assert run("check", "--json", "--suggest", *chosen) == 1
     bad, good = json.loads(capsys.readouterr().out)
-    assert good.pop("repairs") == []
+    assert good.pop("repairs") is None
     suggested = bad.pop("repairs")
     assert [bad, good] == before
     assert [one["rank_deficiency"] for one in suggested] == [0, 0]

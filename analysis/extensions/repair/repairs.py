@@ -141,5 +141,6 @@ class Repairs:
         return lines
 
     def data(self) -> Data:
-        """Return repairs as plain data in metres at full precision."""
-        return {"repairs": [repair.to_dict() for repair in self.repairs]}
+        """Return repairs as plain data in metres at full precision, if any are needed."""
+        is_needed = bool(self.repairs or self.reason)
+        return {"repairs": [each.to_dict() for each in self.repairs] if is_needed else None}
