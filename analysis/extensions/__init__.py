@@ -53,10 +53,8 @@ SHIPPED = (
         "repair",
         functions=_from("interface", "repair"),
         services={
-            **_from("suggestions", "suggested"),
+            **_from("repair_search", "suggested"),
             **_from("mending_command", "with_repairs"),
-            **_from("missing_bars", "bar_reasons"),
-            **_from("whole_pool", "pool_gap"),
         },
     ),
     _here(
@@ -83,7 +81,7 @@ SHIPPED = (
         },
         functions=_from("interface", "sheet"),
         services={
-            **_from("campaign_picture", "draw_campaign"),
+            **_from("campaign_picture", "draw_curve"),
             **_from("sheet", "Sheet"),
             **_from("earlier", "begun"),
         },
