@@ -24,8 +24,8 @@ from ballplate.simulator.inputs.quantities import (
     Duration,
     Expansion,
     Length,
-    LengthFunction,
     Ratio,
+    TargetFunction,
     TemperatureDifference,
 )
 from pydantic import TypeAdapter
@@ -45,7 +45,7 @@ QUANTITIES = {
         (Expansion, "thermal expansion"),
         (Bending, "angle per length"),
         (Duration, "duration"),
-        (LengthFunction, "length, or one that grows as `A + L/K`"),
+        (TargetFunction, "length, or one that grows as `A + L/K`"),
     )
 }
 
