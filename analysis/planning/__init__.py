@@ -17,7 +17,7 @@ if TYPE_CHECKING:
         check_files,
         checked_design,
     )
-    from .constraints import HOUR, Budget, Spent
+    from .constraints import HOUR, Budget
     from .criteria import DESCRIPTIONS
     from .information import Information
     from .remaining_candidates import Offer, offer

@@ -63,13 +63,11 @@ if TYPE_CHECKING:
         parse_angle,
         parse_duration,
         parse_length,
-        parse_length_drift,
         parse_length_function,
         parse_positive_angle,
         parse_positive_length,
         parse_positive_temperature_difference,
         parse_ratio,
-        parse_ratio_drift,
         plain_unit,
         typed_length,
     )
