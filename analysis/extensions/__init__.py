@@ -53,10 +53,8 @@ SHIPPED = (
         "repair",
         functions=_from("interface", "repair"),
         services={
-            **_from("suggestions", "suggested"),
+            **_from("repair_search", "suggested"),
             **_from("mending_command", "with_repairs"),
-            **_from("missing_bars", "bar_reasons"),
-            **_from("whole_pool", "pool_gap"),
         },
     ),
     _here(

@@ -17,12 +17,13 @@ if TYPE_CHECKING:
         check_files,
         checked_design,
     )
-    from .constraints import HOUR, Budget
-    from .criteria import DESCRIPTIONS
-    from .information import Information
+    from .constraints import HOUR, Budget, Constraints
+    from .criteria import DESCRIPTIONS, criterion
+    from .information import Frames, pool_information
     from .remaining_candidates import Offer, offer
     from .run_sheet_tables import price, sheet_data, sheet_lines, summary, times
     from .schedule import RunSheet, Step, run_sheet, steps_of
+    from .search import Losses, SelectionProblem
     from .selection import Campaign
     from .set_ups import REST, SetUp, base_name, position_of, renamed
     from .short_names import names_of_plan

@@ -46,7 +46,6 @@ from ballplate.simulator.computing.steps import (
 from ballplate.simulator.computing.threads import single_threaded
 from ballplate.simulator.experiment.model import AtMost, Candidate, Experiment, Pool, Position
 from ballplate.simulator.experiment.pool import with_chosen
-from ballplate.simulator.inputs.extensions import optional_service
 from ballplate.simulator.inputs.messages import ExperimentError, refused
 from ballplate.simulator.inputs.settings import listing
 
@@ -165,14 +164,7 @@ def _campaign(
     information = pool_information(
         steady, whole, is_about_balls(request.criterion), completed_by, report
     )
-    gap = None
-    gap_of = optional_service("pool_gap") if information.deficiency else None
-    if gap_of is not None:
-        gap = gap_of(steady, pool.candidates, information)
-    try:
-        wanted = criterion(information, experiment, request.criterion)
-    except ExperimentError as error:
-        raise error if gap is None else gap.refusing(error) from None
+    wanted = criterion(information, experiment, request.criterion)
     drawn_candidates = [
         offered.now(k) for k, candidate in enumerate(pool.candidates) if candidate.drawn
     ]
@@ -247,7 +239,6 @@ def _campaign(
         completed,
         interrupted,
         left_open,
-        gap=gap,
     )
 
 

@@ -6,13 +6,12 @@ import math
 from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any
 
 from ballplate.presentation.formatting import Data
 from ballplate.simulator.experiment.model import Candidate, Experiment, Pool
 from ballplate.simulator.experiment.pool import with_chosen
 from ballplate.simulator.inputs.extensions import service
-from ballplate.simulator.inputs.messages import ExperimentError
 from ballplate.simulator.inputs.settings import number_of
 
 from ..presentation.formatting import aligned, number, picked
@@ -32,20 +31,6 @@ if TYPE_CHECKING:
 
 # Candidates left out, and reasons for leaving candidates out of the pool, that are told.
 TOLD = 5
-
-
-class OpenPool(Protocol):
-    """Parameters that all candidates together leave undetermined, and a cure as text."""
-
-    @property
-    def words(self) -> str: ...
-
-    @property
-    def remedy(self) -> str: ...
-
-    def to_dict(self) -> Data: ...
-
-    def refusing(self, error: ExperimentError) -> ExperimentError: ...
 
 
 @dataclass(frozen=True)
@@ -84,7 +69,7 @@ class Campaign(Result):
     infinite if the selection is deficient; `bound` is the lower bound of all selections, NaN if
     missing. `drawn` is the criterion of the experiment's own positions, or of an earlier choice,
     within the limits or not, described by `drawn_words`. `prediction` evaluates the full choice in
-    the order of the `sheet`. `gap` describes parameters that the whole pool leaves undetermined.
+    the order of the `sheet`.
     """
 
     experiment: Experiment
@@ -111,7 +96,6 @@ class Campaign(Result):
     interrupted: tuple[Candidate, ...] = ()
     left_open: int = 0
     ignored: tuple[Candidate, ...] = ()
-    gap: OpenPool | None = None
 
     @property
     def label(self) -> str:
@@ -220,8 +204,6 @@ class Campaign(Result):
                 f"left out of {self.criterion}: {self.excluded} that no choice from this pool"
                 " determines"
             )
-        if self.gap is not None:
-            lines += [self.gap.words, self.gap.remedy]
         if any(influence.in_order for influence in self.experiment.influences):
             lines.append("positions were chosen without drift; U1 to U6 are those with the drift")
         lines += _interrupted(self)
@@ -245,7 +227,6 @@ class Campaign(Result):
             "interrupted": [picked(position, "name", "readings") for position in self.interrupted],
             "completed": self.completed and self.completed.whole.name,
             "left_open": self.left_open,
-            "whole_pool": self.gap and self.gap.to_dict(),
             "ignored": _names(self.ignored),
             "gains": list(map(_gain_data, self.gains)),
             "left_out": list(map(_gain_data, self.left_out)),

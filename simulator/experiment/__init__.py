@@ -15,7 +15,16 @@ if TYPE_CHECKING:
     from .loading import build, load, trees_of, with_pool
     from .machine_file import load_machine
     from .map_files import is_map_file, read_map, write_map
-    from .model import Candidate, ChangeTimes, Experiment, Pool, Position, Probe, ReadingGroup
+    from .model import (
+        AtMost,
+        Candidate,
+        ChangeTimes,
+        Experiment,
+        Pool,
+        Position,
+        Probe,
+        ReadingGroup,
+    )
     from .model_files import absolute
     from .modules import python_models, runs_code
     from .name_rules import PLACE, check_rule

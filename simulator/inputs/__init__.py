@@ -44,6 +44,7 @@ if TYPE_CHECKING:
         DURATION_UNITS,
         KINDS,
         LENGTH_UNITS,
+        PARSERS,
         QUANTITY,
         SMALLEST,
         CommonPart,

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import ballplate as bp
 import pytest
-from ballplate.extensions.repair import repair_tables
+from ballplate.extensions.reliability import wording
 from ballplate.simulator.design.observations import calibration, radius
 
 from tests.mutation.forks import change, in_fork, probed
@@ -89,10 +89,10 @@ def test_a_change_is_made_in_a_fork_only() -> None:
 
     def changed() -> str:
         change(of_last)
-        return repair_tables.listed(["a", "b"])
+        return wording.listed(["a", "b"])
 
     assert in_fork(changed, 60.0) == "a"
-    assert repair_tables.listed(["a", "b"]) == "a and b"
+    assert wording.listed(["a", "b"]) == "a and b"
     assert in_fork(lambda: 1 / 0, 60.0) is None
 
 

@@ -62,7 +62,6 @@ def summary(experiment: Experiment, moving: bool = False) -> dict[str, Any]:
             "expected": expected,
             "parameters": design.parameter_count,
             "observations": design.observation_count,
-            "reasons": [] if judged is None else judged.reasons,
             "directions": [] if judged is None else _directions(judged),
         },
         "quantities": rows(quantities),
