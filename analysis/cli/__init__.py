@@ -463,7 +463,6 @@ if TYPE_CHECKING:
         write_noted,
         write_picture,
     )
-    from .excerpts import print_errors
     from .notes import complain, note, warn
     from .outputs import (
         PARQUET,

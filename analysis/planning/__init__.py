@@ -17,7 +17,7 @@ if TYPE_CHECKING:
         check_files,
         checked_design,
     )
-    from .constraints import HOUR, Budget, Constraints, Spent
+    from .constraints import HOUR, Budget, Constraints
     from .criteria import DESCRIPTIONS, criterion
     from .information import Frames, pool_information
     from .remaining_candidates import Offer, offer

@@ -30,14 +30,12 @@ if TYPE_CHECKING:
         uncertainty_words,
     )
     from .paper import escaped, on_paper
-    from .pictures import draw_box, draw_scene
+    from .pictures import draw_box
     from .result import FitResult, Result
     from .scenes import (
         MOST_BALLS,
         RISE,
         TURN,
-        Box,
-        DrawnPosition,
         box,
         box_edges,
         hull,

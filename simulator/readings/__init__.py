@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     from .fingerprints import position_fingerprints
     from .generate import NoReadingError, exact_readings, scale_readings, true_readings
     from .given_points import ensure_points, probe_places
-    from .joining import joined, reading_keys
+    from .joining import joined
     from .observed_readings import ObservedReadings, observe
     from .reading_files import AXES, read_readings
     from .reading_sources import (
