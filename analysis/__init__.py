@@ -50,7 +50,7 @@ if TYPE_CHECKING:
         lengths,
         map,
     )
-    from ballplate.extensions.pages.interface import page, view
+    from ballplate.extensions.pages.interface import page
     from ballplate.extensions.reliability.interface import reliability
     from ballplate.extensions.repair.interface import repair
     from ballplate.extensions.reproduction.interface import reproduce
@@ -171,7 +171,6 @@ __all__ = [
     "sweep",
     "sweep_report",
     "validate",
-    "view",
     "write_file",
     "write_map",
 ]

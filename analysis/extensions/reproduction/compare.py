@@ -288,7 +288,9 @@ def compare_difference(
     estimated = compare_estimators(experiment, trials, across_probes=True, report=report)
     case, limit = case_of(difference.design), document.limits.median
     compared = [
-        Comparison("", "not converged", case, "", math.nan, float(estimated.failed), (0.0, 0.0))
+        Comparison(
+            "", "not converged", case, "", math.nan, float(len(estimated.failed)), (0.0, 0.0)
+        )
     ]
     for name, published, values in (
         ("rms", difference.rms, np.array(estimated.rms)),

@@ -11,12 +11,6 @@ from typing import Any
 import numpy as np
 from ballplate.extensions.maps.length_map import length_map, length_settings
 from ballplate.extensions.pages.level_maps import MISSED
-from ballplate.extensions.pages.motions import (
-    moved_balls,
-    moved_points,
-    null_motions,
-    weak_motions,
-)
 from ballplate.extensions.pages.page_facts import target_in_words
 from ballplate.extensions.repair.written import plane_of
 from ballplate.extensions.sweeps.error_map_uncertainty import LEVELS, in_slices, point_map
@@ -30,6 +24,8 @@ from ballplate.simulator.experiment import Experiment, Position, lay_out
 from ballplate.simulator.geometry import ball_coordinates, even_grid, without_rigid_motion
 from ballplate.simulator.inputs import Target
 from ballplate.uncertainty import Quantity, uncertainties
+
+from .motions import moved_balls, moved_points, null_motions, weak_motions
 
 # Nodes of the lattice along each axis: edges of it that bend are drawn as curves.
 NODES = 9
