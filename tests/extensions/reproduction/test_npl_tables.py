@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from ballplate.extensions.reproduction.compare import (
-    Comparison,
+    ComparedValue,
     compare_column,
     compare_erratum,
     compare_remark,
@@ -27,7 +27,7 @@ def shipped() -> Shipped:
     return Shipped(Path("designs/npl"))
 
 
-def figures_of(shipped: Shipped, column: PublishedColumn) -> dict[str, Comparison]:
+def figures_of(shipped: Shipped, column: PublishedColumn) -> dict[str, ComparedValue]:
     """Values of a column by their symbols, and its common factor as "factor"."""
     found = compare_column(npl(), shipped, column)
     return {re.split("[ ,]", row.quantity)[0]: row for row in found}
