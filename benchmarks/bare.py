@@ -24,8 +24,7 @@ def bare_batch(shared: Reference, seed: int, batch: int) -> tuple[Real, Real]:
     design, factor, start = shared.design, shared.factor, shared.start
     layout, n = factor.layout, len(design.balls.places)
     generator = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(batch,)))
-    noise = generator.standard_normal((BATCH, *shared.noise.shape), np.float32)
-    noise *= shared.noise.astype(np.float32)
+    noise = shared.noise * generator.standard_normal((BATCH, *shared.noise.shape))
     given = design.of(CalibratedDistances)
     errors = given.uncertainty * generator.standard_normal((BATCH, len(given)))
     real = shared.truth.state.balls
@@ -48,7 +47,7 @@ def bare_batch(shared: Reference, seed: int, batch: int) -> tuple[Real, Real]:
                     residual[:, i] += np.einsum("am,bam->bm", model.by_place[i], moved)
                     continue
                 residual[:, i] += a[:, model.columns[i]] @ model.by_parameters[i]
-                slopes = a[:, model.mixed_columns[i]].astype(np.float32) @ model.mixed[i]
+                slopes = a[:, model.mixed_columns[i]] @ model.mixed[i]
                 slopes = slopes.reshape(moved.shape) + model.by_place[i]
                 residual[:, i] += np.einsum("bam,bam->bm", slopes, moved)
             if number:
@@ -72,7 +71,7 @@ def bare_batch(shared: Reference, seed: int, batch: int) -> tuple[Real, Real]:
             for i in range(3):
                 gathered[:, model.columns[i]] += residual[:, i] @ model.by_parameters[i].T
                 if number:
-                    both = (moved * residual[:, i, None].astype(np.float32)).reshape(BATCH, -1)
+                    both = (moved * residual[:, i, None]).reshape(BATCH, -1)
                     gathered[:, model.mixed_columns[i]] += both @ model.mixed[i].T
         difference = base + balls[:, :, given.first] - balls[:, :, given.second]
         length = np.sqrt((difference**2).sum(axis=1))

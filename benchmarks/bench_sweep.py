@@ -68,7 +68,7 @@ def test_a_large_store(tmp_path: Path) -> None:
     row = compute(sweep, CellTask(0))
     begun = time.perf_counter()
     store = open_store(tmp_path / "large.sqlite", create=True)
-    number = add_sweep(store, definition(sweep, bundle_of(sweep)), ())
+    number = add_sweep(store, definition(sweep, bundle_of(sweep)))
     add_rows(
         store,
         number,

@@ -54,7 +54,7 @@ def _pages(folder: Path) -> dict[str, Path]:
     texts = {
         "design-page": page_of_design(experiment, bp.run(experiment)),
         "fit-page": fit.page(),
-        "sweep-page": bp.sweep_report(store),
+        "sweep-page": bp.page(bp.stored(store)),
     }
     found = {}
     for name, text in texts.items():

@@ -85,7 +85,6 @@ SHIPPED = (
         services={
             **_from("campaign_picture", "draw_campaign"),
             **_from("sheet", "Sheet"),
-            **_from("drift_orders", "DriftOrders"),
             **_from("earlier", "begun"),
         },
     ),
@@ -213,12 +212,12 @@ SHIPPED = (
                 "plan",
             ),
             "sweep --report": Command(
-                "report_command", "results of a store as an HTML page, or its tables"
+                "report_command", "results of a store as an HTML page, or a table"
             ),
             "sweep --export": Command("export_command", "results of a store as CSV or Parquet"),
         },
         functions={
-            **_from("interface", "stored", "sweep", "sweep_report"),
+            **_from("interface", "stored", "sweep"),
             **_from("running", "OtherSweepError"),
             **_from("store_file", "StoreError"),
         },

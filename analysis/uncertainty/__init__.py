@@ -21,7 +21,7 @@ if TYPE_CHECKING:
         scale_of,
         stretches,
     )
-    from .summaries import Quantity, point_pairs, summarise, uncertainties
+    from .summaries import Quantity, summarise, uncertainties
     from .tasks import expansion
 
 __getattr__, __dir__ = lazily(__name__, __file__)

@@ -17,7 +17,6 @@ from ballplate.extensions.sweeps.sweep_schema import schema as sweep_schema
 from ballplate.simulator.experiment.json_schema import schema
 from ballplate.simulator.experiment.machine_sections import machine_schema
 from ballplate.simulator.experiment.map_sections import map_schema
-from ballplate.simulator.inputs.moved import MOVED
 from ballplate.simulator.inputs.quantities import (
     UNITS,
     Angle,
@@ -221,12 +220,6 @@ def commands() -> str:
     return "\n".join(lines)
 
 
-def moved() -> str:
-    """What moved, as Markdown."""
-    rows = [f"| `{old}` | `{new}` |" for old, new in MOVED.items()]
-    return "\n".join(["| before | now |", "|---|---|", *rows])
-
-
 def _usage(parser: argparse.ArgumentParser) -> list[str]:
     parser.formatter_class = lambda prog: argparse.HelpFormatter(prog, width=90)
     # From Python 3.14 on help has colours on a terminal, where this may well run.
@@ -254,7 +247,6 @@ PARTS = {
     "<!-- map format -->": map_format,
     "<!-- units -->": units,
     "<!-- commands -->": commands,
-    "<!-- moved -->": moved,
 }
 
 

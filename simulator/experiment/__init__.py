@@ -10,7 +10,6 @@ from ballplate.simulator.inputs.faces import lazily
 if TYPE_CHECKING:
     from .changes import node_of
     from .error_tables import parse_line, parse_point
-    from .exact_values import exact_contradictions
     from .json_schema import DRAFT, schema, tidied
     from .layout import lay_out
     from .loading import build, load, trees_of, with_pool
@@ -47,7 +46,6 @@ if TYPE_CHECKING:
         override,
         place_of,
         variant_trees,
-        with_present_keys,
     )
 
 __getattr__, __dir__ = lazily(__name__, __file__)

@@ -19,49 +19,7 @@ MOST_VARIANTS = 1000
 # Balls, balls read, calibrated values, priors and evaluation points of all variants of a file,
 # which are loaded together.
 MOST_OF_ALL = 2_000_000
-# Keys of earlier versions: files and paths that have them mean the key of today.
-ALIASES = {"target_accuracy": "target_uncertainty"}  # earlier name first
 STEP = re.compile(r"(?:(?:^|\.)([^.\[\]]+)|\[([^\]]*)\])")
-
-
-def with_present_keys(node: Node, above: tuple[str, ...] = ()) -> Node:
-    """Return the same experiment with the present keys; a key that occurs with its earlier name
-    stays, so that the earlier one is refused as unknown.
-
-    `above` are the steps that lead to the node. Names chosen by the author, such as a probe's,
-    stay.
-    """
-    if isinstance(node, Sequence):
-        # The only list of entries that have such a key.
-        if above != ("evaluation", "tasks"):
-            return node
-        items = tuple(with_present_keys(item, (*above, "")) for item in node.items)
-        changed = any(new is not old for new, old in zip(items, node.items, strict=True))
-        return replace(node, items=items) if changed else node
-    if isinstance(node, Scalar) or not _leads_to_aliases(above):
-        return node
-    keys = {key: _present(key, node) if _has_aliases(above) else key for key in node.items}
-    below = {
-        keys[key]: with_present_keys(item, (*above, keys[key])) for key, item in node.items.items()
-    }
-    if all(below.get(key) is item for key, item in node.items.items()):
-        return node
-    marks = {keys[key]: mark for key, mark in node.key_marks.items()}
-    return replace(node, items=below, key_marks=marks)
-
-
-def _has_aliases(above: AnySequence[str]) -> bool:
-    """True if the keys below some steps have earlier names."""
-    return not above or len(above) == 3 and tuple(above[:2]) == ("evaluation", "tasks")
-
-
-def _leads_to_aliases(above: tuple[str, ...]) -> bool:
-    return _has_aliases(above) or above in (("evaluation",), ("evaluation", "tasks"))
-
-
-def _present(key: str, node: Mapping) -> str:
-    present = ALIASES.get(key, key)
-    return key if present in node.items else present
 
 
 def variant_trees(root: Node, problems: Problems) -> dict[str, Node]:
@@ -145,7 +103,7 @@ def override(root: Node, path: str, value: Node, mark: Mark) -> Node:
         raise ValueError(
             f'"{steps[0]}" cannot be replaced in a variant; {hint(steps[0], section_names)}'
         )
-    return _replaced(root, steps, with_present_keys(value, tuple(steps)), mark, ())
+    return _replaced(root, steps, value, mark, ())
 
 
 def removed(root: Node, path: str) -> Node:
@@ -175,7 +133,7 @@ def _less(node: Node, steps: list[str], above: tuple[str, ...]) -> Node:
 
 
 def steps_of(path: str) -> list[str]:
-    """Steps of a path, with the keys of today.
+    """Steps of a path.
 
     :raises ValueError: the path is malformed.
     """
@@ -184,9 +142,7 @@ def steps_of(path: str) -> list[str]:
         raise ValueError(
             f'"{path}" is not a path; write for example positions[1].level or artefacts.plate.size'
         )
-    return [
-        ALIASES.get(step, step) if _has_aliases(steps[:i]) else step for i, step in enumerate(steps)
-    ]
+    return steps
 
 
 def place_of(root: Node, path: str) -> tuple[str, ...]:

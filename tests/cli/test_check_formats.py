@@ -373,6 +373,10 @@ def test_the_action_checks(tmp_path: Path) -> None:
     assert len(lines) > 1 and all(
         line.startswith("::error file=designs/one.yaml,line=1,") for line in lines[:-1]
     )
+    # Another word than true and false is refused, not taken for false.
+    for name in ("FAIL_WEAK", "MODULES"):
+        found = shell(check["run"], tmp_path, FILES="designs/more/of them.yaml", **{name: "yes"})
+        assert found.returncode == 2 and "is true or false, not yes" in found.stdout
     # A pattern that nothing matches is no success, and what an input contains is never run.
     found = shell(check["run"], tmp_path, FILES="nothing/*.yaml\n$(touch intruder)")
     assert found.returncode == 3 and "nothing/*.yaml" in found.stdout

@@ -95,7 +95,6 @@ MONOMIALS_APPLIES_TO_ESTIMATOR_FULL = (
 )
 MONTE_CARLO_DATA_SETS = "Monte Carlo: 10 data sets of the true machine"
 MONTE_CARLO_DATA_SETS_OF_THE_TRUE = "Monte Carlo: 100 data sets of the true machine, seed 1"
-NO_FILE_WAS_WRITTEN = "no file was written"
 NO_LENGTH_IS_KNOWN = (
     "reason: no length is known (gauge: radius): the overall scale of the machine is undetermined"
 )
@@ -130,7 +129,6 @@ STANDARD_OUTPUT_CANNOT_BE_WRITTEN = "standard output: cannot be written"
 STANDARD_OUTPUT_CANNOT_BE_WRITTEN_NO_SPACE = (
     "standard output: cannot be written (No space left on device); give it room"
 )
-STARTS_OF_THE_SEARCH = "0/25 starts of the search"
 SWAP_THE_NAMES_OF_THE_BALLS = "swap the names of the balls in lines 60 and 71"
 SWAP_THE_NAMES_OF_THE_BALLS_IN_LINES = "swap the names of the balls in lines 5 and 9"
 THE_DESIGN_LEAVES_ERRORS_UNDETERMINED = "the design leaves errors undetermined"

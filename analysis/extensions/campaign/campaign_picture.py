@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
-from ballplate.planning import DESCRIPTIONS, HOUR, Budget, Selection, Spent
+from ballplate.planning import DESCRIPTIONS, HOUR, Budget, Campaign, Spent
 from ballplate.presentation import (
     DASHES,
     INK,
@@ -42,7 +42,7 @@ CHOSEN, BOUND, TARGET = "chosen", "bound of any choice", "target"
 WIDE, FAR = 5.0, 4.0
 
 
-def draw_campaign(selection: Selection, path: str | Path | None = None) -> Figure:
+def draw_campaign(selection: Campaign, path: str | Path | None = None) -> Figure:
     """Draw the criterion against the limit, and the chosen positions; save to the path, if any.
 
     :raises ImportError: matplotlib is missing.
@@ -71,7 +71,7 @@ def draw_campaign(selection: Selection, path: str | Path | None = None) -> Figur
         return save(figure, path, words(selection))
 
 
-def words(selection: Selection) -> str:
+def words(selection: Campaign) -> str:
     """The picture for those who do not see it."""
     caption = [
         f"{selection.criterion}, at most {selection.budget}: chosen"
@@ -87,7 +87,7 @@ def words(selection: Selection) -> str:
     return f"{', '.join(caption)}; {len(selection.chosen)} chosen of {offered} candidates"
 
 
-def _value_text(selection: Selection, value: float) -> str:
+def _value_text(selection: Campaign, value: float) -> str:
     if math.isinf(value):
         return "deficient"
     return number(value, 3) if selection.unit == "1" else f"{number(1e6 * value, 3)} µm"
@@ -132,11 +132,11 @@ class _Mark:
         return number(self.value, 3) if math.isfinite(self.value) else "deficient"
 
 
-def _factor(selection: Selection) -> float:
+def _factor(selection: Campaign) -> float:
     return 1.0 if selection.unit == "1" else 1e6
 
 
-def _marks(selection: Selection) -> list[_Mark]:
+def _marks(selection: Campaign) -> list[_Mark]:
     """Return the choice and the values for its comparison."""
     marks = [_Mark(CHOSEN, selection.value, SERIES[0], MARKERS[0])]
     if not math.isnan(selection.bound):
@@ -149,7 +149,7 @@ def _marks(selection: Selection) -> list[_Mark]:
 
 
 # In one piece: layers of one drawing, from the back to the front.
-def _curve(axes: Axes, selection: Selection, marks: Sequence[_Mark]) -> None:
+def _curve(axes: Axes, selection: Campaign, marks: Sequence[_Mark]) -> None:
     """Draw the criterion against the limit: choices, their bounds, current design, target."""
     from matplotlib.ticker import MaxNLocator
 

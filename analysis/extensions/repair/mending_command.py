@@ -100,13 +100,10 @@ def _write(path: Path, mark: str, text: str, new: str, options: Namespace) -> in
 
     :raises ExperimentError: the text has changed, or the file cannot be written.
     """
-    with options.interruption.held():
-        check_overwritten(path)
+    check_overwritten(path)
     if _text(path) != (mark, text):
         changed = "the file has changed meanwhile and is not overwritten; start again"
         raise refused(path, changed)
     content = (mark + new).encode()
-    is_written = write_outputs(
-        {path: lambda place: place.write_bytes(content)}, True, options.interruption.held
-    )
+    is_written = write_outputs({path: lambda place: place.write_bytes(content)}, True)
     return 0 if is_written else BAD_FILE

@@ -13,7 +13,6 @@ from ballplate.extensions.maps.length_map import length_map, length_settings
 from ballplate.extensions.pages.level_maps import MISSED
 from ballplate.extensions.pages.page_facts import target_in_words
 from ballplate.extensions.repair.written import plane_of
-from ballplate.extensions.sweeps.error_map_uncertainty import LEVELS, in_slices, point_map
 from ballplate.planning import run_sheet
 from ballplate.presentation import Data, percent, picked, uncertainty_words
 from ballplate.rank import Verdict, verdict
@@ -25,6 +24,7 @@ from ballplate.simulator.geometry import ball_coordinates, even_grid, without_ri
 from ballplate.simulator.inputs import Target
 from ballplate.uncertainty import Quantity, uncertainties
 
+from .level_slices import LEVELS, in_slices, point_map
 from .motions import moved_balls, moved_points, null_motions, weak_motions
 
 # Nodes of the lattice along each axis: edges of it that bend are drawn as curves.
@@ -215,15 +215,14 @@ def _length_map(experiment: Experiment, linearisation: Linearisation) -> Data:
         "bounds": MISSED,
         "largest": float(np.nanmax(ratios, initial=0.0)),
     }
-    mapped = in_slices(linearisation.design, of_levels)
-    return {**picked(mapped, "x", "y", "slices"), "scale": scale}
+    return {**in_slices(linearisation.design, of_levels), "scale": scale}
 
 
 def _point_map(experiment: Experiment, linearisation: Linearisation) -> Data:
     """Return standard uncertainties of corrected points through the volume, None if
     undetermined.
     """
-    return picked(point_map(linearisation, MAP_NODES), "x", "y", "slices")
+    return point_map(linearisation, MAP_NODES)
 
 
 MAPS: Mapping[Any, Callable[[Experiment, Linearisation], Data]] = {
