@@ -50,7 +50,7 @@ if TYPE_CHECKING:
         lengths,
         map,
     )
-    from ballplate.extensions.pages.interface import page, view
+    from ballplate.extensions.pages.interface import page
     from ballplate.extensions.reliability.interface import reliability
     from ballplate.extensions.repair.interface import repair
     from ballplate.extensions.reproduction.interface import reproduce
@@ -170,7 +170,6 @@ __all__ = [
     "stored",
     "sweep",
     "validate",
-    "view",
     "write_file",
     "write_map",
 ]

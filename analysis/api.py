@@ -10,9 +10,7 @@ and TypeError for one of another type.
 from __future__ import annotations
 
 import os
-import sys
 from collections.abc import Iterable, Mapping
-from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, overload
 
@@ -25,7 +23,7 @@ from ballplate.simulator.inputs.arguments import (
     ensure_type,
     ensure_whole,
 )
-from ballplate.simulator.inputs.extensions import optional_function, service
+from ballplate.simulator.inputs.extensions import service
 
 from .arguments import SIGMAS, PathLike, experiment_of, load, observed_of, table_of
 from .estimators.estimator_choice import (
@@ -461,23 +459,3 @@ def write_map(fitted: FittedMap, path: PathLike) -> None:
     ensure_type(FittedMap, "what to_map() of a fit gives", fitted=fitted)
     ensure_path("path", path)
     map_files.write_map(fitted, path)
-
-
-def _shown_in_notebook(experiment: Experiment) -> str:
-    """Return the notebook view of an experiment: its title and its picture, which the experiment
-    itself cannot draw.
-    """
-    view = optional_function("view")
-    picture = "" if view is None else view(experiment)._repr_html_()
-    return f"<p>{escape(repr(experiment))}</p>\n{picture}"
-
-
-def _teach_notebook() -> None:
-    """Let the session of IPython, if this is one, show experiments so."""
-    session = getattr(sys.modules.get("IPython"), "get_ipython", lambda: None)()
-    if session is not None:
-        formatter = session.display_formatter.formatters["text/html"]
-        formatter.for_type(Experiment, _shown_in_notebook)
-
-
-_teach_notebook()

@@ -199,7 +199,7 @@ SHIPPED = (
     ),
     _here(
         "pages",
-        functions=_from("interface", "page", "view"),
+        functions=_from("interface", "page"),
     ),
     _here(
         "sweeps",

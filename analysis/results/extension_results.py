@@ -7,15 +7,6 @@ from pathlib import Path
 from typing import Any, Protocol
 
 from ballplate.presentation.formatting import Data
-from ballplate.simulator.inputs.extensions import function, optional_function
-
-
-class SpaceView(Protocol):
-    """A picture in space, which a notebook shows."""
-
-    def save(self, path: str | Path) -> None: ...
-
-    def _repr_html_(self) -> str: ...
 
 
 class AskedResult(Protocol):
@@ -65,18 +56,3 @@ class IssuedCertificate(AskedResult, Protocol):
     def datum(self) -> str: ...
 
     def texts(self, path: str | Path) -> Mapping[Path, str]: ...
-
-
-def shown_in_space(result: object) -> SpaceView:
-    """Return the view of a prediction or a fit.
-
-    :raises MissingExtensionError: the extension that draws it is not installed.
-    """
-    view: SpaceView = function("view")(result)
-    return view
-
-
-def picture_in_space(result: object) -> str:
-    """Return the view as HTML for a notebook; empty without the extension that draws it."""
-    view = optional_function("view")
-    return "" if view is None else str(view(result)._repr_html_())

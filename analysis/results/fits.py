@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from ballplate.presentation.files import write_file
-from ballplate.presentation.formats import as_html
 from ballplate.presentation.formatting import Data, given, picked
 from ballplate.presentation.result import FitResult
 from ballplate.presentation.scenes import box_edges, projection
@@ -33,9 +32,6 @@ from ballplate.results.extension_results import (
     AskedResult,
     GroupVariances,
     IssuedCertificate,
-    SpaceView,
-    picture_in_space,
-    shown_in_space,
 )
 from ballplate.results.groupings import GROUPINGS, Grouping
 from ballplate.results.map_of_fit import counted_twice, map_of
@@ -81,9 +77,6 @@ if TYPE_CHECKING:
 
 # Steps of an iteration below this, in metres and radians, are reported as rounding.
 LEAST_STEP = 1e-10
-
-# Rows of the table of estimates in a notebook, so that the view below stays visible.
-ROWS_BESIDE_VIEW = 12
 
 # Largest residuals in the text.
 SHOWN_RESIDUALS = 3
@@ -316,15 +309,6 @@ class Fit(FitResult):
         :raises ValueError: the fit has no experiment.
         """
         return str(function("page")(self))
-
-    def view(self) -> SpaceView:
-        """The fit in space: positions, residuals, ellipsoids of points and balls, and moving
-        undetermined or weak directions; of a failed fit only the positions.
-        """
-        return shown_in_space(self)
-
-    def _repr_html_(self) -> str:
-        return self._written(as_html, ROWS_BESIDE_VIEW) + picture_in_space(self)
 
     def covariance(self, *chosen: str) -> pandas.DataFrame:
         """Covariance of estimates and measuring tasks, in products of their units; NaN if

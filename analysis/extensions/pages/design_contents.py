@@ -12,11 +12,8 @@ from ballplate.extensions.reliability.redundancy import reliability_of
 from ballplate.planning import Wanted, checked_design
 from ballplate.results import Prediction
 from ballplate.simulator.computing import Report, unreported
-from ballplate.simulator.estimation import linearise
 from ballplate.simulator.experiment import Experiment, with_pool
 from ballplate.simulator.inputs import optional_service
-
-from .motions import null_motions, weak_motions
 
 # Points along each axis of the map of lengths, in two and in three dimensions.
 GRID = {2: (7,), 3: (5,)}
@@ -31,7 +28,6 @@ def page_of_design(
     progress of the search for suggested changes and of the map of lengths.
     """
     design = prediction.design
-    linearisation = linearise(design)
     target = target_in_words(experiment)
     data: dict[str, Any] = {"run": prediction.to_dict()}
     settings = length_settings(experiment, target or NO_TARGET, GRID[design.dimension])
@@ -54,9 +50,7 @@ def page_of_design(
     contents = DesignContents(
         experiment.title,
         data,
-        linearisation,
-        null_motions(linearisation),
-        weak_motions(linearisation, experiment.target_uncertainty),
+        design,
         target,
         reason,
         experiment.source.name if experiment.name is None else experiment.label,

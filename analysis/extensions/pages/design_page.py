@@ -3,23 +3,21 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from ballplate.simulator.estimation import Linearisation
+from ballplate.simulator.design import Design
 
-from .design_views import ball_views, motion_view, point_view, volume_view
-from .document import Page, PageSection, facts_list, introduction, shipped, written
-from .elements import Html, element, folded, joined, note, sentence, table
+from .design_views import volume_view
+from .document import Page, PageSection, facts_list, introduction, written
+from .elements import Html, element, joined, note, sentence, table
 from .information_section import information_section
 from .length_sections import lengths_section
-from .motions import Motion
 from .quoted import QuotedData
 from .residual_sections import reliability_section
-from .spatial import figure_of
+from .spatial import still_figure
 from .uncertainty_sections import (
-    expansion,
     lengths_words,
     misses_target,
     scale_section,
@@ -34,23 +32,17 @@ FOOT = (
     " --json: its data-path names the command and the path in the output."
 )
 
-# Directions that are drawn, of each kind; the others are told in words.
-MOST_DRAWN = 12
-
 
 @dataclass(frozen=True, eq=False)
 class DesignContents:
     """Contents of a page of a design: plain data as printed by the commands, by the command's
-    name; the linearised design with its undetermined and weak motions; `target` as text; the
-    `file` and its assumptions. `unreliable` is the reason why there is no reliability among the
-    data.
+    name; the `design`; `target` as text; the `file` and its assumptions. `unreliable` is the
+    reason why there is no reliability among the data.
     """
 
     title: str
     data: Mapping[str, Any]
-    at: Linearisation
-    null: Sequence[Motion]
-    weak: Sequence[Motion]
+    design: Design
     target: str
     unreliable: str
     file: str
@@ -61,15 +53,9 @@ def design_page(contents: DesignContents) -> str:
     """The page as a file that needs no other."""
     quoted = {name: QuotedData(f"/{name}", data) for name, data in contents.data.items()}
     run = quoted["run"]
-    factor = expansion(run.at("quantities"))
-    linearisation = contents.at
-    ellipsoids = (
-        [point_view(linearisation, factor)] if len(linearisation.design.evaluation.points) else []
-    )
-    ellipsoids += list(ball_views(linearisation, factor))
     sections = [
         PageSection("volume", "The experiment", _experiment(contents)),
-        PageSection("rank", "What the readings determine", _rank(run, contents)),
+        PageSection("rank", "What the readings determine", _rank(run)),
         *_informing(quoted),
         PageSection("suggestions", "Suggested changes", _suggestions(quoted)),
         PageSection(
@@ -83,14 +69,13 @@ def design_page(contents: DesignContents) -> str:
             "Lengths throughout the volume",
             lengths_section(quoted["lengths"], contents.target),
         ),
-        PageSection("ellipsoids", "Points and balls", figures_wide(map(figure_of, ellipsoids))),
         PageSection("scale", "Where scale comes from", scale_section(run)),
         PageSection("reliability", "Reliability", _reliability(quoted, contents.unreliable)),
         PageSection("sheet", "Run sheet", _sheet(quoted["sheet"])),
     ]
     verdict = _verdict(run, contents.target, quoted["lengths"])
     top = introduction(verdict, _is_good(run), contents.file)
-    return written(Page(contents.title, top, sections, FOOT, shipped("view.js")))
+    return written(Page(contents.title, top, sections, FOOT))
 
 
 def _informing(quoted: Mapping[str, QuotedData]) -> list[PageSection]:
@@ -103,12 +88,8 @@ def _informing(quoted: Mapping[str, QuotedData]) -> list[PageSection]:
 
 def _experiment(contents: DesignContents) -> Html:
     """Section on the volume with its artefacts, and on assumptions."""
-    return figures_wide([figure_of(volume_view(contents.at.design)), facts_list(contents.facts)])
-
-
-def figures_wide(content: Iterable[Html]) -> Html:
-    """Return pictures in a row on wide screens."""
-    return element("div", *content, class_="figures views")
+    picture = still_figure(volume_view(contents.design))
+    return element("div", picture, facts_list(contents.facts), class_="figures views")
 
 
 def _is_good(run: QuotedData) -> bool:
@@ -168,45 +149,26 @@ def _throughout(run: QuotedData, lengths: QuotedData) -> list[str | Html]:
     return [" Of the lengths throughout the volume, ", whole.share(share), f" are {are}."]
 
 
-def _rank(run: QuotedData, contents: DesignContents) -> Html:
+def _rank(run: QuotedData) -> Html:
     parts = []
-    groups = (
+    for key, title, words in (
         (
             "undetermined",
             "Undetermined",
-            contents.null,
             "These change together without changing any observation.",
         ),
         (
             "weakly_determined",
             "Weakly determined",
-            contents.weak,
-            "The observations are almost insensitive to these; each is drawn one standard"
-            " deviation long.",
+            "The observations are almost insensitive to these.",
         ),
-    )
-    for key, title, motions, words in groups:
-        if not run.data[key]:
-            continue
-        pictures: list[Html] = []
-        items: list[Html] = []
-        for k, (motion, direction) in enumerate(
-            zip(motions, run.at(key).each(), strict=True), start=1
-        ):
-            text = direction.text() if key == "undetermined" else direction.text("text")
-            drawn = None
-            if len(pictures) < MOST_DRAWN:
-                name = f"{key.replace('_', '-')}-{k}"
-                drawn = motion_view(contents.at, motion, name, text, f"{title} {k}")
-            if drawn is None:
-                items.append(element("li", text, value=k))
-            else:
-                pictures.append(figure_of(drawn))
-        parts += [element("h3", title), note(words), figures_wide(pictures)]
-        if items:
-            summary = "Directions without a picture" if pictures else "Directions"
-            list_of_others = folded(summary, element("ol", *items), is_open=len(items) <= 20)
-            parts.append(list_of_others)
+    ):
+        if run.data[key]:
+            directions = (
+                element("li", direction.text() if key == "undetermined" else direction.text("text"))
+                for direction in run.at(key).each()
+            )
+            parts += [element("h3", title), note(words), element("ol", *directions)]
     if not parts:
         return sentence("No direction is undetermined or weakly determined.")
     return joined(parts)

@@ -1,4 +1,4 @@
-"""Views and pages of designs and fits from Python."""
+"""Pages of designs, fits and sweeps from Python."""
 
 from __future__ import annotations
 
@@ -20,8 +20,6 @@ from .elements import Html, element, joined, note, sentence, table
 if TYPE_CHECKING:
     from ballplate.results import Fit, Prediction
 
-    from .embedded import View
-
 # Of pages of other extensions, in addition to the functions below.
 __all__ = [
     "Chart",
@@ -40,40 +38,8 @@ __all__ = [
     "page",
     "sentence",
     "table",
-    "view",
     "written",
 ]
-
-
-def view(subject: Experiment | PathLike | Prediction | Fit) -> View:
-    """Return a design in space: positions of plates, balls and probes of an experiment; of a
-    prediction or a fit also ellipsoids of uncertainty, residuals, and motions of undetermined
-    directions.
-
-    A notebook shows it, to be turned by mouse, buttons or keyboard, and appends it to experiments,
-    predictions and fits. `save(path)` of the result writes a page, or the picture alone.
-
-    >>> import ballplate as bp
-    >>> bp.view(bp.quickstart())
-    <View of quickstart: positions>
-    >>> bp.view(bp.run(bp.quickstart()))
-    <View of quickstart: positions, points, balls of plate>
-    """
-    from ballplate.results import Fit, Prediction
-
-    from .offered import design_view, fit_view
-
-    if isinstance(subject, Fit):
-        return fit_view(subject)
-    if isinstance(subject, Prediction):
-        return design_view(subject)
-    from ballplate.simulator.experiment import lay_out
-
-    from .embedded import View
-    from .views import position_picture
-
-    chosen = experiment_of(subject)
-    return View(chosen.label, chosen.title, (position_picture(lay_out(chosen)),))
 
 
 def page(
@@ -103,9 +69,9 @@ def page(
         ensure_path("path", path)
     of_sweep = getattr(subject, "page_text", None)
     if isinstance(subject, Fit):
-        from .offered import fit_page_text
+        from .fit_contents import page_of_fit
 
-        text = fit_page_text(subject)
+        text = page_of_fit(subject)
     elif of_sweep is not None:
         text = of_sweep()
     else:

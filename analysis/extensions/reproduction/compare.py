@@ -34,7 +34,7 @@ from .shipped import (
 
 
 @dataclass(frozen=True)
-class Comparison:
+class ComparedValue:
     """A published value or statement and what ballplate computes, in metres and radians.
 
     Values of a table are compared by their ratio after the common `factor` of their column, which
@@ -65,7 +65,7 @@ class Comparison:
 
 def compare_section(
     document: Document, shipped: Shipped, section: str, trials: int | None, report: Report
-) -> list[Comparison]:
+) -> list[ComparedValue]:
     """Compare everything that a document states in one section.
 
     `trials` is the number of synthetic data sets for the comparison of estimators; None skips it.
@@ -97,7 +97,7 @@ def compare_section(
     return compared
 
 
-def compare_rank(shipped: Shipped, design: str, statement: RankStatement) -> Comparison:
+def compare_rank(shipped: Shipped, design: str, statement: RankStatement) -> ComparedValue:
     """Compare a stated rank deficiency with that of one of its designs."""
     stated, computed = statement.deficiency, planned(shipped, design).verdict.deficiency
     published, within, note = (
@@ -105,14 +105,14 @@ def compare_rank(shipped: Shipped, design: str, statement: RankStatement) -> Com
         if stated == "some"
         else (float(stated), (stated, stated), "")
     )
-    return Comparison(
+    return ComparedValue(
         "", "rank deficiency", case_of(design), "", published, computed, within, note=note
     )
 
 
 def compare_column(
     document: Document, shipped: Shipped, column: PublishedColumn
-) -> list[Comparison]:
+) -> list[ComparedValue]:
     """Compare the common factor of one column, which exceptions do not influence, and then its
     values after that factor.
     """
@@ -127,7 +127,7 @@ def compare_column(
     factor = _median(ratio for symbol, ratio in ratios.items() if symbol not in exceptions)
     limit, usual = document.limits.factor, document.limits.figure
     compared = [
-        Comparison(
+        ComparedValue(
             column.table,
             f"factor, {column.statistic}",
             column.case,
@@ -140,7 +140,7 @@ def compare_column(
     for symbol, published in column.figures.items():
         exception = exceptions.get(symbol)
         compared.append(
-            Comparison(
+            ComparedValue(
                 column.table,
                 f"{symbol} {column.statistic}",
                 column.case,
@@ -169,7 +169,7 @@ def _ratios(shipped: Shipped, column: PublishedColumn, design: str) -> dict[str,
     }
 
 
-def compare_remark(shipped: Shipped, remark: Remark) -> list[Comparison]:
+def compare_remark(shipped: Shipped, remark: Remark) -> list[ComparedValue]:
     """Compare the least and the largest ratio of a remark with its limits."""
     ratios = []
     for design, reference in remark.pairs:
@@ -193,13 +193,13 @@ def compare_remark(shipped: Shipped, remark: Remark) -> list[Comparison]:
         ("largest ratio", max(ratios), 0.0, remark.at_most),
     )
     return [
-        Comparison("", quantity, "", "", math.nan, ratio, (low, high), note=note)
+        ComparedValue("", quantity, "", "", math.nan, ratio, (low, high), note=note)
         for quantity, ratio, low, high in limits
         if low is not None and high is not None
     ]
 
 
-def compare_erratum(document: Document, shipped: Shipped, erratum: Erratum) -> Comparison:
+def compare_erratum(document: Document, shipped: Shipped, erratum: Erratum) -> ComparedValue:
     """Compute the largest deviation of a block's values from the designs in its heading, which must
     exceed that of a column that agrees; columns have the values of the designs meant.
     """
@@ -216,7 +216,7 @@ def compare_erratum(document: Document, shipped: Shipped, erratum: Erratum) -> C
                 ]
                 factor = _median(ratios)
                 deviations += [abs(ratio / factor - 1.0) for ratio in ratios]
-    return Comparison(
+    return ComparedValue(
         erratum.table,
         "as headed, off by",
         "",
@@ -230,7 +230,7 @@ def compare_erratum(document: Document, shipped: Shipped, erratum: Erratum) -> C
 
 def compare_iterations(
     document: Document, shipped: Shipped, published: PublishedIterations
-) -> list[Comparison]:
+) -> list[ComparedValue]:
     """Compare the iterations of a fit of exact readings with a published one's."""
     limits, case = document.limits, case_of(published.design)
     fitted = fitted_exactly(shipped_experiment(shipped, published.design))
@@ -245,7 +245,9 @@ def compare_iterations(
         stated = float(published.settles)
         words = f"settles within {count}" if count else "settles"
         compared.append(
-            Comparison(published.table, words, case, "", stated, float(settled), (stated, stated))
+            ComparedValue(
+                published.table, words, case, "", stated, float(settled), (stated, stated)
+            )
         )
     for name, values, computed, shown_only, limit, first, most in (
         (
@@ -273,14 +275,14 @@ def compare_iterations(
             within = 1.0 / limit, math.inf if k in most else limit
             found = computed[k] if k < len(computed) else math.nan
             compared.append(
-                Comparison(published.table, f"{name} {k}", case, "", value, found, within, 1.0)
+                ComparedValue(published.table, f"{name} {k}", case, "", value, found, within, 1.0)
             )
     return compared
 
 
 def compare_difference(
     document: Document, shipped: Shipped, difference: Difference, trials: int, report: Report
-) -> list[Comparison]:
+) -> list[ComparedValue]:
     """Compare the published differences of two estimators over one data set with the median over
     synthetic ones, in whose range they must be.
     """
@@ -288,7 +290,9 @@ def compare_difference(
     estimated = compare_estimators(experiment, trials, across_probes=True, report=report)
     case, limit = case_of(difference.design), document.limits.median
     compared = [
-        Comparison("", "not converged", case, "", math.nan, float(estimated.failed), (0.0, 0.0))
+        ComparedValue(
+            "", "not converged", case, "", math.nan, float(len(estimated.failed)), (0.0, 0.0)
+        )
     ]
     for name, published, values in (
         ("rms", difference.rms, np.array(estimated.rms)),
@@ -297,11 +301,11 @@ def compare_difference(
         below = float((values < published).mean())
         within = 1.0 / len(values), 1.0 - 1.0 / len(values)
         compared += [
-            Comparison(
+            ComparedValue(
                 *("", f"{name} difference", case, "m", published, float(np.median(values))),
                 (1.0 / limit, limit),
                 1.0,
             ),
-            Comparison("", f"{name}, share below", case, "", math.nan, below, within),
+            ComparedValue("", f"{name}, share below", case, "", math.nan, below, within),
         ]
     return compared

@@ -12,7 +12,7 @@ from ballplate.presentation import Data, Result, aligned, amount_of, number, pic
 from ballplate.simulator.computing import Report, unreported
 from ballplate.simulator.inputs import hint, number_of
 
-from .compare import Comparison, compare_section
+from .compare import ComparedValue, compare_section
 from .published import Document, npl
 from .shipped import Shipped
 
@@ -25,7 +25,7 @@ class ReproducedDocument(Result):
     """A document with the comparisons of its sections."""
 
     document: Document
-    sections: dict[str, list[Comparison]]
+    sections: dict[str, list[ComparedValue]]
 
     @property
     def label(self) -> str:
@@ -112,7 +112,7 @@ class ReproducedDocument(Result):
         ]
 
 
-def _cells(row: Comparison) -> tuple[str, ...]:
+def _cells(row: ComparedValue) -> tuple[str, ...]:
     low, high = row.within
     limits = f"{low:g}" if low == high else f"{low:g} to {high:g}"
     if math.isinf(high):

@@ -79,12 +79,8 @@ def nominal_points(path: Path) -> tuple[tuple[str, ...], Array]:
     return names, np.array([row.lengths for row in rows])
 
 
-def compensated_points(
-    curve: ErrorCurve, names: Sequence[str], places: Array, normals: Array | None = None
-) -> CompensatedPoints:
+def compensated_points(curve: ErrorCurve, names: Sequence[str], places: Array) -> CompensatedPoints:
     """Places (m, 2) of the profile compensated by the curve's errors, and its corners behind them.
-
-    `normals` (m, 2) are used instead of those of circles through neighbouring points.
 
     :raises SplineError: the curve is none of errors along a profile, a place is not on it, or a
         corner is hardly one.
@@ -109,7 +105,7 @@ def compensated_points(
     points_found = CompensatedPoints(
         tuple(names),
         places,
-        np.array(points_kept).reshape(-1, 2) if normals is None else normals,
+        np.array(points_kept).reshape(-1, 2),
         curve.fit.values(s),
         curve.standard_uncertainty(s),
     )

@@ -88,7 +88,7 @@ class FittedCurve(Result):
             if nominal is not None:
                 return compensated_points(self.curve, *nominal_points(Path(nominal)))
             places = np.zeros((0, 2)) if points.places is None else points.places
-            return compensated_points(self.curve, points.names, places, points.normals)
+            return compensated_points(self.curve, points.names, places)
         except SplineError as error:
             raise _told(error, Path(nominal or self.file), points.x_column) from None
 

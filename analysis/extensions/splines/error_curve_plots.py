@@ -127,7 +127,7 @@ def draw_whiskers(curve: ErrorCurve, points: CurvePoints, path: str | Path | Non
     assert points.places is not None
     # Axial co-ordinate to the right, radius upwards, as a turning centre is looked at.
     line, start = profile.places[:, ::-1], points.places[:, ::-1]
-    normals = (profile.normals[whole] if points.normals is None else points.normals)[:, ::-1]
+    normals = profile.normals[whole][:, ::-1]
     factor = points.x_column.factor if points.x is None else 1e-3
     unit = points.x_column.unit if points.x is None else "mm"
     extent = np.ptp(line, axis=0)

@@ -4,7 +4,6 @@ error.
 
 from __future__ import annotations
 
-import math
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -22,10 +21,8 @@ from ballplate.simulator.inputs import (
     ExperimentError,
     Mark,
     Message,
-    QuantityError,
     TableLine,
     decimal_sign,
-    exact_number,
     header_cells,
     hint,
     listing,
@@ -39,7 +36,6 @@ from ballplate.simulator.machines import Array
 
 EXAMPLE = "position_mm,error_um"
 PROFILES = (("nominal_x", "nominal_z"), ("x", "z"))
-NORMALS = ("normal_x", "normal_z")
 POINT, FEATURE, UNCERTAINTY, ARC_LENGTH = "point", "feature", "u", "arc_length"
 MOST_POINTS = 20_000
 NO_TABLES = (".yaml", ".yml", ".json")
@@ -65,8 +61,7 @@ class CurvePoints:
     """Points in the order of the file, in metres and radians.
 
     `x` (m,) is not there where the abscissa is the arc length along the profile; `places` (m, 2),
-    radius and axial co-ordinate, are not there where the file has no profile, unit `normals` (m, 2)
-    where it does not state them.
+    radius and axial co-ordinate, are not there where the file has no profile.
     """
 
     names: tuple[str, ...]
@@ -77,7 +72,6 @@ class CurvePoints:
     y: Array = field(repr=False)
     uncertainties: Array | None = field(repr=False)
     places: Array | None = field(repr=False)
-    normals: Array | None = field(default=None, repr=False)
 
     def chosen(self, indices: Sequence[int]) -> CurvePoints:
         """Those of some indices."""
@@ -91,7 +85,6 @@ class CurvePoints:
             self.y[index],
             None if self.uncertainties is None else self.uncertainties[index],
             None if self.places is None else self.places[index],
-            None if self.normals is None else self.normals[index],
         )
 
 
@@ -103,8 +96,7 @@ def read_points(path: Path, x: str | None = None, y: str | None = None) -> Curve
     `x` and `y` choose columns, with or without the unit. Without `x` the abscissa is the arc
     length along the profile if the file has the columns nominal_x and nominal_z (or x and z),
     otherwise the first column with a unit; without `y` the error is the only column left. `point`
-    and `feature` are texts, `u` a standard uncertainty of the error, `normal_x` and `normal_z`,
-    without unit, the direction out of the material. Other columns are not read.
+    and `feature` are texts, `u` a standard uncertainty of the error. Other columns are not read.
 
     :raises ExperimentError: all faults of the file at once.
     """
@@ -133,7 +125,6 @@ def read_points(path: Path, x: str | None = None, y: str | None = None) -> Curve
     values: list[list[float]] = []
     names: list[str] = []
     features = []
-    normals = []
     names_seen: dict[str, int] = {}
     decimal = decimal_sign(lines[1:], [header.index(column) for column in wanted])
     for line in lines[1:]:
@@ -156,13 +147,6 @@ def read_points(path: Path, x: str | None = None, y: str | None = None) -> Curve
                 text = f'"{cell}" is not a standard uncertainty; give one above zero'
                 messages.append(place.message("", text))
         values.append(row)
-        if header.has_normals:
-            try:
-                normals.append(_direction([cells[header.texts[part]][1] for part in NORMALS]))
-            except QuantityError as error:
-                messages.append(
-                    Mark(file, number, cells[header.texts[NORMALS[0]]][0]).message("", str(error))
-                )
         name = cells[header.texts[POINT]][1] if POINT in header.texts else str(len(names) + 1)
         if name in names_seen:
             messages.append(
@@ -203,23 +187,7 @@ def read_points(path: Path, x: str | None = None, y: str | None = None) -> Curve
         by_name[y_column.name],
         by_name.get(UNCERTAINTY),
         np.stack([by_name[column.name] for column in profile], axis=1) if profile else None,
-        np.array(normals) if header.has_normals else None,
     )
-
-
-def _direction(cells: Sequence[str]) -> list[float]:
-    """A unit vector from the texts of its parts.
-
-    :raises QuantityError: no numbers, or both zero.
-    """
-    parts = [float(exact_number(cell.replace(",", "."))) for cell in cells]
-    length = math.hypot(*parts)
-    if not 0 < length < math.inf:
-        raise QuantityError(
-            f'"{cells[0]}" and "{cells[1]}" are not a direction; give its components, such as'
-            " 0.6 and 0.8"
-        )
-    return [part / length for part in parts]
 
 
 def choose_points(points: CurvePoints, text: str, file: str) -> list[int]:
@@ -259,7 +227,7 @@ class _Header:
     """The first line: columns with a unit by their names, and where texts are."""
 
     def __init__(self, file: str, line: TableLine) -> None:
-        self.mark = mark = Mark(file, line.number, 1)
+        self.mark = Mark(file, line.number, 1)
         cells = list(header_cells(file, line, EXAMPLE))
         self.order = [cell for _, cell, _, _ in cells]
         self.columns: dict[str, Column] = {}
@@ -272,16 +240,11 @@ class _Header:
             units: Mapping[str, Fraction] = LENGTH_UNITS if kind == "length" else ANGLE_UNITS
             if name in self.columns or cell in self.texts:
                 messages.append(place.message("", f'a second column "{shorten(cell)}"; remove one'))
-            elif cell in (POINT, FEATURE, *NORMALS):
+            elif cell in (POINT, FEATURE):
                 self.texts[cell] = k
             elif name and unit in units:
                 self.columns[name] = Column(name, unit, float(units[unit]), kind)
                 self.factors[name], self._index[name] = units[unit], k
-        self.has_normals = all(part in self.texts for part in NORMALS)
-        if any(part in self.texts for part in NORMALS) and not self.has_normals:
-            messages.append(
-                mark.message("", "a normal has two parts; add the other of normal_x and normal_z")
-            )
         if messages:
             raise ExperimentError(messages)
 

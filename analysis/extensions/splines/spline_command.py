@@ -30,7 +30,7 @@ DESCRIPTION = (
     " squares, with values and slopes prescribed at its ends or at other points, and write it as"
     " polynomials for a controller. The file has columns such as position_mm and error_um,"
     " or nominal_x_mm and nominal_z_mm for a profile, whose arc length is then the"
-    " abscissa; also point, feature, u_um, normal_x and normal_z. A LOCATION is an abscissa"
+    " abscissa; also point, feature and u_um. A LOCATION is an abscissa"
     ' such as "12.5 mm", start, end, or nominal co-ordinates on the profile such as "37.084'
     ' mm, -37.084 mm".'
 )

@@ -11,12 +11,6 @@ from typing import Any
 import numpy as np
 from ballplate.extensions.maps.length_map import length_map, length_settings
 from ballplate.extensions.pages.level_maps import MISSED
-from ballplate.extensions.pages.motions import (
-    moved_balls,
-    moved_points,
-    null_motions,
-    weak_motions,
-)
 from ballplate.extensions.pages.page_facts import target_in_words
 from ballplate.extensions.repair.written import plane_of
 from ballplate.planning import run_sheet
@@ -31,6 +25,7 @@ from ballplate.simulator.inputs import Target
 from ballplate.uncertainty import Quantity, uncertainties
 
 from .level_slices import LEVELS, in_slices, point_map
+from .motions import moved_balls, moved_points, null_motions, weak_motions
 
 # Nodes of the lattice along each axis: edges of it that bend are drawn as curves.
 NODES = 9

@@ -4,9 +4,6 @@ escaped, and a page needs nothing else.
 
 from __future__ import annotations
 
-import base64
-import hashlib
-import json
 import re
 from dataclasses import replace
 from pathlib import Path
@@ -132,7 +129,6 @@ def test_every_figure_of_a_designs_page_is_that_of_the_json(variant: str) -> Non
     data["errors"] = bp.information(experiment).to_dict()
     assert assert_quoted(page, data) > 100
     assert ('class="verdict bad"' in page) == is_deficient
-    assert ("view moving" in page) == is_deficient
     shown = {one.text for one in ResultPage(page).shown}
     assert shown.issuperset(data["run"]["undetermined"])
 
@@ -191,26 +187,20 @@ def test_what_a_person_wrote_is_escaped(tmp_path: Path) -> None:
     for page in pages:
         found = ResultPage(page)
         assert not {tag for tag, _ in found.tags} & {"b", "i", "u", "s", "em", "img", "iframe"}
-        scripts = [attributes for tag, attributes in found.tags if tag == "script"]
-        assert sum("type" not in one for one in scripts) == 1
+        assert "script" not in {tag for tag, _ in found.tags}
         assert not any(name.startswith("on") for _, one in found.tags for name in one)
         assert "a &lt;i&gt;title&lt;/i&gt; &amp; &quot;more&quot; &#x27;of it&#x27;" in page
         assert "z &lt;low&gt; &amp;" in page and "&lt;u&gt;one&lt;/u&gt; &amp; two" in page
     assert "&lt;em&gt;.csv" in pages[0]
 
 
-def test_a_page_runs_its_own_script_only_and_asks_for_nothing(page: str) -> None:
-    script = re.search(r"<script>(.*?)</script>", page, re.DOTALL)
-    assert script is not None
-    digest = base64.b64encode(hashlib.sha256(script[1].encode()).digest()).decode()
+def test_a_page_runs_no_script_and_asks_for_nothing(page: str) -> None:
     policy = re.search(r'Content-Security-Policy" content="([^"]+)"', page)
     assert policy is not None and policy[1].startswith("default-src 'none'")
-    assert policy[1].endswith(f"script-src 'sha256-{digest}'")
+    assert "script-src" not in policy[1] and "<script" not in page
     asked = [one.get("src") or one.get("href", "") for _, one in ResultPage(page).tags]
     assert all(one.startswith(("#", "data:,")) for one in asked if one)
     assert "url(" not in page and "@import" not in page
-    for stored in re.findall(r'<script type="application/json">(.*?)</script>', page):
-        assert "<" not in stored and json.loads(stored)["layers"]
 
 
 def test_a_fit_that_fails_has_a_page_that_says_so(fitted: bp.Fit) -> None:

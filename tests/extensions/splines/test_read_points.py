@@ -59,21 +59,6 @@ def test_a_profile_an_uncertainty_and_a_choice_of_errors(write: Path) -> None:
     ]
 
 
-def test_normals_of_the_drawing(write: Path) -> None:
-    write.write_text(
-        "x_mm,z_mm,error_um,normal_x,normal_z\n1,1,2,3,4\n2,1,2,-1,0\n", encoding="utf-8"
-    )
-    points = read_points(write)
-    assert points.normals is not None
-    np.testing.assert_allclose(points.normals, [[0.6, 0.8], [-1.0, 0.0]])
-    np.testing.assert_allclose(points.chosen([1]).normals, [[-1.0, 0.0]])
-    assert told(write, "x_mm,z_mm,error_um,normal_x,normal_z\n1,1,2,0,0\n2,1,2,a,1\n") == [
-        wording.AND_ARE_NOT,
-        wording.IS_NOT_A_NUMBER_WRITE,
-    ]
-    assert told(write, "x_mm,z_mm,error_um,normal_x\n1,1,2,0\n") == [wording.A_NORMAL_HAS_TWO]
-
-
 def test_rows_with_mistakes_are_told_all_at_once(write: Path) -> None:
     text = "point,position_mm,error_um,u_um\n1,0,1,0.1\n1,1,x,0.1\n3,2,,0.1\n4,3\n5,4,1,0\n6,5,2,1e30\n"
     assert told(write, text) == [

@@ -3,7 +3,6 @@
 AND_ARE_NOT = (
     'data.csv:2:7: "0" and "0" are not a direction; give its components, such as 0.6 and 0.8'
 )
-A_NORMAL_HAS_TWO = "data.csv:1:1: a normal has two parts; add the other of normal_x and normal_z"
 A_PICTURES_NAME_ENDS = "a picture's name ends in .svg, .png, .pdf"
 A_SECOND_POINT_AS_IN_LINE = 'data.csv:3:1: a second point "1", as in line 2; rename one'
 CANNOT_BE_WRITTEN = "a.svg: cannot be written (No such file or directory)"

@@ -7,7 +7,7 @@ from dataclasses import replace
 import ballplate as bp
 import numpy as np
 import pytest
-from ballplate.extensions.pages.motions import (
+from ballplate.extensions.studio.motions import (
     Motion,
     moved_balls,
     moved_points,
