@@ -42,18 +42,18 @@ pool:
   candidates:
     - name: some
       artefact: plate
-      planes: [z, x]
+      planes: [z]
       levels: [0 mm, 600 mm]
-      corners: {x: 0 mm, y: [0 mm, 400 mm], z: 100 mm}
-      probes: {z: [[down]], x: [right]}
+      corners: {x: 0 mm, y: [0 mm, 400 mm]}
+      probes: [[down]]
+    - {name: more, artefact: plate, planes: [x], levels: [0 m, 60 cm], corners: {y: [0 mm, 400 mm], z: 100 mm}, probes: [right]}
     - {name: bar, artefact: bar, pose: {origin: [100 mm, 100 mm, 100 mm]}, probes: [down]}
     - {name: gauge, artefact: gauge, pose: {origin: [500 mm, 500 mm, 500 mm]}, probes: [down]}
   calibration:
     - {name: dear, price: 3 h, kind: distances, artefact: plate, pairs: corners, standard_uncertainty: 0.1 um}
   limits:
     keep: [low]
-    never_together: [[low, bar]]
-    at_most: [{of: {plane: x}, count: 1}]
+    at_most: [{of: {name: [low, bar]}, count: 1}, {of: {plane: x}, count: 1}]
     reach: {right: {x: [0 mm, 1 m]}}
 seed: 1
 """
@@ -64,10 +64,10 @@ error_model: {kind: metric}
 artefacts: {plate: {kind: grid, balls: [3, 2], size: [500 mm, 200 mm]}}
 pool:
   candidates:
-    - {centres: {x: [250 mm, 400 mm], y: 500 mm}, quarter_turns: [0, 1], balls: [all, corners, [r1c2]]}
+    - {centres: {x: [250 mm, 400 mm], y: 500 mm}, quarter_turns: [0, 1], balls: corners}
 """
-SOME_CORNERS = "corners: {x: 0 mm, y: [0 mm, 400 mm], z: 100 mm}"
-SOME_PROBES = "probes: {z: [[down]], x: [right]}"
+SOME_CORNERS = "corners: {x: 0 mm, y: [0 mm, 400 mm]}"
+SOME_PROBES = "probes: [[down]]"
 LIMITS = GOOD[GOOD.index("  limits:\n") : GOOD.index("seed:")]
 
 
@@ -108,17 +108,24 @@ def test_every_combination_is_there_but_what_is_drawn(tmp_path: Path) -> None:
         "some z 0 mm at 0, 400 mm",
         "some z 600 mm at 0, 0 mm",
         "some z 600 mm at 0, 400 mm",
-        "some x 0 mm at 0, 100 mm",
-        "some x 0 mm at 400, 100 mm",
-        "some x 600 mm at 0, 100 mm",
-        "some x 600 mm at 400, 100 mm",
+        "more x 0 mm at 0, 100 mm",
+        "more x 0 mm at 400, 100 mm",
+        "more x 600 mm at 0, 100 mm",
+        "more x 600 mm at 400, 100 mm",
         "bar",
         "gauge",
         "dear",
     ]
     assert pool.dropped == {"same place as another": 1}
     assert [one.drawn for one in pool.candidates] == [True] + 10 * [False]
-    assert [one.group for one in pool.candidates] == ["", *7 * ["some"], "bar", "gauge", "dear"]
+    assert [one.group for one in pool.candidates] == [
+        "",
+        *3 * ["some"],
+        *4 * ["more"],
+        "bar",
+        "gauge",
+        "dear",
+    ]
     assert [one.plane for one in pool.candidates] == [*4 * "z", *4 * "x", "", "", ""]
 
 
@@ -169,8 +176,8 @@ def test_settings_of_candidates_are_those_of_a_file(tmp_path: Path) -> None:
             replaced(SOME_PROBES, f"{SOME_PROBES}\n      quarter_turns: [1]\n      balls: corners"),
         )
     )
-    assert pool["some x 600 mm at 400, 100 mm"].settings == {
-        "name": "some x 600 mm at 400, 100 mm",
+    assert pool["more x 600 mm at 400, 100 mm"].settings == {
+        "name": "more x 600 mm at 400, 100 mm",
         "artefact": "plate",
         "plane": "x",
         "level": "600 mm",
@@ -305,7 +312,7 @@ def test_a_group_keeps_what_every_probe_can_read_from_inside_the_volume(tmp_path
     text = replaced("right: [-50 mm, 0 mm, 0 mm]", "right: [50 mm, 0 mm, 0 mm]")
     text = replaced("levels: [0 mm, 600 mm]", f"levels: [{listed}]", text)
     text = replaced(
-        "      probes: {z: [[down]], x: [right]}\n",
+        "      probes: [[down]]\n",
         "      probes: {z: [down], x: [[right], [right, down]]}\n",
         text,
     )
@@ -538,9 +545,7 @@ def test_readings_of_a_pool_are_bounded(tmp_path: Path) -> None:
 def test_a_group_without_probes_is_told_what_is_missing(tmp_path: Path) -> None:
     path = tmp_path / "pool.yaml"
     text = GOOD.replace("probes: {down: [0 mm, 0 mm, -50 mm], right: [-50 mm, 0 mm, 0 mm]}\n", "")
-    text = text.replace("      probes: {z: [[down]], x: [right]}\n", "").replace(
-        ", probes: [down]", ""
-    )
+    text = text.replace("      probes: [[down]]\n", "").replace(", probes: [down]", "")
     path.write_text(text, encoding="utf-8")
     with pytest.raises(ExperimentError, match="probes: missing; add"):
         load(path, planning=True)
