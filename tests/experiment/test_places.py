@@ -208,12 +208,19 @@ pool:
   candidates:
     - name: whole
       artefact: plate
-      planes: [z, x]
-      levels: {z: [low, 30 %, 500 mm], x: {from: low, to: high, count: 3}}
-      corners: {x: [low, high], y: middle, z: [high, 200 mm]}
+      planes: [z]
+      levels: [low, 30 %, 500 mm]
+      corners: {x: [low, high], y: middle}
       quarter_turns: [0, 1]
       probes: [[left, right], [right]]
-      balls: [all, [r1c1, r2c2]]
+    - name: across
+      artefact: plate
+      planes: [x]
+      levels: {from: low, to: high, count: 3}
+      corners: {y: middle, z: [high, 200 mm]}
+      quarter_turns: [0, 1]
+      probes: [[left, right], [right]]
+      balls: [r1c1, r2c2]
     - {name: single, artefact: plate, plane: y, level: high, centre: {x: low, z: 10 %}, probes: [down]}
 """
 
