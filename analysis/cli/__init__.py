@@ -357,7 +357,6 @@ class _Parser(argparse.ArgumentParser):
 
     def meant_by(self, unknown: Sequence[str]) -> str:
         """Return a suggestion of the options that the unknown ones are probably meant to be."""
-        from ballplate.simulator.inputs.moved import MOVED
         from ballplate.simulator.inputs.settings import nearest
 
         option_strings = [
@@ -366,9 +365,6 @@ class _Parser(argparse.ArgumentParser):
             for option in action.option_strings
             if option.startswith("--")
         ]
-        for word in unknown:
-            if successor := MOVED.get(f"{self.prog} {word.partition('=')[0]}"):
-                return f"; it is now {successor}"
         meant = [
             nearest(option.partition("=")[0], option_strings)
             for option in unknown
@@ -381,11 +377,8 @@ class _Parser(argparse.ArgumentParser):
 
     def _check_value(self, action: argparse.Action, value: Any) -> None:
         if action.choices is not None and value not in action.choices:
-            from ballplate.simulator.inputs.moved import MOVED
             from ballplate.simulator.inputs.settings import nearest
 
-            if successor := MOVED.get(f"{self.prog} {value}"):
-                self.error(f"{self.prog} {value} is now {successor}")
             meant = nearest(str(value), [str(choice) for choice in action.choices])
             if meant is not None:
                 raise argparse.ArgumentError(

@@ -47,8 +47,8 @@ def add_options(parser: ArgumentParser) -> None:
         "--suggest",
         action="store_true",
         help=(
-            "suggest changes that remove all undetermined and weakly determined directions, each"
-            " verified, ranked by U6 with uncertain probe offsets"
+            "suggest changes that remove all undetermined and weakly determined directions and meet"
+            " the target, each verified: first moves, then readings, then certificates"
         ),
     )
     parser.add_argument(

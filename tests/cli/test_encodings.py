@@ -30,7 +30,6 @@ COMMANDS = [
     "map machine.yaml --format csv",
     "map machine.yaml --json",
     "sweep --export sizes.sqlite -o -",
-    "sweep --report sizes.sqlite --format csv",
     "sweep --report sizes.sqlite --format markdown",
     "spline errors.csv -o -",
     "schema",

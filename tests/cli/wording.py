@@ -57,8 +57,6 @@ ESTIMATORS_OF_DISTANCES_ALONE_CANNOT_FOLLOW = (
 ESTIMATOR_DISTANCES_LENGTHS_OF_STANDARDS_AGAINST = (
     "estimator distances (12 lengths of standards) against"
 )
-EVERY_BAR_LIES_PARALLEL = "every bar lies parallel to the xy plane"
-EVERY_BAR_LIES_PARALLEL_TO_THE_XY = "reason: every bar lies parallel to the xy plane"
 EXX_POSITIONING_ERROR = "EXX (positioning error of X, quadratic)"
 FAR_OUTSIDE_THE_VOLUME = "far outside the volume; check the unit"
 FINISHED_CELLS_ARE_IN_NEW_SQLITE = "finished cases are in new.sqlite"
@@ -95,9 +93,6 @@ MONOMIALS_APPLIES_TO_ESTIMATOR_FULL = (
 )
 MONTE_CARLO_DATA_SETS = "Monte Carlo: 10 data sets of the true machine"
 MONTE_CARLO_DATA_SETS_OF_THE_TRUE = "Monte Carlo: 100 data sets of the true machine, seed 1"
-NO_LENGTH_IS_KNOWN = (
-    "reason: no length is known (gauge: radius): the overall scale of the machine is undetermined"
-)
 NO_READING_OF_THE_BALLS = 'no reading of the balls "r1c2", "r1c3"'
 OF_THE_STATED_ONES = "of the stated ones"
 ONLY_A_BRYAN_GAUGE_HAS = (
