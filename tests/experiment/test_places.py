@@ -235,9 +235,9 @@ def test_candidates_of_a_pool_are_at_the_places_of_positions(limits: str, tmp_pa
     items = [candidate for candidate in pool.candidates if not candidate.drawn]
     names = {candidate.name for candidate in items}
     assert "whole z 30 % at low, middle turn 1 left+right" in names
-    assert "whole x 50 % at middle, 200 mm turn 0 right all balls" in names
+    assert "across x 50 % at middle, 200 mm turn 0 right" in names
     # 3 levels x 2 places and 3 levels x 2 places, 2 turns, 2 sets of probes, 2 of balls, and one.
-    assert len(items) + sum(pool.dropped.values()) == 2 * 6 * 8 + 1
+    assert len(items) + sum(pool.dropped.values()) == 2 * 6 * 4 + 1
     for candidate in items:
         item = candidate.item
         assert isinstance(item, Position)
