@@ -332,7 +332,7 @@ def _out_of_reach(
     time.
     """
     if limits.forbids(members):
-        why = "as limits exclude each; change at_most or never_together"
+        why = "as limits exclude each; change at_most"
         return _impossible(experiment, "pool.limits", f"{text}, {why}{or_else}")
     return _impossible(experiment, "pool", f"{text} with {limits.budget}; allow more{or_else}")
 

@@ -64,7 +64,7 @@ MORE_THAN_VALUES = (
 MOST_OF_ALL = 'most of all "down";'
 NESTED_MORE_THAN_DEEP = "f:3:49: nested more than 50 deep by this alias; write less of it"
 NO_CANDIDATE_IS_LEFT = (
-    "6:3: pool.candidates: no candidate is left: 8 outside the volume; widen the pool"
+    "6:3: pool.candidates: no candidate is left: 4 outside the volume; widen the pool"
 )
 NO_CO_ORDINATES_FOR_ADD_THEM = (
     "e.yaml:14:94: calibration[0].values: no co-ordinates for r3c1, r3c3; add them, or "

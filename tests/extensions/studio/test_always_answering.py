@@ -278,8 +278,9 @@ def test_a_plan_is_applied_in_one_step_as_the_command_would_plan(tmp_path):
     pool = """
 pool:
   candidates:
-    - {planes: [z, x, y], levels: [250 mm, 750 mm], corners: {x: 0 mm, y: 0 mm, z: 0 mm},
-       quarter_turns: [0, 1], probes: {z: [down], x: [right, left], y: [back, front]}}
+    - {planes: [z], levels: [250 mm, 750 mm], corners: {x: 0 mm, y: 0 mm}, quarter_turns: [0, 1], probes: [down]}
+    - {planes: [x], levels: [250 mm, 750 mm], corners: {y: 0 mm, z: 0 mm}, quarter_turns: [0, 1], probes: [right, left]}
+    - {planes: [y], levels: [250 mm, 750 mm], corners: {x: 0 mm, z: 0 mm}, quarter_turns: [0, 1], probes: [back, front]}
 """
     path.write_text(TEXT + pool, encoding="utf-8")
     document = opened(path)
