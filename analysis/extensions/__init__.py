@@ -112,7 +112,7 @@ SHIPPED = (
             ),
             "validate": Command(
                 "validate_command",
-                "leave out positions, plates and directions in turn and predict them",
+                "leave out positions in turn and predict them",
                 "evaluate",
             ),
             "run --budget": Command(
@@ -121,7 +121,6 @@ SHIPPED = (
             ),
         },
         functions=_from("interface", "budget", "compare_models", "validate"),
-        services=_from("bootstrap", "bootstrap") | _from("components", "variance_components"),
     ),
     _here(
         "reliability",
