@@ -139,7 +139,7 @@ SHIPPED = (
         commands={
             "certificate": Command(
                 "certificate_command",
-                "write a plate's ball co-ordinates with their covariance: page, CSV, DCC, GTC",
+                "write a plate's ball co-ordinates with their covariance: page, CSV, DCC",
                 "evaluate",
             ),
         },

@@ -380,7 +380,7 @@ class Fit(FitResult):
         about: Mapping[str, str] | None = None,
     ) -> IssuedCertificate:
         """The co-ordinates of a plate's balls in its own axes with their full covariance, to be
-        written as a page, tables, a digital calibration certificate or a GTC archive.
+        written as a page, tables or a digital calibration certificate.
 
         `datum` names the ball at the origin, one on an axis and, in space, one in the xy plane, or
         is "all"; by default corners of the plate. The coverage factor is by default that of the
