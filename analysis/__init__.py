@@ -56,7 +56,7 @@ if TYPE_CHECKING:
     from ballplate.extensions.reproduction.interface import reproduce
     from ballplate.extensions.requirements.interface import reach
     from ballplate.extensions.splines.interface import spline
-    from ballplate.extensions.sweeps.interface import stored, sweep, sweep_report
+    from ballplate.extensions.sweeps.interface import stored, sweep
     from ballplate.extensions.sweeps.running import OtherSweepError
     from ballplate.extensions.sweeps.store_file import StoreError
     from ballplate.planning.criteria import Criterion
@@ -167,7 +167,6 @@ __all__ = [
     "spline",
     "stored",
     "sweep",
-    "sweep_report",
     "validate",
     "view",
     "write_file",
@@ -204,11 +203,7 @@ def __getattr__(name: str) -> Any:
         try:
             value = function(name)
         except KeyError:
-            from ballplate.simulator.inputs.moved import MOVED
-
-            successor = MOVED.get(f"bp.{name}")
-            moved = "" if successor is None else f"; it is now {successor}"
-            message = f"module {__name__!r} has no attribute {name!r}{moved}"
+            message = f"module {__name__!r} has no attribute {name!r}"
             raise AttributeError(message) from None
         except MissingExtensionError as error:
             raise MissingNameError(f"{__name__}.{name}: {error}") from None

@@ -11,7 +11,8 @@ from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
+from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, overload
 
@@ -42,7 +43,6 @@ if TYPE_CHECKING:
     from .arguments import Tables
     from .estimators.distances import EstimatorComparison
     from .planning.criteria import CriterionName
-    from .planning.orders import OrderName
     from .planning.selection import Campaign
     from .presentation.result import FitResult
     from .results.fits import Fit
@@ -354,8 +354,6 @@ def plan(
     done: PathLike | pandas.DataFrame | None = None,
     moved: bool = False,
     earlier: PathLike | None = None,
-    order: OrderName | None = None,
-    drift: Sequence[str] = (),
     report: Report = unreported,
 ) -> Campaign:
     """Choose positions and certificates from the experiment's pool within a limit, with the bound
@@ -364,20 +362,17 @@ def plan(
     Without a limit the choice may cost as much as the positions of the experiment. Readings that
     are `done` already are kept; if the artefact has `moved` since, a position interrupted there
     can only be set up again. `earlier` is the file of an earlier choice from this pool, to compare
-    with and continue. An `order`, change-over, mirrored, blocks or least-drift, or sizes of a
-    `drift` such as ["0.5 um/h", "0.2 ppm/h"] add the effect of drift in each order.
+    with and continue.
 
     >>> corners = {"x": ["50 mm"], "y": ["50 mm"]}
     >>> places = {"planes": ["z"], "levels": ["100 mm", "400 mm"], "corners": corners}
     >>> pool = {"candidates": [places | {"probes": ["down"]}]}
-    >>> chosen = plan(quickstart().with_(pool=pool), positions=7)
-    >>> chosen.headline()
+    >>> plan(quickstart().with_(pool=pool), positions=7).headline()
     '7 of 8 candidates, U6 0.137 µm, given chain of axes MB2, temperatures exactly known'
     """
     from .planning.campaign_choice import Request, campaign
     from .planning.constraints import HOUR, Budget
     from .planning.criteria import NAMES
-    from .planning.orders import ORDERS
     from .simulator.experiment.loading import with_pool
 
     ensure_one_of(NAMES, criterion=str(criterion))
@@ -389,9 +384,7 @@ def plan(
     budget = None
     if (hours, positions, readings) != (None, None, None):
         budget = Budget(None if hours is None else HOUR * hours, readings, positions)
-    if order is not None:
-        ensure_one_of(tuple(ORDERS), order=order)
-    request = Request(criterion, budget, curve, seed, order, tuple(drift))
+    request = Request(criterion, budget, curve, seed)
     loaded = load_file(experiment, True) if isinstance(experiment, str | os.PathLike) else ()
     chosen = loaded[0] if len(loaded) == 1 else with_pool(experiment_of(experiment))
     done_table = None if done is None else table_of("done", done)
@@ -403,7 +396,7 @@ def plan(
 
 
 def load_map(path: PathLike) -> FittedMap:
-    """The map of a file that a fit left behind, YAML or .npz.
+    """The map of a file that a fit left behind.
 
     >>> from tempfile import TemporaryDirectory
     >>> with TemporaryDirectory() as folder:
@@ -419,12 +412,12 @@ def load_map(path: PathLike) -> FittedMap:
 
 
 def write_map(fitted: FittedMap, path: PathLike) -> None:
-    """Write what `to_map()` of a fit gives into a file: YAML, or arrays of NumPy where its name
-    ends in .npz. Numbers keep all their digits; a file of that name is overwritten.
+    """Write what `to_map()` of a fit gives into a file in YAML. Numbers keep all their digits; a
+    file of that name is overwritten.
 
     >>> from tempfile import TemporaryDirectory
     >>> with TemporaryDirectory() as folder:
-    ...     path = f"{folder}/map.npz"
+    ...     path = f"{folder}/map.yaml"
     ...     write_map(fit(quickstart(), simulate(quickstart())).to_map(), path)
     ...     load_map(path).degrees_of_freedom
     580
@@ -438,12 +431,12 @@ def write_map(fitted: FittedMap, path: PathLike) -> None:
 
 
 def _shown_in_notebook(experiment: Experiment) -> str:
-    """Return the notebook view of an experiment: its table and its picture, which the experiment
+    """Return the notebook view of an experiment: its title and its picture, which the experiment
     itself cannot draw.
     """
     view = optional_function("view")
     picture = "" if view is None else view(experiment)._repr_html_()
-    return experiment._repr_html_() + picture
+    return f"<p>{escape(repr(experiment))}</p>\n{picture}"
 
 
 def _teach_notebook() -> None:

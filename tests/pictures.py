@@ -62,7 +62,7 @@ def _pages(folder: Path) -> dict[str, Path]:
         "design-page": page_of_design(experiment, bp.run(experiment)),
         "design-undetermined": page_of_design(loose, bp.run(loose)),
         "fit-page": fit.page(),
-        "sweep-page": bp.sweep_report(store),
+        "sweep-page": bp.page(bp.stored(store)),
     }
     found = {}
     for name, text in texts.items():

@@ -67,8 +67,8 @@ def printed(capsys: pytest.CaptureFixture[str], *arguments: str) -> Any:
             ),
         ),
         (
-            lambda: bp.reproduce("certified", "one-position"),
-            ("reproduce", "certified", "--experiment=one-position"),
+            lambda: bp.reproduce("npl", "6.1.2"),
+            ("reproduce", "npl", "--experiment=6.1.2"),
         ),
         (
             lambda: bp.reach(QUICKSTART, unknowns="repeatability", target="1 um", share=0.9),
@@ -217,7 +217,7 @@ WRONG: list[tuple[Callable[[], object], type[Exception], str]] = [
         ValueError,
         'start_slope: "flat" is not a slope',
     ),
-    (lambda: bp.reproduce("np"), ValueError, 'document: "np" is unknown; give npl or certified'),
+    (lambda: bp.reproduce("np"), ValueError, 'document: "np" is unknown; give npl'),
     (lambda: bp.reproduce("npl", "6.9"), ValueError, 'no experiment "6.9"'),
     (lambda: bp.reach(QUICKSTART, share=2), ValueError, "share=2; give a ratio above 0"),
     (lambda: bp.reach(QUICKSTART, target=3), TypeError, "target=3; give a text with a unit"),
@@ -302,14 +302,6 @@ def test_a_check_has_a_table() -> None:
     assert row["rank deficiency"] == deficiency and not row["as expected"]
 
 
-def test_an_experiment_shows_itself() -> None:
-    given = bp.quickstart().with_({"positions[z low].name": "<b>"})
-    html = given._repr_html_()
-    assert "1000 x 1000 x 1000 mm" in html and "0.2 µm" in html and "plate: 25 balls" in html
-    assert "position &lt;b&gt;" in html and "<b>" not in html
-    assert html.count("<tr>") == html.count("</tr>") == 12
-
-
 def test_residuals_in_space_are_drawn_as_seen() -> None:
     """The picture shows what an eye to the right of the front and above it sees of each vector."""
     experiment = bp.quickstart()
@@ -368,7 +360,7 @@ def test_a_notebook_shows_the_first_rows_of_a_long_table() -> None:
     rows, whole, shown = len(found.rows()), found.to_html(), found._repr_html_()
     assert rows > 60
     # One row of headings.
-    assert whole.count("<tr>") == rows + 1 and shown.count("<tr>") == 61
+    assert whole.count("<tr") == rows + 1 and shown.count("<tr") == 61
     assert f"and {rows - 60} more rows" in shown and "more rows" not in whole
 
 

@@ -52,7 +52,7 @@ def add_options(parser: ArgumentParser) -> None:
         "--output",
         metavar="MAP",
         type=map_path,
-        help="write the map of the machine, with its covariance (.yaml, or .npz)",
+        help="write the map of the machine, with its covariance (.yaml)",
     )
     parser.add_argument(
         "--date",

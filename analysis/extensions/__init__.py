@@ -53,10 +53,8 @@ SHIPPED = (
         "repair",
         functions=_from("interface", "repair"),
         services={
-            **_from("suggestions", "suggested"),
+            **_from("repair_search", "suggested"),
             **_from("mending_command", "with_repairs"),
-            **_from("missing_bars", "bar_reasons"),
-            **_from("whole_pool", "pool_gap"),
         },
     ),
     _here(
@@ -83,9 +81,8 @@ SHIPPED = (
         },
         functions=_from("interface", "sheet"),
         services={
-            **_from("campaign_picture", "draw_campaign"),
+            **_from("campaign_picture", "draw_curve"),
             **_from("sheet", "Sheet"),
-            **_from("drift_orders", "DriftOrders"),
             **_from("earlier", "begun"),
         },
     ),
@@ -212,12 +209,12 @@ SHIPPED = (
                 "plan",
             ),
             "sweep --report": Command(
-                "report_command", "results of a store as an HTML page, or its tables"
+                "report_command", "results of a store as an HTML page, or a table"
             ),
             "sweep --export": Command("export_command", "results of a store as CSV or Parquet"),
         },
         functions={
-            **_from("interface", "stored", "sweep", "sweep_report"),
+            **_from("interface", "stored", "sweep"),
             **_from("running", "OtherSweepError"),
             **_from("store_file", "StoreError"),
         },
@@ -242,7 +239,7 @@ SHIPPED = (
         commands={
             "reproduce": Command(
                 "reproduce_command",
-                "compute published experiments or certified problems, and compare the figures",
+                "compute published experiments, and compare the figures",
             ),
         },
         functions=_from("interface", "reproduce"),

@@ -101,20 +101,17 @@ def accumulate(
     squares = estimates.sum_of_squares[used]
     sigma = np.sqrt(np.maximum(squares, 0.0) / max(limits.freedom, 1))
     quantities = []
-    # Allocated once, since the largest vectors exceed the cache.
-    work = np.empty((2, len(squares) * max((len(aim.base) for aim in aims), default=0)))
     for aim in aims:
         change = aim.change(estimates.found)
         change = change if used.all() else change[used]
-        error, squared = work[:, : change.size].reshape(2, *change.shape)
         # Sums over the quantity's members are products with vectors of weights: one pass each.
         weight = aim.uncertainty**-2.0
-        of_scatter = np.square(change, out=squared) @ weight
+        of_scatter = change**2 @ weight
         # Excess of the errors' squares over those of their deviations, without subtracting two sums
         # that may be far larger.
         systematic = change @ (2.0 * aim.base * weight) + aim.base**2 @ weight
-        np.add(change, aim.base, out=error)
-        np.square(error, out=squared)
+        error = change + aim.base
+        squared = error**2
         errors, squares_of_errors = error.sum(axis=0), squared.sum(axis=0)
         # Relative to the mean square uncertainty in the same unit: relative to each uncertainty,
         # the few members that have almost none would dominate.

@@ -31,9 +31,6 @@ from ..uncertainty.quantities import QUANTITIES, functions_of
 # Distances followed through all replicates; more are sampled.
 MOST_PAIRS = 1000
 
-# Changes of distances computed at once, so that they stay in cache.
-ENTRIES_AT_ONCE = 16_384
-
 # Fraction of the largest uncertainty in a unit below which a value is unchanged but for rounding.
 UNCHANGED = 1e-8
 
@@ -126,15 +123,8 @@ def _change(shared: Reference, places: MeasuredPoints) -> Callable[[Deviations],
     model = shared.local_model(places.points, places.probes)
     n, d = places.points.shape
     are_free = bool((shared.factor.layout.offset_columns[places.probes] >= 0).any())
-    # Co-ordinates and distances of the same points are computed successively: one is cached.
-    last: list[tuple[Deviations, Array]] = []
 
     def change(replicates: Deviations) -> Array:
-        if not (last and last[0][0] is replicates):
-            last[:] = [(replicates, changed(replicates))]
-        return last[0][1]
-
-    def changed(replicates: Deviations) -> Array:
         unmoved = np.zeros((len(replicates.a), d, n))
         offsets = replicates.offsets[:, places.probes].swapaxes(1, 2) if are_free else None
         return model.change(unmoved, replicates.a, offsets)
@@ -234,28 +224,12 @@ def _distances(
     pairs = pairs_of(displaced_points.moved, np.stack(ends, axis=1))
     uncertainty = np.where(pairs.is_open, np.nan, pairs.uncertainties)
 
-    squared, double = length**2, 2.0 * between
-
     def change(replicates: Deviations) -> Array:
         displaced = moved(replicates)
+        difference = displaced[:, :, first] - displaced[:, :, second]
         # The difference of squared lengths from that of co-ordinates keeps all digits.
-        gained = np.zeros((len(displaced), len(first)))
-
-        rows = max(ENTRIES_AT_ONCE // len(first), 1)
-        work = np.empty((2, rows, len(first)))
-        for start in range(0, len(gained), rows):
-            chunk, changes = gained[start : start + rows], displaced[start : start + rows]
-            difference, buffer = work[:, : len(chunk)]
-            for axis in range(displaced.shape[1]):
-                np.take(changes[:, axis], first, axis=1, out=difference, mode="clip")
-                difference -= np.take(changes[:, axis], second, axis=1, out=buffer, mode="clip")
-                np.add(difference, double[:, axis], out=buffer)
-                buffer *= difference
-                chunk += buffer
-            root = np.sqrt(np.add(squared, chunk, out=buffer), out=buffer)
-            root += length
-            chunk /= root
-        return gained
+        gained = (difference * (difference + 2.0 * between.T)).sum(axis=1)
+        return gained / (np.sqrt(length**2 + gained) + length)
 
     return MonteCarloQuantity(
         symbol, length - true_length, uncertainty, ("m",) * len(first), change, sampled

@@ -20,7 +20,6 @@ from ballplate.simulator.inputs.settings import number_of
 from ballplate.simulator.inputs.trust import OPENED, Trust
 from ballplate.simulator.inputs.yamltree import Mark
 
-from ..rank.verdicts import Verdict
 from ..results.checked_designs import check
 from ..results.prediction import Advice, Prediction
 from ..results.qualifications import given_words
@@ -31,7 +30,7 @@ WITH_MODULES = "leave --no-modules out if you trust the file"
 class SuggestedChanges(Protocol):
     """Suggestions for a design, as lines of text and as plain data."""
 
-    def lines(self, judged: Verdict) -> list[str]: ...
+    def lines(self) -> list[str]: ...
 
     def data(self) -> Data: ...
 
@@ -178,7 +177,7 @@ def advised(design: CheckedDesign) -> CheckedDesign:
     lines = [*design.goals]
     data = {"goals": list(design.goals), "missed": list(design.missed)}
     if design.suggestions is not None:
-        lines += design.suggestions.lines(prediction.verdict)
+        lines += design.suggestions.lines()
         data |= design.suggestions.data()
     advice = Advice(design.missed, tuple(lines), data)
     return replace(design, prediction=replace(prediction, advice=advice))

@@ -104,7 +104,7 @@ class Result:
         return self._written(as_markdown)
 
     def to_latex(self) -> str:
-        """Its main table in LaTeX, as a table environment that needs no package."""
+        """Its main table as a tabular of LaTeX, which needs the package booktabs."""
         return self._written(as_latex)
 
     def to_html(self) -> str:

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from .fitting import fit
     from .map_of_fit import FRAMES, MappedFit, data_of, left_out_words
     from .prediction import Prediction
-    from .qualifications import Qualification, given_words, qualification_data
+    from .qualifications import Qualification, given_words, qualification_data, qualifications_of
     from .residuals import reading_residuals
     from .sigmas_by_campaign import campaign_sigmas, with_sigmas
     from .text_blocks import scale_lines, target_lines, verdict_lines

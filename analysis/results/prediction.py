@@ -29,7 +29,7 @@ from .qualifications import (
     Qualification,
     given_words,
     qualification_data,
-    qualifications,
+    qualifications_of,
 )
 from .text_blocks import (
     QUANTITY_COLUMNS,
@@ -95,7 +95,7 @@ class Prediction(Result):
     def qualifications(self) -> tuple[Qualification, ...]:
         """What the figures and verdicts take for granted, as every output states it."""
         deficiency = self.verdict.deficiency
-        return tuple(qualifications(deficiency, self.scale, self.assumptions, self.experiment))
+        return tuple(qualifications_of(deficiency, self.scale, self.assumptions, self.experiment))
 
     @property
     def qualified(self) -> list[str]:

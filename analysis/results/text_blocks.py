@@ -155,7 +155,6 @@ def verdict_lines(
             lines.append(f"{title}: {len(listed) - 20} directions more")
     if judged.weak and lengths is not None:
         lines.append(f"all directions together: {_lengths_words(lengths)}")
-    lines += [f"reason: {reason}" for reason in judged.reasons]
     return lines
 
 
@@ -388,7 +387,6 @@ def verdict_data(judged: Verdict) -> Data:
         "expected_rank_deficiency": judged.expected,
         **picked(judged, "as_expected", "singular_values", "gap"),
         "undetermined": list(map(str, judged.null)),
-        "reasons": judged.reasons,
         "weakly_determined": [
             {
                 "text": str(direction),

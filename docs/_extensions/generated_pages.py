@@ -13,17 +13,12 @@ from pathlib import Path
 from typing import Any
 
 from ballplate.cli import parser as command_line
-from ballplate.extensions.reproduction.compare import reproduce
-from ballplate.extensions.reproduction.published import npl
-from ballplate.extensions.reproduction.reproduction_tables import reproduction_markdown
-from ballplate.extensions.reproduction.shipped import Shipped
 from ballplate.extensions.sweeps.sweep_schema import schema as sweep_schema
 from ballplate.simulator.experiment.json_schema import schema
 from ballplate.simulator.experiment.machine_sections import machine_schema
 from ballplate.simulator.experiment.map_sections import map_schema
-from ballplate.simulator.inputs.moved import MOVED
 from ballplate.simulator.inputs.quantities import (
-    UNITS,
+    KINDS,
     Angle,
     Bending,
     Duration,
@@ -39,9 +34,6 @@ from sphinx.application import Sphinx
 Schema = dict[str, Any]
 
 TOP = Path(__file__).resolve().parents[2]
-
-# As many as the command takes unless told.
-DATA_SETS = 100
 
 QUANTITIES = {
     TypeAdapter(kind).json_schema()["pattern"]: words
@@ -81,13 +73,6 @@ def map_format() -> str:
     return _keys(whole)
 
 
-def reproduction(data_sets: int = DATA_SETS) -> str:
-    """The published figures beside ours, as Markdown."""
-    found = reproduce(npl(), Shipped(TOP / "designs" / "npl"), (), data_sets)
-    # The page has a title of its own.
-    return reproduction_markdown(found).partition("\n")[2]
-
-
 def _keys(whole: Schema) -> str:
     sections = dict(_sections(whole))
     lines = ["## The file", "", *_table(whole, whole, sections)]
@@ -106,7 +91,8 @@ def _keys(whole: Schema) -> str:
 def units() -> str:
     """The units of quantities as Markdown."""
     return "\n".join(
-        f"- {kind}: {', '.join(f'`{unit}`' for unit in names)}" for kind, names in UNITS.items()
+        f"- {kind}: {', '.join(f'`{unit}`' for unit in about.units)}"
+        for kind, about in KINDS.items()
     )
 
 
@@ -235,12 +221,6 @@ def commands() -> str:
     return "\n".join(lines)
 
 
-def moved() -> str:
-    """What moved, as Markdown."""
-    rows = [f"| `{old}` | `{new}` |" for old, new in MOVED.items()]
-    return "\n".join(["| before | now |", "|---|---|", *rows])
-
-
 def _usage(parser: argparse.ArgumentParser) -> list[str]:
     parser.formatter_class = lambda prog: argparse.HelpFormatter(prog, width=90)
     # From Python 3.14 on help has colours on a terminal, where this may well run.
@@ -261,7 +241,6 @@ def _text(action: argparse.Action) -> str:
     return (action.help or "").replace("%%", "%") + "."
 
 
-REPRODUCTION = "<!-- reproduction -->"
 PARTS = {
     "<!-- file format -->": file_format,
     "<!-- sweep format -->": sweep_format,
@@ -269,14 +248,11 @@ PARTS = {
     "<!-- map format -->": map_format,
     "<!-- units -->": units,
     "<!-- commands -->": commands,
-    "<!-- moved -->": moved,
-    REPRODUCTION: reproduction,
 }
 
 
 def _fill(app: Sphinx, page: str, source: list[str]) -> None:
-    parts = {**PARTS, REPRODUCTION: lambda: reproduction(app.config.data_sets)}
-    for marker, part in parts.items():
+    for marker, part in PARTS.items():
         if marker in source[0]:
             source[0] = source[0].replace(marker, part())
             # The program may have changed although the page has not.
@@ -284,7 +260,5 @@ def _fill(app: Sphinx, page: str, source: list[str]) -> None:
 
 
 def setup(app: Sphinx) -> dict[str, bool]:
-    # Fewer are drawn where it is tested that the pages can be built.
-    app.add_config_value("data_sets", DATA_SETS, "env", int)
     app.connect("source-read", _fill)
     return {"parallel_read_safe": True, "parallel_write_safe": True}

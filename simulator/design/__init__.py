@@ -24,12 +24,8 @@ if TYPE_CHECKING:
     )
     from .influences.displacements import SharedDisplacements
     from .influences.drift import (
-        HOUR,
         Clock,
         Drift,
-        DriftSettings,
-        PointDriftSettings,
-        ScaleDriftSettings,
         even_clock,
     )
     from .influences.position_scale import PositionScale
@@ -77,7 +73,7 @@ if TYPE_CHECKING:
     )
     from .observations.star import Stars
     from .observations.stated_values import CertificateEntry, FileValues, value_name
-    from .observations.whitening import CovarianceRoot, Whitening, at_least_exact
+    from .observations.whitening import CovarianceRoot, Whitening
     from .parameters import SharedLayout, shared_layout
 
 __getattr__, __dir__ = lazily(__name__, __file__)

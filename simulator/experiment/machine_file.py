@@ -36,6 +36,7 @@ from ..splines.spline_problems import SplineError, SplineProblem
 from .error_tables import ErrorTable, read_error_table
 from .machine_sections import DescribedMachineSettings, SmoothingSettings
 from .sections import VolumeSettings
+from .volumes import check_ends
 
 # Part of a polynomial's coefficients that is rounding.
 NOTHING = 1e-12
@@ -116,7 +117,7 @@ def _bare(settings: DescribedMachineSettings, problems: Problems) -> MachineDesc
             problems.add(("volume", "z"), "missing; a machine file has three axes")
             return None
         ends = [volume.x, volume.y, volume.z]
-    _check_ends(ends, problems)
+    check_ends(dict(zip(AXES, ends, strict=True)), ("volume",), problems)
     # What else is wrong is told with the ends exchanged, or without any.
     ends = [
         (min(pair), max(pair)) if pair[0] != pair[1] else (-math.inf, math.inf) for pair in ends
@@ -157,26 +158,13 @@ def _bare(settings: DescribedMachineSettings, problems: Problems) -> MachineDesc
     return replace(machine, reference=bottom)
 
 
-def _check_ends(ends: Iterable[tuple[float, float]], problems: Problems) -> None:
-    for axis, (lower, upper) in zip(AXES, ends, strict=False):
-        if upper < lower:
-            text = (
-                f"ends at {format_length(upper)}, not above its beginning, {format_length(lower)};"
-                " exchange them"
-            )
-            problems.add(("volume", axis), text)
-        elif upper == lower:
-            text = f"begins and ends at {format_length(lower)}; give an end above it"
-            problems.add(("volume", axis), text)
-
-
 def _volume_of(root: Mapping, problems: Problems) -> None:
     """Report faults of the volume of a file that has other faults."""
     try:
         volume = VolumeSettings.model_validate(to_python(root).get("volume"))
     except ValidationError:
         return
-    _check_ends([ends for ends in (volume.x, volume.y, volume.z) if ends is not None], problems)
+    check_ends(volume.stated, ("volume",), problems)
 
 
 def _three(values: Iterable[float]) -> Three:

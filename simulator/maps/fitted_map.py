@@ -74,7 +74,7 @@ class FittedMap:
     expanded uncertainties. `frame` describes the rigid motion that the model holds, `temperatures`
     are in degrees Celsius, and `left_out` are estimates of the fit that the map does not apply.
     `date` is that of the campaign, as 2026-11-22, if known. `sum_of_squares` is S^2 at the stated
-    uncertainties and `lack_of_fit` that of the fit, if the map states them.
+    uncertainties and `lack_of_fit` that of the fit.
     """
 
     title: str
@@ -90,17 +90,17 @@ class FittedMap:
     sigma: float
     sigma_is_estimated: bool
     degrees_of_freedom: int
+    sum_of_squares: float
+    lack_of_fit: LackOfFit
     repeatability: Array
     coverage_factor: float = 2.0
     frame: str = ""
     temperatures: Mapping[str, float] | None = None
     left_out: tuple[LeftOut, ...] = ()
     data: MapData | None = None
-    lack_of_fit: LackOfFit | None = None
     experiment: str = ""
     program: str = ""
     date: str | None = None
-    sum_of_squares: float | None = None
 
     def __repr__(self) -> str:
         open_ = self.undetermined.shape[1]
@@ -116,16 +116,6 @@ class FittedMap:
     def without_scatter(self) -> bool:
         """True if sigma, and with it the covariance, is zero except rounding."""
         return self.sigma_is_estimated and self.sigma < LEAST_SIGMA
-
-    @property
-    def known_lack_of_fit(self) -> LackOfFit:
-        """Basis of warnings: the stated lack of fit, or else the one that an estimated sigma
-        implies.
-        """
-        if self.lack_of_fit is not None:
-            return self.lack_of_fit
-        freedom = self.degrees_of_freedom if self.sigma_is_estimated else 0
-        return LackOfFit(self.sigma * self.sigma * freedom, freedom)
 
     @property
     def conversion_residual(self) -> float | None:

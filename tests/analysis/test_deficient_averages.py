@@ -12,8 +12,7 @@ import pandas
 import pytest
 import yaml
 from ballplate.cli import main
-from ballplate.extensions.sweeps.report.results import best_and_worst, read_results
-from ballplate.extensions.sweeps.store import open_store
+from ballplate.extensions.sweeps.answer import answer
 from ballplate.results import planned_uncertainty
 from ballplate.simulator.estimation import linearise
 from ballplate.simulator.estimation.functions import displacements
@@ -114,15 +113,16 @@ def test_numbers_of_a_sweep(tmp_path: Path, capsys: pytest.CaptureFixture[str]) 
     assert (frame["U6_average_m"].isna() == is_part).all()
     assert (frame["U6_maximum_m"].isna() == is_part).all()
     assert not is_part[frame["U6_average_m"].idxmin()]
-    opened = open_store(Path(store))
-    best = best_and_worst(read_results(opened, 1))[0]
-    opened.close()
-    assert not is_part[frame["cell"] == best].any()
-    assert main(["sweep", "--report", store, "--format", "csv", "-o", "-"]) == 0
-    rows = [line.split(",")[2:4] for line in capsys.readouterr().out.splitlines()]
-    assert rows[1] == (["5", "0"] if is_part[0] else ["0", "5"])
-    for row in rows[2:4]:
-        assert [cell == "-" for cell in row] == is_part.tolist()
+    assert not is_part[frame["cell"] == answer(bp.stored(store)).case].any()
+    assert main(["sweep", "--report", store, "--format", "markdown", "-o", "-"]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    heads, _, *rows = [
+        [cell.strip() for cell in line.strip("|").split("|")] for line in lines if line[:1] == "|"
+    ]
+    deficiencies = [row[heads.index("rank deficiency")] for row in rows]
+    assert deficiencies == (["5", "0"] if is_part[0] else ["0", "5"])
+    for name in ("U6 maximum, µm", "U6 average, µm"):
+        assert [row[heads.index(name)] == "undetermined" for row in rows] == is_part.tolist()
 
 
 def test_reach_of_a_deficient_design() -> None:

@@ -102,7 +102,7 @@ def test_every_form_has_every_row(results: list[Result]) -> None:
         assert_shows(page.rows, rows)
         assert_shows(from_markdown(result.to_markdown()), rows)
         latex = result.to_latex()
-        assert latex.count(r"\begin{table}") == latex.count(r"\end{table}") == 1
+        assert latex.count(r"\begin{tabular}") == latex.count(r"\end{tabular}") == 1
         assert len(re.findall(r"\\\\$", latex, re.MULTILINE)) == len(rows) + 1
 
 

@@ -105,7 +105,7 @@ def test_files_in_each_others_place_are_told(
     for arguments, words in (
         (["next", "readings.csv", design], f"first, then the readings: next {design} readings.csv"),
         (["run", "--budget", "readings.csv", design], "the experiment file comes first"),
-        (["fit", design, "map.npz"], "map.npz is no table of readings"),
+        (["fit", design, "map.yml"], "map.yml is no table of readings"),
         (["next", design, "map.yaml"], "map.yaml is no table of readings"),
         (
             ["adjust", "map.yaml", "--scale", "x=1 ppm", "--after", "r.csv"],

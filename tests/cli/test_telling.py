@@ -46,10 +46,6 @@ def test_results_are_the_same(command: str, capsys: pytest.CaptureFixture[str]) 
     assert re.fullmatch(
         rf"{command}: [0-9.e-]+ s, [0-9.e-]+ s of the processor in this process", lines[-1]
     )
-    steps = {"run --lengths": "lengths", "run --reliability": "observations"}
-    assert command == "check" or re.fullmatch(
-        rf"(\d+) of \1 {steps[command]}: [0-9.e-]+ s", lines[-2]
-    )
 
 
 def test_files_that_an_experiment_names_are_told(capsys: pytest.CaptureFixture[str]) -> None:
@@ -103,9 +99,8 @@ def test_no_bar_when_quiet(
 ) -> None:
     with monkeypatch.context() as patched:
         patched.setattr(type(sys.stderr), "isatty", lambda self: True)
-        assert "351 lengths" in "".join(
-            told(capsys, "run", "--lengths", QUICKSTART, "--grid", "3")[2]
-        )
+        shown = "".join(told(capsys, "run", "--lengths", QUICKSTART, "--grid", "3")[2])
+        assert "lengths: " in shown and "351/351" in shown
         assert told(capsys, "run", "--lengths", QUICKSTART, "--grid", "3", "-q")[2] == []
 
 
@@ -119,10 +114,10 @@ def test_check_shows_how_far_it_has_come(
     shown = told(capsys, "check", gauge, "designs/quickstart.yaml")
     # A terminal's lines are wrapped.
     assert (shown[0], shown[1].split()) == (plain[0], plain[1].split())
-    assert "2/2 files" in "".join(shown[2])
-    assert "5/5 designs" in "".join(told(capsys, "check", gauge)[2])
+    assert re.search("files: .* 2/2", "".join(shown[2]))
+    assert re.search("designs: .* 5/5", "".join(told(capsys, "check", gauge)[2]))
     search = told(capsys, "check", gauge, "--variant", "radius unknown", "--suggest")
-    assert re.search(r"[0-9]/[0-9] kinds of changes, [0-9:?]+ left", "".join(search[2]))
+    assert re.search("kinds of changes: .* [0-9]/[0-9]", "".join(search[2]))
     assert told(capsys, "check", gauge, "-q")[2] == []
     assert told(capsys, "check", "designs/quickstart.yaml")[2] == []
 

@@ -16,4 +16,3 @@ PRIOR_OF_RATIO_OF_THE_STYLI = "prior of ratio of the styli"
 RATIO_OF_THE_STYLI = "ratio of the styli"
 SENSOR_ERROR_OF_PLATE = "sensor error of plate"
 SENSOR_ERROR_OF_THE_SCALES = "sensor error of the scales"
-THE_DERIVATIVE_OF_SHIFTS = 'the derivative of shifts by "more" is'

@@ -95,12 +95,12 @@ def test_readings_of_a_measured_machine(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("x", "lines"),
     [
-        ("", ["x.csv: the file is empty; its first line should be position_mm,EXX_um,EYX_um,EAX_urad"]),
-        ("position_mm,EXX\n0,1\n", ["x.csv:1:13: the column \"EXX\" has no unit; write it with its unit"]),
-        ("position_mm,EQX_um\n0,1\n", ["x.csv:1:13: the column \"EQX_um\" is not an error of an axis; did you mean \"E"]),
+        ("", ["x.csv:1:1: the file is empty; its first line should be position_mm"]),
+        ("position_mm,EXX\n0,1\n", ["x.csv:1:13: the column \"EXX\" has no unit; write for example EXX_um"]),
+        ("position_mm,EQX_um\n0,1\n", ["x.csv:1:13: unknown column \"EQX_um\"; did you mean \"E"]),
         ("position_mm,EXX_urad\n0,1\n", ["x.csv:1:13: unknown unit in the column \"EXX_urad\""]),
         ("position_mm,EAX_um\n0,1\n", ["x.csv:1:13: unknown unit in the column \"EAX_um\""]),
-        ("EXX_um,EYX_um\n0,1\n", ["x.csv:1:1: has no position, or no error; write columns as in position_mm,EXX_um"]),
+        ("EXX_um,EYX_um\n0,1\n", ["x.csv:1:1: no column for position; the first line should be position_mm"]),
         ("position_mm,EXX_um,EYY_um\n0,1,1\n", ["x.csv:1:1: errors of the axes X, Y; write one file for each axis"]),
         ("position_mm,EXX_um\n0,1\n", ["x.csv:1:1: a curve needs at least two points"]),
         ("position_mm,EXX_um\n0,1\n5\n9,one\n", ["x.csv:3:1: 1 columns instead of 2", "x.csv:4:3: \"one\" is not"]),

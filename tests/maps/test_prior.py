@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import re
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -276,30 +275,6 @@ def test_stated_uncertainties_cancel(tmp_path: Path) -> None:
     assert results[1] == pytest.approx(results[0], rel=1e-5)
 
 
-def without_sums(path: Path) -> None:
-    """A map file as it was written before it stated its sum of squares."""
-    text = re.sub(r', "sum_of_squares": [^}]*', "", path.read_text(encoding="utf-8"))
-    path.write_text(re.sub("\nchecksum: .*", "", text), encoding="utf-8")
-
-
-@pytest.mark.parametrize("sigma", ["estimated", "given"])
-def test_an_older_map_says_what_it_lacks(sigma: str, tmp_path: Path) -> None:
-    campaigns = Campaigns("metric", tmp_path)
-    campaigns.factor = 2.0
-    campaigns.map_of_first(sigma=sigma)
-    later = {"sigma": "estimated", "priors": [{"kind": "map", "file": "first.yaml"}]}
-    second = campaigns.experiment("B", campaigns.second, **later)
-    new: Any = bp.fit(second, campaigns.readings[~campaigns.of_first])
-    without_sums(tmp_path / "first.yaml")
-    second = campaigns.experiment("B", campaigns.second, **later)
-    old: Any = bp.fit(second, campaigns.readings[~campaigns.of_first])
-    lack = "the map is older and does not state its sum of squares"
-    assert lack not in "".join(new.lines()) and lack in "".join(old.lines())
-    # It follows from an estimated sigma; otherwise nothing can be tested.
-    assert (old.sigma == pytest.approx(new.sigma, rel=1e-12)) == (sigma == "estimated")
-    assert (wording.ITS_RESIDUALS_ARE_UNKNOWN in "".join(old.lines())) == (sigma == "given")
-
-
 def test_predictions_say_how_a_map_is_scaled(tmp_path: Path) -> None:
     """By its own sigma: the readings to come are taken at their stated uncertainties."""
     campaigns = Campaigns("spatial metric", tmp_path)
@@ -475,16 +450,15 @@ def test_combinations_are_lengths_by_name(tmp_path: Path) -> None:
 def test_files_nobody_has_looked_at_run_no_map_of_a_model_in_python(tmp_path: Path) -> None:
     write_files(tmp_path)
     experiment = bp.experiment(IN_SPACE | {"error_model": model_of("python", tmp_path)}, tmp_path)
-    for name in ("own.yaml", "own.npz"):
-        bp.write_map(bp.fit(experiment, bp.simulate(experiment)).to_map(), tmp_path / name)
-        sections = IN_SPACE | {
-            "error_model": {"kind": "metric"},
-            "true_machine": {"kind": "map", "file": name},
-        }
-        (tmp_path / "file.yaml").write_text(json.dumps(sections), encoding="utf-8")
-        assert load(tmp_path / "file.yaml")
-        with pytest.raises(bp.ExperimentError, match=wording.OWN_IS_CODE_IN_PYTHON):
-            load(tmp_path / "file.yaml", trust=UNKNOWN)
+    bp.write_map(bp.fit(experiment, bp.simulate(experiment)).to_map(), tmp_path / "own.yaml")
+    sections = IN_SPACE | {
+        "error_model": {"kind": "metric"},
+        "true_machine": {"kind": "map", "file": "own.yaml"},
+    }
+    (tmp_path / "file.yaml").write_text(json.dumps(sections), encoding="utf-8")
+    assert load(tmp_path / "file.yaml")
+    with pytest.raises(bp.ExperimentError, match=wording.OWN_IS_CODE_IN_PYTHON):
+        load(tmp_path / "file.yaml", trust=UNKNOWN)
 
 
 def test_stored_cells_know_maps_by_their_content(tmp_path: Path) -> None:
@@ -522,8 +496,8 @@ def test_readings_that_count_twice_are_told(tmp_path: Path) -> None:
     assert rows[1] == pytest.approx(rows[0] / np.sqrt(2.0), rel=0.05)
     # A map that rests on another one is no independent campaign either.
     later = bp.fit(known, second).to_map()  # type: ignore[attr-defined]
-    bp.write_map(later, tmp_path / "later.npz")
-    found = bp.diff(tmp_path / "map.yaml", tmp_path / "later.npz", grid=2)
+    bp.write_map(later, tmp_path / "later.yaml")
+    found = bp.diff(tmp_path / "map.yaml", tmp_path / "later.yaml", grid=2)
     assert found.in_common == "some" and found.is_changed is None
     apart = bp.fit(plain, second).to_map()  # type: ignore[attr-defined]
     assert bp.diff(tmp_path / "map.yaml", apart, grid=2).is_changed is False

@@ -29,7 +29,6 @@ VERDICTS = {
     "clean": "not significant",
     "significant": "significant",
     "beyond": "beyond the limit",
-    "old": "not stated",
 }
 
 
@@ -45,15 +44,11 @@ def fit(name: str, **options: Any) -> bp.Fit:
 
 @pytest.fixture(scope="module")
 def maps(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
-    """Map files of each verdict, and one as earlier versions wrote it."""
+    """Map files of each verdict."""
     folder = tmp_path_factory.mktemp("maps")
     found = {name: folder / f"{name}.yaml" for name in VERDICTS}
     for name in SHIFTS:
         bp.write_map(fit(name).to_map(), found[name])
-    text = found["clean"].read_text()
-    old = re.sub("^(lack_of_fit|checksum):.*\n", "", text, flags=re.MULTILINE)
-    assert text.count("\n") == old.count("\n") + 2
-    found["old"].write_text(old)
     (folder / "points.csv").write_text("name,x_mm,y_mm,z_mm\na,100,100,100\nb,600,500,400\n")
     return found
 
@@ -146,7 +141,7 @@ OF_MAPS = [
     ["map", "--curves", "MAP"],
     ["map", "--convert", "MAP", "--to", "metric"],
     ["adjust", "MAP", "--scale", "x=10 um/m"],
-    ["diff", "MAP", "clean.npz"],
+    ["diff", "MAP", "clean.yaml"],
 ]
 
 
@@ -167,8 +162,8 @@ def test_every_command_repeats_it(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.chdir(maps[name].parent)
-    if not Path("clean.npz").exists():
-        bp.write_map(fit("clean").to_map(), "clean.npz")
+    if not Path("clean.yaml").exists():
+        bp.write_map(fit("clean").to_map(), "clean.yaml")
     given = [f"{name}.yaml" if one == "MAP" else one for one in arguments]
     assert main(given) in (0, 1)
     told = capsys.readouterr()
@@ -204,16 +199,16 @@ def test_maps_made_of_a_map_carry_it(
     monkeypatch.chdir(tmp_path)
     before = bp.load_map(maps["beyond"])
     if kind == "conversion":
-        main(["map", "--convert", str(maps["beyond"]), "--to", "empirical", "-o", "new.npz"])
+        main(["map", "--convert", str(maps["beyond"]), "--to", "empirical", "-o", "new.yaml"])
     elif kind == "adjustment":
-        main(["adjust", str(maps["beyond"]), "--scale", "x=10 um/m", "-o", "new.npz"])
+        main(["adjust", str(maps["beyond"]), "--scale", "x=10 um/m", "-o", "new.yaml"])
     else:
-        bp.write_map(before, "new.npz")
-    assert bp.load_map("new.npz").lack_of_fit == before.lack_of_fit
+        bp.write_map(before, "new.yaml")
+    assert bp.load_map("new.yaml").lack_of_fit == before.lack_of_fit
     # By hand it is not taken off.
     text = maps["beyond"].read_text()
     Path("edited.yaml").write_text(re.sub("^lack_of_fit:.*\n", "", text, flags=re.MULTILINE))
-    with pytest.raises(bp.ExperimentError, match="checksum"):
+    with pytest.raises(bp.ExperimentError, match="lack_of_fit: missing"):
         bp.load_map("edited.yaml")
 
 

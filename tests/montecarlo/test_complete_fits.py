@@ -110,9 +110,7 @@ def test_what_is_left_to_a_separate_estimate_has_not_converged() -> None:
         found = _refined(shared, drawn, np.arange(BATCH))
         kept = np.flatnonzero(found.converged)
         assert len(kept) < BATCH
-        before, by_ball, by_shared = _gradient(
-            shared, drawn.select(kept), found.found.select(kept), is_start=False
-        )
+        before, by_ball, by_shared = _gradient(shared, drawn.select(kept), found.found.select(kept))
         balls, common = _step(shared, by_ball, by_shared)
         decrease = -((by_ball * balls).sum(axis=(1, 2)) + (by_shared * common).sum(axis=1))
         assert (decrease < 1e-4).all()

@@ -6,7 +6,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from ballplate.montecarlo import replicates
 from ballplate.montecarlo.expansion import Direct, Expansion
 from ballplate.montecarlo.reference import Reference, Truth, reference
 from ballplate.montecarlo.replicates import BATCH, Estimates, draw, estimate_batch
@@ -311,24 +310,6 @@ def test_the_first_of_a_batch_are_what_they_are_among_all() -> None:
         same = vars(whole.found)[name][:5]
         np.testing.assert_allclose(value, same, rtol=0, atol=1e-10 * np.abs(same).max(initial=1e-9))
     np.testing.assert_allclose(part.sum_of_squares, whole.sum_of_squares[:5], rtol=1e-12)
-
-
-def test_replicates_that_take_longer_go_on_alone(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Whether the others are still looked at changes nothing but rounding."""
-    design = small()
-    shared = reference(design, truth(design))
-    # So tight that some need a pass more.
-    monkeypatch.setattr(replicates, "SMALLEST_STEP", 1e-5)
-    apart = estimate_batch(shared, 1, 0)
-    passes, counts = np.unique(apart.passes, return_counts=True)
-    assert len(passes) == 2 and counts[1] < counts[0]
-    monkeypatch.setattr(replicates, "FEW_LEFT", 0.0)
-    together = estimate_batch(shared, 1, 0)
-    np.testing.assert_array_equal(apart.passes, together.passes)
-    for name, value in vars(apart.found).items():
-        same = vars(together.found)[name]
-        np.testing.assert_allclose(value, same, rtol=0, atol=1e-10 * np.abs(same).max(initial=1e-9))
-    np.testing.assert_allclose(apart.sum_of_squares, together.sum_of_squares, rtol=1e-12)
 
 
 def test_replicates_of_a_deficient_design_move_in_nothing_open() -> None:

@@ -349,13 +349,8 @@ def test_reach_scales_an_angle(told: dict[str, Any]) -> None:
 def test_repairs_leave_an_angle_alone(told: dict[str, Any]) -> None:
     text = json.dumps([told["suggested"], told["offered"], told["fixed"]])
     assert "calibrate the corner" not in text and '"calibration[1]' not in text
-    edits = [
-        edit
-        for one in told["offered"]["repairs"]["partial"]
-        for edit in one["edits"]
-        if edit["path"] == "calibration"
-    ]
-    assert [edit["value"] for edit in edits] == [HEIGHTS]
+    # Even all that the pool offers leaves something undetermined.
+    assert told["offered"]["repairs"] == []
     words, fixed = told["fixed"]
     assert "Traceback" not in words
     assert yaml.safe_load(fixed)["calibration"] == [SIDES, CORNER]

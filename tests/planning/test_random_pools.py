@@ -16,7 +16,7 @@ from ballplate.planning.campaign_choice import TINY_POOL
 from ballplate.planning.constraints import Spent
 from ballplate.planning.criteria import CriterionName
 from ballplate.planning.experiment_file import experiment_text
-from ballplate.planning.schedule import RunSheet, run_sheet
+from ballplate.planning.schedule import run_sheet
 from ballplate.planning.selection import Campaign
 from ballplate.results.checked_designs import planned_uncertainty, predict
 from ballplate.simulator.estimation.linearisation import linearise
@@ -56,19 +56,11 @@ def by_run(experiment: Experiment, name: CriterionName) -> float:
     }[kind]
 
 
-def sheet_of(found: Campaign) -> RunSheet:
-    return run_sheet(
-        found.chosen, found.pool.changes, found.done, found.completed, found.interrupted
-    )
-
-
 def written(found: Campaign, folder: Path) -> Experiment:
     """The choice as `plan -o` writes it, read again."""
     path = folder / "chosen.yaml"
     path.write_text(
-        experiment_text(
-            found.experiment, sheet_of(found).chosen, "", folder, None, found.left_open or None
-        )
+        experiment_text(found.experiment, found.sheet.chosen, "", folder, found.left_open or None)
     )
     return load(path)[0]
 
@@ -121,7 +113,7 @@ def check_choice(pool: RandomPool, folder: Path) -> bool:
     if not np.isnan(found.bound):
         assert found.bound <= found.value * (1 + 1e-9)
     assert found.spent.is_within(pool.budget)
-    assert sheet_of(found).seconds == pytest.approx(found.spent.seconds, abs=1e-6)
+    assert found.sheet.seconds == pytest.approx(found.spent.seconds, abs=1e-6)
     experiment = written(found, folder)
     if found.is_determined:
         assert by_run(experiment, pool.criterion) == pytest.approx(found.value, rel=1e-9)

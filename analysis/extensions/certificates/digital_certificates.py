@@ -26,7 +26,6 @@ from ballplate.simulator.inputs import (
     matrix_problems,
     metres_or_radians,
     shorten,
-    unit_of_area,
 )
 from ballplate.simulator.machines import Array
 
@@ -392,7 +391,7 @@ def _matrix(block: Element, count: int) -> NamedMatrix | None:
         raise region.mark.refused(text)
     columns = [child for child in region.walk() if child.name.removesuffix(LIST) == "column"]
     values, rounding = np.zeros((count, count)), np.zeros((count, count))
-    marks, factors = [], set[float]()
+    marks = []
     for k, column in enumerate(columns):
         marks.append(column.mark)
         numbers, units = list[str](), list[str]()
@@ -411,14 +410,12 @@ def _matrix(block: Element, count: int) -> NamedMatrix | None:
                 factor = float(length_factor(_one_of(units, j, count) or "", 2))
             except QuantityError as error:
                 raise column.mark.refused(f"covariance: {error}") from None
-            factors.add(factor)
             values[j, k], rounding[j, k] = _plain(number) * factor, half_digit(number) * factor
             if not math.isfinite(values[j, k]):
                 text = f'covariance: "{shorten(number)}" is not a number'
                 raise column.mark.refused(text)
     names = tuple(f"value {k + 1}" for k in range(count))
-    unit = unit_of_area(factors.pop()) if len(factors) == 1 else "um"
-    matrix = NamedMatrix(names, values, rounding, False, tuple(marks), unit)
+    matrix = NamedMatrix(names, values, rounding, False, tuple(marks))
     wrong = matrix_problems(matrix)
     if wrong:
         raise ExperimentError(wrong)

@@ -25,8 +25,6 @@ from ballplate.simulator.inputs import (
     listing,
     metres_or_radians,
     parse_positive_length,
-    plain_number,
-    power_of_ten,
     refuse_controls,
     refused,
     shorten,
@@ -227,22 +225,18 @@ class _Reader:
         roles, file = self.form.headings.roles, str(self.source)
         sign = DECIMALS[self.form.decimal]
         axes = [axis.place for axis in group.axes]
-        factors = {i: (LENGTH_UNITS[u], power_of_ten(LENGTH_UNITS[u])) for i, u in units.items()}
+        factors = {i: LENGTH_UNITS[u] for i, u in units.items()}
         further = [roles.get(name) for name in self.words.further]
         for name, names_known in self.words.further.items():
             if name in roles and (unit := roles[name].unit) is not None:
-                factors[roles[name].place] = names_known[unit], power_of_ten(names_known[unit])
+                factors[roles[name].place] = names_known[unit]
         constants = {**texts, **group.texts}
         places = self.form.headings.places
         rows: list[tuple[FileRow, float]] = []
         messages: list[Message] = []
 
         def number(cells: Sequence[str], i: int, mark: Mark) -> float:
-            factor, power = factors.get(i, (None, ""))
-            cell = cells[i].replace(sign, ".")
-            value = plain_number(cell, power)
-            if value is not None:
-                return value
+            factor, cell = factors.get(i), cells[i].replace(sign, ".")
             if cell.casefold() in NOTHING:
                 return math.nan
             try:

@@ -65,7 +65,7 @@ def add_options(parser: ArgumentParser) -> None:
         "--output",
         metavar="FILE",
         type=map_path,
-        help="write the predicted machine as a map file: .yaml, or .npz for a large one",
+        help="write the predicted machine as a map file (.yaml)",
     )
     add_force(parser)
     add_json(parser)

@@ -364,7 +364,7 @@ def _doubts(*maps: FittedMap | None) -> tuple[str, ...]:
     for campaign, fitted_map in zip(CAMPAIGNS, maps, strict=True):
         if fitted_map is None:
             continue
-        doubts.append(fitted_map.known_lack_of_fit.caution.replace("the map", campaign, 1))
+        doubts.append(fitted_map.lack_of_fit.caution.replace("the map", campaign, 1))
         if fitted_map.sigma_is_estimated:
             remedy = (
                 f"a factor of {coverage_factor(fitted_map.degrees_of_freedom):.3g} would give 95 %"

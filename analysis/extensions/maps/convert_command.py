@@ -33,7 +33,7 @@ def add_options(parser: ArgumentParser) -> None:
         "--output",
         metavar="MAP",
         type=map_path,
-        help="write the converted map (.yaml, or .npz)",
+        help="write the converted map (.yaml)",
     )
     add_force(parser)
     add_json(parser)

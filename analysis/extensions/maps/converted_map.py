@@ -84,7 +84,7 @@ class ConvertedMap(Result):
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        caution = self.old.known_lack_of_fit.caution
+        caution = self.old.lack_of_fit.caution
         return (caution,) if caution else ()
 
     def headline(self) -> str:

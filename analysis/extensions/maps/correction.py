@@ -141,7 +141,7 @@ class Correction(Result):
     @property
     def warnings(self) -> tuple[str, ...]:
         """Warnings: extrapolation, few degrees of freedom, effects not applied."""
-        fitted, cautions = self.fitted, [self.fitted.known_lack_of_fit.caution]
+        fitted, cautions = self.fitted, [self.fitted.lack_of_fit.caution]
         outside = np.flatnonzero(self.outside)
         if len(outside):
             words = listing((self.given.name(int(i)) for i in outside), 3)

@@ -51,7 +51,7 @@ if TYPE_CHECKING:
 
 def map_cautions(fitted: FittedMap) -> tuple[str, ...]:
     """Return cautions on all uncertainties of a map."""
-    cautions = [fitted.known_lack_of_fit.caution]
+    cautions = [fitted.lack_of_fit.caution]
     if fitted.sigma_is_estimated:
         remedy = "with few, take a larger coverage factor"
         cautions.append(few_degrees_of_freedom(fitted.degrees_of_freedom, "sigma", remedy))

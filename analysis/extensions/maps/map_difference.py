@@ -141,7 +141,7 @@ class MapDifference(Result):
             *(
                 verdict_line(side.lack_of_fit, side.label)
                 for side in (self.first, self.second)
-                if not side.is_expected
+                if side.lack_of_fit is not None
             ),
             "",
             *self._motion_table(),
@@ -417,7 +417,7 @@ def _map_data(side: ComparedMap) -> Data:
         **picked(side, "label", "title", "date"),
         "expected": side.is_expected,
         "degrees_of_freedom": side.degrees_of_freedom,
-        **({} if side.is_expected else {"lack_of_fit": verdict_data(side.lack_of_fit)}),
+        **({} if side.lack_of_fit is None else {"lack_of_fit": verdict_data(side.lack_of_fit)}),
     }
 
 

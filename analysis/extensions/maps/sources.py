@@ -125,6 +125,6 @@ def _measured(side: Side, label: str, day: str | None) -> ComparedMap:
         day or side.date,
         data=side.data,
         lack_of_fit=side.lack_of_fit,
-        cautions=(side.known_lack_of_fit.caution,),
+        cautions=(side.lack_of_fit.caution,),
         sigma=side.sigma,
     )

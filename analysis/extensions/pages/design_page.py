@@ -207,9 +207,6 @@ def _rank(run: QuotedData, contents: DesignContents) -> Html:
             summary = "Directions without a picture" if pictures else "Directions"
             list_of_others = folded(summary, element("ol", *items), is_open=len(items) <= 20)
             parts.append(list_of_others)
-    if run.data["reasons"]:
-        reasons = (element("li", direction.text()) for direction in run.at("reasons").each())
-        parts += [element("h3", "Reasons"), element("ul", *reasons)]
     if not parts:
         return sentence("No direction is undetermined or weakly determined.")
     return joined(parts)
@@ -228,41 +225,31 @@ def _suggestions(quoted: Mapping[str, QuotedData]) -> Html:
         else ""
     )
     rows = []
-    for key in ("complete", "partial"):
-        for number, suggestion in enumerate(repairs.at(key).each(), start=1):
-            changes = joined(
-                (change.text("text") for change in suggestion.at("changes").each()), "; "
+    for number, suggestion in enumerate(repairs.each(), start=1):
+        changes = joined((change.text("text") for change in suggestion.at("changes").each()), "; ")
+        edits = joined(
+            element(
+                "li",
+                element("code", f"{edit['path']}: {json.dumps(edit['value'], ensure_ascii=False)}"),
             )
-            removed = ", ".join(map(str, suggestion.data["removes"]))
-            many = "s" if len(suggestion.data["removes"]) > 1 else ""
-            name = (
-                f"repair {number}" if key == "complete" else f"of direction{many} {removed} alone"
-            )
-            edits = joined(
-                element(
-                    "li",
-                    element(
-                        "code", f"{edit['path']}: {json.dumps(edit['value'], ensure_ascii=False)}"
-                    ),
-                )
-                for edit in suggestion.data["edits"]
-            )
-            u6, loose = (
-                suggestion.micro(symbol) if suggestion.data[symbol] is not None else "-"
-                for symbol in ("average_U6", "average_U6_with_uncertain_offsets")
-            )
-            rows.append(
-                [
-                    name,
-                    changes,
-                    suggestion.number("rank_deficiency"),
-                    suggestion.number("weakly_determined"),
-                    u6,
-                    loose,
-                    suggestion.number("readings"),
-                    element("ul", edits, class_="edits"),
-                ]
-            )
+            for edit in suggestion.data["edits"]
+        )
+        u6, loose = (
+            suggestion.micro(symbol) if suggestion.data[symbol] is not None else "-"
+            for symbol in ("average_U6", "average_U6_with_uncertain_offsets")
+        )
+        rows.append(
+            [
+                f"repair {number}",
+                changes,
+                suggestion.number("rank_deficiency"),
+                suggestion.number("weakly_determined"),
+                u6,
+                loose,
+                suggestion.number("readings"),
+                element("ul", edits, class_="edits"),
+            ]
+        )
     if not rows:
         return sentence("No changes were found that determine everything.")
     heads = [
@@ -275,17 +262,11 @@ def _suggestions(quoted: Mapping[str, QuotedData]) -> Html:
         "more readings",
         "in the file",
     ]
-    title = "Changes, by U6 with uncertain probe offsets, each verified"
+    title = "Changes: moves, then readings, then certificates, each verified"
     made_table = table("repairs", title, heads, rows, (0, 1, 7))
-    whole, parts = len(repairs.data["complete"]), len(repairs.data["partial"])
     introduction = "Each change determines every direction."
-    if not whole:
+    if any(row["rank_deficiency"] for row in repairs.data):
         introduction = "No change determines every direction."
-    elif parts:
-        introduction = (
-            "Each repair determines every direction; the other changes determine some of the"
-            " undetermined ones."
-        )
     return joined([sentence(introduction, now), made_table])
 
 

@@ -206,7 +206,6 @@ def _rank(fit: QuotedData) -> Html:
     for key, title in (
         ("planned_but_not_read", "Planned, but not read"),
         ("read_but_not_planned", "Read, but not planned"),
-        ("reasons", "Reasons"),
     ):
         if data[key]:
             words = (element("li", direction.text()) for direction in fit.at(key).each())

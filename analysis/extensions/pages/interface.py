@@ -11,12 +11,38 @@ from ballplate.arguments import (
 )
 from ballplate.simulator.computing import Report, unreported
 from ballplate.simulator.experiment import Experiment
-from ballplate.simulator.inputs import ensure_path, ensure_report, ensure_type
+from ballplate.simulator.inputs import ensure_path, ensure_report
+
+from .charts import Chart, Trace, chart_svg, figure, figures, legend
+from .document import Page, PageSection, facts_list, written
+from .elements import Html, element, joined, note, sentence, table
 
 if TYPE_CHECKING:
     from ballplate.results import Fit, Prediction
 
     from .embedded import View
+
+# Of pages of other extensions, in addition to the functions below.
+__all__ = [
+    "Chart",
+    "Html",
+    "Page",
+    "PageSection",
+    "Trace",
+    "chart_svg",
+    "element",
+    "facts_list",
+    "figure",
+    "figures",
+    "joined",
+    "legend",
+    "note",
+    "page",
+    "sentence",
+    "table",
+    "view",
+    "written",
+]
 
 
 def view(subject: Experiment | PathLike | Prediction | Fit) -> View:
@@ -53,20 +79,15 @@ def view(subject: Experiment | PathLike | Prediction | Fit) -> View:
 def page(
     subject: Experiment | PathLike | Prediction | Fit | Any,
     path: PathLike | None = None,
-    run_modules: bool = False,
-    compare: PathLike | None = None,
     report: Report = unreported,
 ) -> str:
     """Return the page of a design, a fit or a sweep, as written by `run --report`, `fit --report`
     and `sweep --report`: HTML that needs no other file and no network. With a path it is written
     as well.
 
-    Of an experiment it is the page of its design, with the prediction of `run`. Of a sweep,
-    drawings of designs whose error models are in Python need `run_modules`; `compare` names
-    another store for comparison.
+    Of an experiment it is the page of its design, with the prediction of `run`.
 
-    :raises ValueError: a fit or a prediction without its experiment; sweeps that cannot be
-        compared.
+    :raises ValueError: a fit or a prediction without its experiment.
     :raises ImportError: modules for pages of sweeps are not installed.
     :raises OSError: the file cannot be written.
 
@@ -77,19 +98,16 @@ def page(
     from ballplate.presentation import write_file
     from ballplate.results import Fit, Prediction, predict
 
-    ensure_type(bool, "True or False", run_modules=run_modules)
     ensure_report(report)
     if path is not None:
         ensure_path("path", path)
     of_sweep = getattr(subject, "page_text", None)
-    if (run_modules or compare is not None) and of_sweep is None:
-        raise ValueError("run_modules and compare apply to sweeps only; leave them out")
     if isinstance(subject, Fit):
         from .offered import fit_page_text
 
         text = fit_page_text(subject)
     elif of_sweep is not None:
-        text = of_sweep(run_modules, compare, report)
+        text = of_sweep()
     else:
         from .design_contents import page_of_design
 

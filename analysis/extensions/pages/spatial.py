@@ -93,13 +93,6 @@ def figure_of(picture: SpatialPicture) -> Html:
     )
 
 
-def still_figure(picture: SpatialPicture) -> Html:
-    """Return the picture for a page without a script."""
-    layers = [layer for layer in picture.layers if len(layer.points)]
-    svg = _svg(layers, _eye(layers), picture.words)
-    return element("figure", svg, element("figcaption", picture.caption), class_="view")
-
-
 def still(picture: SpatialPicture) -> str:
     """The picture as an SVG file of its own."""
     layers = [layer for layer in picture.layers if len(layer.points)]

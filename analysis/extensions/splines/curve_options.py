@@ -8,7 +8,7 @@ from contextlib import suppress
 from dataclasses import dataclass, fields
 
 from ballplate.simulator.inputs import (
-    UNITS,
+    KINDS,
     QuantityError,
     hint,
     metres_or_radians,
@@ -55,8 +55,8 @@ class Asked:
     evaluate: str | None = None
 
 
-# Kinds of what is asked for that is no text.
-KINDS = {"every": int, "order": int, "periodic": bool}
+# Types of what is asked for that is no text.
+TYPES = {"every": int, "order": int, "periodic": bool}
 LISTS = ("boundary", "corner", "straight", "at")
 
 
@@ -69,7 +69,7 @@ def ensure_asked(options: Mapping[str, object]) -> None:
     for name, value in options.items():
         if name not in names:
             raise TypeError(f'"{name}" is unknown; {hint(name, names)}')
-        kind = KINDS.get(name, str)
+        kind = TYPES.get(name, str)
         if name in LISTS:
             if isinstance(value, str) or not isinstance(value, Sequence):
                 raise TypeError(f"{name}={value!r}; give a list")
@@ -190,10 +190,10 @@ def _value(option: str, text: str, derivative: int, x: Column, y: Column) -> flo
             f'{option}: "{text}" has a decimal comma; write for example "{text.replace(",", ".")}"'
         )
     match = re.fullmatch(r"([+-]?[0-9.]+(?:[eE][+-]?[0-9]+)?)\s*([a-z]+)\s*/\s*([a-z]+)", plain)
-    units = UNITS
+    x_units, y_units = KINDS[x.kind].units, KINDS[y.kind].units
     with suppress(QuantityError):
-        if match and match[2] in units[y.kind] and match[3] in units[x.kind]:
-            return metres_or_radians(match[1], units[y.kind][match[2]] / units[x.kind][match[3]])
+        if match and match[2] in y_units and match[3] in x_units:
+            return metres_or_radians(match[1], y_units[match[2]] / x_units[match[3]])
         if x.kind == y.kind == "length":
             return parse_ratio(plain)
     raise OptionError(

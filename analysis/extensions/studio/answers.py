@@ -19,7 +19,6 @@ from ballplate.extensions.pages.motions import (
 )
 from ballplate.extensions.pages.page_facts import target_in_words
 from ballplate.extensions.repair.written import plane_of
-from ballplate.extensions.sweeps.error_map_uncertainty import LEVELS, in_slices, point_map
 from ballplate.planning import run_sheet
 from ballplate.presentation import Data, percent, picked, uncertainty_words
 from ballplate.rank import Verdict, verdict
@@ -30,6 +29,8 @@ from ballplate.simulator.experiment import Experiment, Position, lay_out
 from ballplate.simulator.geometry import ball_coordinates, even_grid, without_rigid_motion
 from ballplate.simulator.inputs import Target
 from ballplate.uncertainty import Quantity, uncertainties
+
+from .level_slices import LEVELS, in_slices, point_map
 
 # Nodes of the lattice along each axis: edges of it that bend are drawn as curves.
 NODES = 9
@@ -61,7 +62,6 @@ def summary(experiment: Experiment, moving: bool = False) -> dict[str, Any]:
             "expected": expected,
             "parameters": design.parameter_count,
             "observations": design.observation_count,
-            "reasons": [] if judged is None else judged.reasons,
             "directions": [] if judged is None else _directions(judged),
         },
         "quantities": rows(quantities),
@@ -123,8 +123,8 @@ def rows(quantities: Mapping[str, Quantity]) -> list[Data]:
 
 
 def hours_of(experiment: Experiment) -> Data:
-    """Return the `hours` that the positions of an experiment, read for planning, take in the order
-    of least change-over, and whether their times are `usual` ones, as the file states none.
+    """Return the `hours` that the positions of an experiment, read for planning, take in a short
+    order, and whether their times are `usual` ones, as the file states none.
     """
     planned = experiment if experiment.pool else experiment.with_({"pool": {}})
     assert planned.pool is not None
@@ -219,15 +219,14 @@ def _length_map(experiment: Experiment, linearisation: Linearisation) -> Data:
         "bounds": MISSED,
         "largest": float(np.nanmax(ratios, initial=0.0)),
     }
-    mapped = in_slices(linearisation.design, of_levels)
-    return {**picked(mapped, "x", "y", "slices"), "scale": scale}
+    return {**in_slices(linearisation.design, of_levels), "scale": scale}
 
 
 def _point_map(experiment: Experiment, linearisation: Linearisation) -> Data:
     """Return standard uncertainties of corrected points through the volume, None if
     undetermined.
     """
-    return picked(point_map(linearisation, MAP_NODES), "x", "y", "slices")
+    return point_map(linearisation, MAP_NODES)
 
 
 MAPS: Mapping[Any, Callable[[Experiment, Linearisation], Data]] = {

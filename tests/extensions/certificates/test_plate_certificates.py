@@ -99,7 +99,7 @@ def test_adjust_takes_maps_and_experiments(
         naming.append(str(folder / f"names-{name}.yaml"))
         text = (folder / "e.yaml").read_text("utf-8")
         Path(naming[-1]).write_text(f"{text}\nreadings: {{files: [{name}]}}\n", "utf-8")
-    maps = [str(folder / name) for name in ("1.yaml", "2.npz")]
+    maps = [str(folder / name) for name in ("1.yaml", "2.yaml")]
     for readings, name in zip((first, second), maps, strict=True):
         assert main(["fit", experiment, readings, "-o", name]) == 0
     capsys.readouterr()

@@ -9,7 +9,7 @@ FOUR_LENGTHS = '"900 1200 700 500 mm" has 4 lengths, not 3; write for example "9
 NO_UNIT_OF_VOLUME = '"900" has no unit'
 NOTHING_HIGH = '"0 mm" must be above zero'
 NO_UNIT_OF_MPE = '"0.9" has no unit'
-STEEP = "grows by 1 mm per metre of length"
+STEEP = "grows by 1000 um/m"
 DIVIDES_BY_ZERO = "divides by zero"
 NO_COVERAGE_FACTOR = '"0.4 um + 0.5 um/m" needs one coverage factor of 1 to 10; write "…, k=2"'
 SMALL_COVERAGE_FACTOR = '"0.4 um, k=0.5" needs one coverage factor of 1 to 10'

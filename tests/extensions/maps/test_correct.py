@@ -243,9 +243,9 @@ def test_slips_are_told(
     case: str, fitted: FittedMap, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     text, options, status, told = SLIPS[case]
-    bp.write_map(fitted, tmp_path / "map.npz")
+    bp.write_map(fitted, tmp_path / "map.yaml")
     (tmp_path / "points.csv").write_text(text)
-    arguments = ["correct", str(tmp_path / "map.npz"), str(tmp_path / "points.csv"), *options]
+    arguments = ["correct", str(tmp_path / "map.yaml"), str(tmp_path / "points.csv"), *options]
     assert main(arguments) == status
     assert told in capsys.readouterr().err
 

@@ -62,8 +62,8 @@ def test_the_same_readings_twice_are_no_agreement(
     table = bp.simulate(bp.quickstart(), 1)
     table.sample(frac=1.0, random_state=2).to_csv(tmp_path / "again.csv", index=False)
     again = bp.fit(bp.quickstart(), tmp_path / "again.csv")
-    bp.write_map(again.to_map(), tmp_path / "again.npz")  # type: ignore[attr-defined]
-    assert main(["diff", maps[0], str(tmp_path / "again.npz"), "--grid", "2", "--fail"]) == 1
+    bp.write_map(again.to_map(), tmp_path / "again.yaml")  # type: ignore[attr-defined]
+    assert main(["diff", maps[0], str(tmp_path / "again.yaml"), "--grid", "2", "--fail"]) == 1
     said = capsys.readouterr()
     assert wording.REST_ON_THE_SAME_READINGS in said.err and "change is shown" not in said.out
     poorer = bp.quickstart().with_({"error_model.position_coefficients": 4})
@@ -105,10 +105,10 @@ def test_a_change_fails_where_that_is_asked(
     tmp_path: Path, maps: list[str], capsys: pytest.CaptureFixture[str]
 ) -> None:
     other = bp.quickstart().with_({"true_machine.seed": 8})
-    bp.write_map(bp.fit(bp.quickstart(), bp.simulate(other, 3)).to_map(), tmp_path / "c.npz")  # type: ignore[attr-defined]
+    bp.write_map(bp.fit(bp.quickstart(), bp.simulate(other, 3)).to_map(), tmp_path / "c.yaml")  # type: ignore[attr-defined]
     assert main(["diff", *maps, "--fail", "--grid", "2"]) == 0
     capsys.readouterr()
-    assert main(["diff", maps[0], str(tmp_path / "c.npz"), "--fail", "--grid", "2", "--json"]) == 1
+    assert main(["diff", maps[0], str(tmp_path / "c.yaml"), "--fail", "--grid", "2", "--json"]) == 1
     found = json.loads(capsys.readouterr().out)
     assert found["changed"] is True and found["years"] is None
     assert found["tests"][0]["p"] < 1e-6 and len(found["tests"]) == 19

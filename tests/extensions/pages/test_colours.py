@@ -48,7 +48,7 @@ def test_figures_can_be_read_on_every_shade() -> None:
         assert contrast("#101010", shade) >= 4.5, shade
 
 
-@pytest.mark.parametrize(("name", "count"), [("td.heat", 8), (".band", 7)])
+@pytest.mark.parametrize(("name", "count"), [(".part.heat", 8), (".band", 7)])
 def test_steps_become_darker_by_what_can_be_seen(name: str, count: int) -> None:
     found = dict(re.findall(rf"{re.escape(name)}-(\d) {{ [\w-]+: (#\w{{6}})", STYLE))
     steps = [found[str(k)] for k in range(count)]

@@ -133,7 +133,7 @@ def test_pages_open_alone_at_all_widths(name: str, tmp_path: Path) -> None:
     pages = {
         "design": page_of_design(experiment, bp.run(experiment)),
         "fit": bp.fit(experiment, bp.simulate(experiment, seed=1)).page(),
-        "sweep": bp.sweep_report(tmp_path / "sweep.sqlite"),
+        "sweep": bp.page(bp.stored(tmp_path / "sweep.sqlite")),
     }
     with browser(CHROMIUM, tmp_path) as tab:
         for kind, text in pages.items():
@@ -176,7 +176,7 @@ def test_a_page_of_a_hundred_thousand_settings_is_light(tmp_path: Path) -> None:
             )
 
     made_up(tmp_path / "many.sqlite", "many settings", axes, rows()).close()
-    text = bp.sweep_report(tmp_path / "many.sqlite")
+    text = bp.page(bp.stored(tmp_path / "many.sqlite"))
     assert len(text) < 1e6
     path = tmp_path / "many.html"
     path.write_text(text, encoding="utf-8")

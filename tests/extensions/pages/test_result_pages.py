@@ -269,8 +269,6 @@ def test_what_has_no_page_is_refused(tmp_path: Path) -> None:
     prediction = bp.run(small())
     with pytest.raises(ValueError, match="predict it again"):
         bp.page(replace(prediction, experiment=None))
-    with pytest.raises(ValueError, match=wording.APPLY_TO_SWEEPS_ONLY):
-        bp.page(prediction, run_modules=True)
     with pytest.raises(TypeError, match=wording.NEITHER_AN_EXPERIMENT_NOR_THE_PATH):
         bp.page(3)  # type: ignore[arg-type]
     with pytest.raises(FileNotFoundError, match=wording.THERE_IS_NO_FOLDER):

@@ -11,7 +11,8 @@ from typing import Any
 
 import pytest
 from ballplate.extensions.repair.mending import mended
-from ballplate.extensions.repair.repair_search import Repair, repairs
+from ballplate.extensions.repair.repair_search import repairs
+from ballplate.extensions.repair.repairs import Repair
 from ballplate.results.checked_designs import check
 from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.experiment.model import Experiment
@@ -50,8 +51,8 @@ def experiment(text: str, variant: str | None = None) -> Experiment:
 def first_repair(text: str, variant: str | None = None) -> Repair:
     chosen = experiment(text, variant)
     found = repairs(chosen)
-    assert found is not None and found.complete
-    return found.complete[0]
+    assert found.repairs
+    return found.repairs[0]
 
 
 def text_of(said: dict[str, Any], seed: int = 0, comments: bool = False) -> str:

@@ -13,8 +13,8 @@ import pytest
 import yaml
 from ballplate.cli import main
 from ballplate.extensions.repair.mending import mended
-from ballplate.extensions.repair.repair_search import Repair, repairs
-from ballplate.extensions.repair.repair_tables import repair_lines
+from ballplate.extensions.repair.repair_search import repairs
+from ballplate.extensions.repair.repairs import Repair
 from ballplate.presentation.formatting import number
 from ballplate.results.checked_designs import check, predict
 from ballplate.simulator.experiment.loading import load
@@ -101,11 +101,8 @@ def check_written(said: dict[str, Any], folder: Path) -> tuple[Repair, ...]:
     path.write_text(yaml.safe_dump(said, sort_keys=False), encoding="utf-8")
     (design,) = (one for one in load(path, planning=True) if one.name == variant)
     found = repairs(design)
-    if found is None:
-        return ()
-    lines = repair_lines(found, check(design).verdict)
-    for k, repair in enumerate(found.complete, 1):
-        (line,) = [one for one in lines if one.startswith(f"repair {k}: ")]
+    for k, repair in enumerate(found.repairs, 1):
+        (line,) = [one for one in found.lines() if one.startswith(f"repair {k}: ")]
         text = mended(path.read_text(encoding="utf-8"), path, variant, repair)
         (after,) = (one for one in load(path, text=text) if one.name == variant)
         judged = check(after)
@@ -125,9 +122,7 @@ def check_written(said: dict[str, Any], folder: Path) -> tuple[Repair, ...]:
             one.count for one in design.positions
         )
         assert repair.readings == more and (f"; {more:+d} readings, " in line or not more)
-    order = [one.order for one in found.complete]
-    assert order == sorted(order)
-    return found.complete
+    return found.repairs
 
 
 @pytest.mark.parametrize("seed", range(4))
@@ -138,26 +133,13 @@ def test_every_suggestion_is_written(seed: int, tmp_path: Path) -> None:
 @pytest.mark.long
 def test_every_suggestion_is_written_for_many_designs(tmp_path: Path) -> None:
     found = [check_written(said_at_random(seed), tmp_path) for seed in range(4, 124)]
-    repaired, told = sum(map(bool, found)), sum(map(len, found))
-    print(f"{told} suggestions written for {repaired} of {len(found)} designs, 0 failures")
-    assert repaired > 90
+    assert sum(map(bool, found)) > 90
 
 
-def test_offsets_taken_as_exact_do_not_come_first(
+def test_a_certificate_is_printed_and_not_written(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """The first example without its positions across y, and a file of one probe without a
-    certificate.
-    """
-    first = yaml.safe_load(Path("designs/quickstart.yaml").read_text(encoding="utf-8"))
-    first["positions"] = [one for one in first["positions"] if one["plane"] != "y"]
-    across, cheaper, *_ = check_written(first, tmp_path)
-    assert not across.rests_on_offsets and cheaper.rests_on_offsets
-    # The one that costs least looks as good where the offset is taken as exact.
-    assert cheaper.readings < across.readings
-    assert across.loosened is not None and cheaper.loosened is not None
-    assert cheaper.loosened.total > 5.0 * across.loosened.total
-
+    """A file of one probe without a certificate."""
     said = said_at_random(0)
     said.pop("calibration", None)
     said["positions"] = [
@@ -166,11 +148,8 @@ def test_offsets_taken_as_exact_do_not_come_first(
         for plane in "zx"
         for k in range(2)
     ]
-    best, *others = check_written(said, tmp_path)
-    assert "calibrate the distance " in best.changes[-1].words
-    assert best.loosened is not None and others[0].loosened is not None
-    assert best.loosened.total < 0.5 * others[0].loosened.total
-    # The certificate is printed and not written.
+    best, *_ = check_written(said, tmp_path)
+    assert best.invents
     path = tmp_path / "deficient.yaml"
     main(["check", "--fix", str(path)])
     assert wording.NOT_WRITTEN in capsys.readouterr().err

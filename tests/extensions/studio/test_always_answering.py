@@ -264,7 +264,7 @@ def test_a_further_position_has_a_name_of_its_own_beside_one_that_is_off(documen
     assert [place["name"] for place in scene_of(again)["positions"]][-2:] == ["z low 2", "z low 3"]
     assert judgement(again).messages == ()
     strict = experiment_of(off)
-    from ballplate.extensions.repair.positions import with_added
+    from ballplate.extensions.repair.changes import with_added
 
     added = with_added(strict, strict.positions[0])
     assert added.positions[-1].name == "z low 3"

@@ -335,7 +335,7 @@ def test_a_machine_of_its_own_from_an_empty_folder(tmp_path: Path) -> None:
             for key, value in changes.items():
                 steps = ",".join(f'"{step}"' for step in key.split(","))
                 fill(f'["positions",{k},{steps}]', value)
-        fill('["target_uncertainty"]', "(0.9 + L/400) um with L in mm")
+        fill('["target_uncertainty"]', "0.9 um + 2.5 um/m")
         page.keyboard.press("Control+s")
         actions += 1
         until(page, "window.studio.state().saved")

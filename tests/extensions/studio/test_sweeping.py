@@ -33,7 +33,7 @@ def document(tmp_path: Path) -> DesignDocument:
 @pytest.fixture
 def page_of_sweep(monkeypatch):
     monkeypatch.setattr(
-        "ballplate.extensions.sweeps.report.sweep_page.sweep_page", lambda *_: "the page"
+        "ballplate.extensions.sweeps.result.SweepResult.page_text", lambda _: "the page"
     )
 
 

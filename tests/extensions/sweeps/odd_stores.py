@@ -31,7 +31,6 @@ def by_sql(*statements: str) -> Damage:
 # Rows of tables with digests: what these are of, and how many columns tell one row from another.
 SIGNED = {
     "sweep": ("SELECT id, definition FROM sweep", ("id",)),
-    "bundle": ("SELECT sweep, path, content FROM bundle", ("sweep", "path")),
     "cell": ("SELECT sweep, number, key FROM cell", ("sweep", "number")),
     "result": (RESULTS.replace("CAST(seconds AS REAL), digest", "0"), ("key", "block")),
 }
@@ -160,7 +159,7 @@ NO_STORES: dict[str, Damage] = {
     "no format": by_sql("DELETE FROM about"),
     "no about": by_sql("DROP TABLE about"),
     "no tables": by_sql(
-        *(f"DROP TABLE {name}" for name in ("about", "sweep", "bundle", "cell", "text", "result")),
+        *(f"DROP TABLE {name}" for name in ("about", "sweep", "cell", "text", "result")),
         "CREATE VIEW cell AS SELECT 1 AS sweep",
     ),
     "no results": by_sql("DROP TABLE result"),
@@ -169,6 +168,7 @@ NO_STORES: dict[str, Damage] = {
     "numbers of texts ill": by_sql(*loosened("CAST(x'ff41fe' AS TEXT)")),
     "texts not numbered": by_sql(*loosened("id"), "DELETE FROM text WHERE id = 1"),
     "format 1": by_sql("UPDATE about SET value = 'ballplate sweep store 1'"),
+    "another table": by_sql("CREATE TABLE bundle (sweep INTEGER)"),
     "view": by_sql(
         "ALTER TABLE cell RENAME TO real_cell",
         "CREATE VIEW cell AS WITH RECURSIVE n(x) AS (SELECT 1 UNION ALL SELECT x + 1 FROM n) SELECT"
@@ -188,14 +188,10 @@ NO_STORES: dict[str, Damage] = {
 # What is a store still, in parts.
 DAMAGED: dict[str, Damage] = {
     **{f"cut to {share}": cut(share) for share in (0.3, 0.5, 0.7, 0.9, 0.99)},
-    **{
-        f"first page of {table}": page_of(table)
-        for table in ("sweep", "bundle", "cell", "text", "result")
-    },
+    **{f"first page of {table}": page_of(table) for table in ("sweep", "cell", "text", "result")},
     "no definition": by_sql("DELETE FROM sweep"),
     "no keys": by_sql("DELETE FROM cell"),
     "no texts": by_sql("DELETE FROM text"),
-    "no files": by_sql("DELETE FROM bundle"),
     "definition no JSON": by_sql("UPDATE sweep SET definition = '{'"),
     "definition of bytes": by_sql("UPDATE sweep SET definition = x'00ff'"),
     "names no JSON": by_sql("UPDATE text SET value = 'x' WHERE id = 1"),
