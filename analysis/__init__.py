@@ -64,7 +64,6 @@ if TYPE_CHECKING:
     from ballplate.presentation.result import Result
     from ballplate.presentation.table import Table
     from ballplate.results.fits import Fit
-    from ballplate.results.groupings import GROUPINGS
     from ballplate.results.prediction import Prediction
     from ballplate.simulator.computing.processes import in_processes
     from ballplate.simulator.design.arrays import Design, Observations
@@ -112,7 +111,6 @@ __all__ = [
     "Extension",
     "Fit",
     "FittedMap",
-    "GROUPINGS",
     "Influence",
     "LinearFunctions",
     "Linearisation",

@@ -32,7 +32,6 @@ from .estimators.estimator_choice import (
     EstimatorName,
     takers,
 )
-from .results.groupings import GROUPINGS, Grouping
 from .simulator.experiment.loading import load as load_file
 from .simulator.experiment.model import Experiment
 
@@ -192,7 +191,6 @@ def fit(
     monomials: bool = False,
     certificate: PathLike | pandas.DataFrame | None = None,
     *,
-    components: Grouping | None = None,
     columns: Mapping[str, object] | None = None,
     unit: str | None = None,
     coordinates: str | None = None,
@@ -200,10 +198,6 @@ def fit(
     fill_down: bool | None = None,
     sheet: str | None = None,
     swap_names: bool | None = None,
-    trials: int | None = None,
-    seed: int | None = None,
-    workers: int = 1,
-    report: Report = unreported,
 ) -> Fit: ...
 
 
@@ -220,7 +214,6 @@ def fit(
     scale: Literal["x", "y", "split", "none"] | None = None,
     offsets: bool = True,
     *,
-    components: Grouping | None = None,
     columns: Mapping[str, object] | None = None,
     unit: str | None = None,
     coordinates: str | None = None,
@@ -228,10 +221,6 @@ def fit(
     fill_down: bool | None = None,
     sheet: str | None = None,
     swap_names: bool | None = None,
-    trials: int | None = None,
-    seed: int | None = None,
-    workers: int = 1,
-    report: Report = unreported,
 ) -> FitResult: ...
 
 
@@ -247,7 +236,6 @@ def fit(
     scale: Literal["x", "y", "split", "none"] | None = None,
     offsets: bool = True,
     *,
-    components: Grouping | None = None,
     columns: Mapping[str, object] | None = None,
     unit: str | None = None,
     coordinates: str | None = None,
@@ -255,10 +243,6 @@ def fit(
     fill_down: bool | None = None,
     sheet: str | None = None,
     swap_names: bool | None = None,
-    trials: int | None = None,
-    seed: int | None = None,
-    workers: int = 1,
-    report: Report = unreported,
 ) -> FitResult:
     """The estimate from readings: a table or several, or those that the experiment's file names;
     also reports of measuring programs, as `read_report` reads them.
@@ -272,9 +256,7 @@ def fit(
     coefficients of t, t^2, ... on [0, 1]. A `certificate` has values instead of the experiment's
     own. Of the `ballplate.ESTIMATORS` those of distances take `pairs` of balls, also
     `across_probes`, and reversal takes the axis that has the `scale` difference, and whether
-    `offsets` between its positions are estimated. With `components`, one of the
-    `ballplate.GROUPINGS`, variances of groups of observations are estimated. With `trials` so many
-    data sets of the fitted parameters are fitted as well, from a `seed` and by several `workers`.
+    `offsets` between its positions are estimated.
     What is to be known beside the figures is in the result's `remarks`, `warnings` and `complaint`.
 
     >>> readings = simulate(quickstart())
@@ -286,8 +268,6 @@ def fit(
     <AlternativeFit of quickstart: distances, converged, full rank>
     """
     from .estimators.estimator_choice import fit_readings
-    from .montecarlo.trial_runs import MOST_TRIALS
-    from .results.fits import Fit
 
     ensure_one_of(SIGMAS, sigma=sigma)
     ensure_one_of(ESTIMATORS, estimator=str(estimator))
@@ -295,17 +275,8 @@ def fit(
     ensure_one_of(("x", "y", "split", "none"), scale=scale)
     ensure_type(bool, "True or False", monomials=monomials, across_probes=across_probes)
     ensure_type(bool, "True or False", offsets=offsets)
-    if components is not None:
-        ensure_one_of(GROUPINGS, components=components)
     asked: dict[str, object] = {"scale": scale, "offsets": not offsets, "pairs": pairs}
     asked |= {"across_probes": across_probes, "monomials": monomials}
-    asked |= {"components": components, "trials": trials}
-    ensure_whole(1, MOST_TRIALS, trials=trials)
-    ensure_whole(0, seed=seed)
-    ensure_whole(1, workers=workers)
-    ensure_report(report)
-    if trials is None and (seed is not None or workers != 1):
-        raise ValueError("seed and workers apply to trials only; leave them out")
     wrong = takers(estimator, [name for name, value in asked.items() if value])
     if wrong is not None:
         raise ValueError(f"{wrong[0]} applies to the estimator {wrong[1]} only; leave it out")
@@ -318,7 +289,7 @@ def fit(
     column_settings |= {"fill_down": fill_down, "sheet": sheet}
     chosen_experiment = experiment_of(experiment).with_readings(column_settings)
     chosen, observed = observed_of(chosen_experiment, readings, certificate)
-    fit_result = fit_readings(
+    return fit_readings(
         chosen,
         observed,
         estimator,
@@ -328,11 +299,7 @@ def fit(
         across_probes,
         scale,
         offsets,
-        components,
     )
-    if trials is None or not isinstance(fit_result, Fit) or not fit_result.converged:
-        return fit_result
-    return fit_result.with_trials(trials, chosen.seed if seed is None else seed, workers, report)
 
 
 def compare(

@@ -217,7 +217,7 @@ OPTIONS = {
     "repair": (["check", "designs/quickstart.yaml", "--suggest"],),
     "requirements": (["check", "designs/quickstart.yaml", "--goal", "U6 average 1 um"],),
     "pages": (["run", "designs/quickstart.yaml", "--report", "page.html"],),
-    "judgement": (["fit", "designs/quickstart.yaml", "READINGS", "--components", "axis"],),
+    "judgement": (["run", "designs/quickstart.yaml", "--budget"],),
     "campaign": (["plan", "POOL", "--positions", "6", "--sheet", "sheet.html"],),
     "laboratory": (["fit", "designs/quickstart.yaml", "designs/reports/z-low.dmo"],),
     "sweeps": (["schema", "sweep"],),

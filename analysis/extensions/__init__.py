@@ -109,7 +109,7 @@ SHIPPED = (
             ),
             "validate": Command(
                 "validate_command",
-                "leave out positions, plates and directions in turn and predict them",
+                "leave out positions in turn and predict them",
                 "evaluate",
             ),
             "run --budget": Command(
@@ -118,7 +118,6 @@ SHIPPED = (
             ),
         },
         functions=_from("interface", "budget", "compare_models", "validate"),
-        services=_from("bootstrap", "bootstrap") | _from("components", "variance_components"),
     ),
     _here(
         "reliability",
@@ -137,7 +136,7 @@ SHIPPED = (
         commands={
             "certificate": Command(
                 "certificate_command",
-                "write a plate's ball co-ordinates with their covariance: page, CSV, DCC, GTC",
+                "write a plate's ball co-ordinates with their covariance: page, CSV, DCC",
                 "evaluate",
             ),
         },

@@ -14,15 +14,11 @@ if TYPE_CHECKING:
     from .error_functions import estimated_curves
     from .estimates import (
         ESTIMATE_COLUMNS,
-        EstimatedFunctions,
-        Function,
         ParameterEstimate,
-        estimated_functions,
         labels,
     )
     from .fits import Fit
     from .fitting import fit
-    from .groupings import GROUPINGS, Grouping
     from .map_of_fit import FRAMES, MappedFit, data_of, left_out_words
     from .prediction import Prediction
     from .qualifications import Qualification, given_words, qualification_data, qualifications_of

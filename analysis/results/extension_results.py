@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Protocol
 
 from ballplate.presentation.formatting import Data
 
@@ -40,13 +40,6 @@ class AskedAssumptions(AskedResult, Protocol):
 
     @property
     def explains(self) -> bool: ...
-
-
-class GroupVariances(AskedResult, Protocol):
-    """Estimated variances of `groups` of observations."""
-
-    @property
-    def groups(self) -> Sequence[Any]: ...
 
 
 class IssuedCertificate(AskedResult, Protocol):

@@ -20,7 +20,6 @@ if TYPE_CHECKING:
         nominal_places,
         nominal_state,
         read_in_positions,
-        reading_noise,
         reading_uncertainties,
     )
     from .influences.displacements import SharedDisplacements

@@ -9,7 +9,6 @@ from ballplate.simulator.inputs.faces import lazily
 # Public names of this package: extensions import these alone, and its modules are private.
 if TYPE_CHECKING:
     from .arrangement import ARRANGEMENTS, AXES, Arrangement
-    from .bases import Basis
     from .curves import Points, SmoothedPoints
     from .custom import CustomModelError, module_source
     from .description import (
@@ -20,11 +19,11 @@ if TYPE_CHECKING:
         reference_functions,
         true_volumetric,
     )
-    from .empirical import USUAL_OFFSET, EmpiricalModel
+    from .empirical import USUAL_OFFSET
     from .empirical_settings import EmpiricalSettings
     from .error_names import SQUARENESS_ERRORS, SquarenessError
-    from .kinematic import ErrorFunction, KinematicModel, error_function
-    from .kinematic_settings import FunctionsSettings, KinematicSettings
+    from .kinematic import KinematicModel, error_function
+    from .kinematic_settings import KinematicSettings
     from .model_kinds import Corner, ErrorModelKind
     from .plane import PlaneModel
     from .protocol import (

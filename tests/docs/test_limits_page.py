@@ -7,7 +7,6 @@ from pathlib import Path
 
 import pytest
 from ballplate.estimators import distances as estimators
-from ballplate.extensions.judgement import components
 from ballplate.extensions.maps import correction
 from ballplate.extensions.maps import length_map as lengths
 from ballplate.extensions.maps import volumetric_errors as volumetric
@@ -72,7 +71,6 @@ LIMITS = {
     "`run --trials`": (trials.MOST_TRIALS,),
     "`sweep` | synthetic": (settings.MOST_TRIALS,),
     "`fit`, `run --reliability` |": (leftover.MOST_ENTRIES,),
-    "`fit --components` |": (components.MOST_ENTRIES,),
     "`compare`, `fit --estimator` |": (estimators.MOST_DERIVATIVES,),
     "`compare --points`": (estimators.MOST_POINTS,),
     "`sweep` | cases": (load.MOST_CELLS,),

@@ -3,7 +3,6 @@
 AGAIN_HAS_THE_KIND = 'Again has the kind "sag", as SagSettings has'
 AS_BALL_CENTRES = "as ball centres, but only to 50 mm"
 A_PROBE_WITHOUT_AN_OFFSET_HAS = "a probe without an offset has no direction"
-CANNOT_BE_ESTIMATED = "cannot be estimated: too little redundancy"
 DISPLACEMENT_OF_BALL = "displacement of ball two/r1c1: x"
 DOES_NOT_KNOW_INFLUENCE_QUANTITIES = "does not know influence quantities"
 DRIFT_OF_SCALE = "drift of scale z"

@@ -79,7 +79,6 @@ RECIPES = (
     "diff map.yaml again.yaml --grid 2 -o out.csv",
     "diff machine.yaml map.yaml --stated '1 um + L/1000000' --json",
     "diff map.yaml again.yaml --grid 2 --plot out.svg --dates 2025-01-01 2026-01-01 --fail",
-    "fit small.yaml small-readings.csv --trials 2 --seed 3 --workers 1",
     "models small.yaml small-readings.csv --coefficients 3",
     (
         "models tables.yaml tables-readings.csv --certificate tables-certificate.csv --sigma given"

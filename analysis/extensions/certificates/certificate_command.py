@@ -20,13 +20,13 @@ from ballplate.cli import (
     write_noted,
 )
 
-ENDINGS = (".html", ".csv", ".xml", ".json")
+ENDINGS = (".html", ".csv", ".xml")
 
 DESCRIPTION = (
     "Fit readings and state the co-ordinates of a plate's balls in the plate's own axes with their"
     " full covariance, and distances with U: as a page (.html), as tables that calibration items"
-    " read (.csv, with the covariance in a second file), as a digital calibration certificate"
-    " (.xml) or as an archive of the GUM Tree Calculator (.json). Lengths without a calibrated"
+    " read (.csv, with the covariance in a second file) or as a digital calibration"
+    " certificate (.xml). Lengths without a calibrated"
     " source of scale are refused. The exit status is 0 if the estimate converged, the rank is as"
     " expected and no lack of fit is beyond the limit, otherwise 1."
 )
@@ -64,7 +64,7 @@ def add_options(parser: ArgumentParser) -> None:
         action=_Written,
         metavar="FILE",
         type=_output,
-        help="write the certificate: .html, .csv, .xml (DCC) or .json (GTC); default: print it",
+        help="write the certificate: .html, .csv or .xml (DCC); default: print it",
     )
     parser.add_argument(
         "--plate", metavar="NAME", help="the plate; optional if there is exactly one"

@@ -27,7 +27,6 @@ from .certificate_page import certificate_page
 from .certified_balls import ABOUT, CertifiedBalls, PlateDistance
 from .datum import Datum, chosen_datum, in_datum, relative_to
 from .digital_form import digital_certificate
-from .uncertain_archive import gtc_archive
 
 # Of so many balls all distances are stated, of more those between a few that are far apart.
 MOST_BALLS_FOR_ALL_DISTANCES = 16
@@ -46,7 +45,6 @@ FORMS: dict[str, Callable[[CertifiedBalls, Path], dict[Path, str]]] = {
     ".html": lambda certificate, path: {path: certificate_page(certificate)},
     ".csv": _tables,
     ".xml": lambda certificate, path: {path: digital_certificate(certificate)},
-    ".json": lambda certificate, path: {path: gtc_archive(certificate)},
 }
 
 
@@ -64,8 +62,8 @@ class PlateCertificate(CertifiedBalls):
 
     def texts(self, path: str | Path) -> dict[Path, str]:
         """The certificate as the ending of a name says: a page (.html), tables (.csv, with the
-        covariance in a second one beside it), a digital calibration certificate (.xml) or a GTC
-        archive (.json); by the names of files.
+        covariance in a second one beside it) or a digital calibration certificate (.xml); by the
+        names of files.
 
         :raises ValueError: another ending, or a digital certificate without what it has to state.
         """

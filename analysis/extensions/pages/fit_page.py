@@ -15,7 +15,6 @@ from .elements import Html, element, joined, note, sentence, table
 from .quoted import QuotedData
 from .residual_sections import (
     answers_section,
-    components_section,
     reliability_section,
     residual_charts,
     residual_tables,
@@ -118,7 +117,6 @@ def _results(fit: QuotedData, contents: FitContents) -> list[PageSection]:
         ),
         PageSection("asked", "What the readings say of the assumptions", answers_section(fit)),
         PageSection("residuals", "Residuals", of_residuals),
-        PageSection("components", "Variance components", components_section(fit)),
         PageSection("reliability", "Reliability", reliability),
         PageSection("adjustments", "Adjustments", _adjustments(fit)),
         PageSection("plate", "Plate", _plate(fit, contents.kinds)),

@@ -1,4 +1,4 @@
-"""Sections on residuals of a fit: flagged readings, variance components, reliability."""
+"""Sections on residuals of a fit: flagged readings, reliability."""
 
 from __future__ import annotations
 
@@ -139,38 +139,6 @@ def answers_section(fit: QuotedData) -> Html:
     heads = ["assumption tested", "p-value", "smallest effect that would show", "cannot be tested"]
     words = "Noticed in four of five campaigns; chance: of a larger effect if the assumption holds."
     return joined([first, table("answers", "Assumptions", heads, rows, (0, 3)), note(words)])
-
-
-def components_section(fit: QuotedData) -> Html:
-    """Section on variance components, if requested."""
-    if fit.data.get("variance_components") is None:
-        return Html()
-    components = fit.at("variance_components")
-    rows = [
-        [
-            group.text("group"),
-            group.number("observations"),
-            group.number("redundancy"),
-            *(
-                group.number(name, digits=3)
-                for name in ("ratio", "standard_uncertainty", "lower", "upper")
-            ),
-            group.text("verdict"),
-        ]
-        for group in components.at("groups").each()
-    ]
-    heads = [
-        "group",
-        "observations",
-        "redundancy",
-        "ratio to stated",
-        "u of ratio",
-        "95 % from",
-        "to",
-        "",
-    ]
-    caption = f"Variances by {components.data['by']}, as ratios to the stated ones"
-    return table("components", caption, heads, rows, (0, 7))
 
 
 def reliability_section(reliability: QuotedData) -> Html:

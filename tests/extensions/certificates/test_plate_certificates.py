@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import json
 import shutil
 from pathlib import Path
@@ -50,11 +51,12 @@ def test_printed_and_written_are_the_same(folder: Path, capsys: pytest.CaptureFi
     assert main([*line, "--json"]) == 0
     told = json.loads(capsys.readouterr().out)
     assert told["coverage_factor"] == 3.0
-    assert main([*line, "--json", "-o", str(folder / "p.json")]) == 0
+    assert main([*line, "--json", "-o", str(folder / "p.csv"), "--force"]) == 0
     assert json.loads(capsys.readouterr().out) == told
-    archive = json.loads((folder / "p.json").read_text())
-    place = told["balls"]["r3c3"]["y"]["value"]
-    assert archive["tagged_real"]["r3c3 y"]["x"] == place
+    with (folder / "p.csv").open(newline="", encoding="utf-8") as stream:
+        table = (line for line in stream if not line.startswith("#"))
+        rows = {row["ball"]: row for row in csv.DictReader(table)}
+    assert float(rows["r3c3"]["y_mm"]) == pytest.approx(1e3 * told["balls"]["r3c3"]["y"]["value"])
     assert main(line) == 0
     text = capsys.readouterr().out
     assert "U = 3 u" in text and "not a calibration certificate" in text

@@ -11,7 +11,6 @@ import ballplate as bp
 import numpy as np
 import pytest
 from ballplate.cli import main
-from ballplate.extensions.judgement.containing_models import linear_map
 from ballplate.extensions.maps.corrected_points import corrected, corrected_with_root
 from ballplate.simulator.inputs.messages import ExperimentError
 from ballplate.simulator.maps.fitted_map import FittedMap
@@ -38,26 +37,6 @@ def positions(plane: str, level: int) -> dict[str, object]:
     return {"name": name, "plane": plane, "level": f"{level} mm", "corner": corner} | {
         "probes": ["down"]
     }
-
-
-def test_a_model_that_contains_the_other_takes_values_and_covariance() -> None:
-    old = fitted()
-    found = bp.convert(old, "{kind: empirical, coefficients: 4}")
-    assert found.is_exact and found.lengths[0] < 1e-14
-    matrix = linear_map(old.model, found.map.model)
-    np.testing.assert_allclose(found.map.values, matrix @ old.values, atol=1e-14)
-    covariance = matrix @ old.covariance @ matrix.T
-    size = np.sqrt(np.diagonal(covariance).max())
-    np.testing.assert_allclose(found.map.covariance, covariance, rtol=0, atol=1e-8 * size**2)
-    points = np.random.default_rng(2).random((5, 3))
-    for one, other in zip(
-        corrected_with_root(old, points), corrected_with_root(found.map, points), strict=True
-    ):
-        if one.ndim == 2:
-            np.testing.assert_allclose(one, other, atol=1e-14)
-        else:
-            spread = np.einsum("ndr,mer->ndme", one, one), np.einsum("ndr,mer->ndme", other, other)
-            np.testing.assert_allclose(*spread, atol=1e-7 * np.abs(spread[0]).max())
 
 
 def test_there_and_back() -> None:
