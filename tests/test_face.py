@@ -302,14 +302,6 @@ def test_a_check_has_a_table() -> None:
     assert row["rank deficiency"] == deficiency and not row["as expected"]
 
 
-def test_an_experiment_shows_itself() -> None:
-    given = bp.quickstart().with_({"positions[z low].name": "<b>"})
-    html = given._repr_html_()
-    assert "1000 x 1000 x 1000 mm" in html and "0.2 µm" in html and "plate: 25 balls" in html
-    assert "position &lt;b&gt;" in html and "<b>" not in html
-    assert html.count("<tr>") == html.count("</tr>") == 12
-
-
 def test_residuals_in_space_are_drawn_as_seen() -> None:
     """The picture shows what an eye to the right of the front and above it sees of each vector."""
     experiment = bp.quickstart()

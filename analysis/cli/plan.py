@@ -99,7 +99,7 @@ def add_options(parser: ArgumentParser) -> None:
     add_picture(
         output,
         "--plot",
-        help="draw the choice in the volume, its lower bound and the curve",
+        help="draw the choice in the volume or, with --curve, the criterion against the limit",
     )
     add_force(output)
     add_json(parser)

@@ -81,7 +81,7 @@ SHIPPED = (
         },
         functions=_from("interface", "sheet"),
         services={
-            **_from("campaign_picture", "draw_campaign"),
+            **_from("campaign_picture", "draw_curve"),
             **_from("sheet", "Sheet"),
             **_from("earlier", "begun"),
         },

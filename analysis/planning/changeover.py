@@ -93,12 +93,14 @@ def _order(
 ) -> Order:
     # The order of a set differs from run to run.
     todo = sorted(kinds, key=lambda item: (item[0].artefact, item[0].plane, sorted(item[0].probes)))
-    before = [] if after is None else [Visit(after, name, name) for name in sorted(after.probes)]
+    before: list[Visit | None] = [None]
+    if after is not None:
+        before = [Visit(after, name, name) for name in sorted(after.probes)]
     orders = []
     for start in (visit for kind, _ in todo for visit in _visits(kind)):
         visits = _followed(start, dict(todo), changes)
         seconds = sum(_between(changes, *pair) for pair in pairwise(visits))
-        for earlier in before or [None]:
+        for earlier in before:
             begun = 0.0 if earlier is None else _between(changes, earlier, start)
             left = None if earlier is None else earlier.last
             orders.append((seconds + begun * is_paid, begun, visits, left))
@@ -129,8 +131,9 @@ def _followed(start: Visit, todo: dict[Setup, int], changes: ChangeTimes) -> lis
 @lru_cache
 def _visits(kind: Setup) -> tuple[Visit, ...]:
     """Return a position of a kind with every first and last probe."""
-    ends = list(permutations(sorted(kind.probes), 2)) or [(*kind.probes, *kind.probes)]
-    return tuple(Visit(kind, first, last) for first, last in ends)
+    names = sorted(kind.probes)
+    ends = permutations(names if len(names) > 1 else 2 * names, 2)
+    return tuple(Visit(kind, first, last) for first, last in dict.fromkeys(ends))
 
 
 def _between(changes: ChangeTimes, from_visit: Visit, to_visit: Visit) -> float:

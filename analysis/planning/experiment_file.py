@@ -21,7 +21,7 @@ LEFT_OUT = ("pool", "variants", "expected_rank_deficiency")
 
 # Where an experiment names files, and code of its own; EACH is every entry of a list or mapping.
 EACH = "*"
-FILES = (
+FILES: tuple[tuple[str, ...], ...] = (
     ("error_model", "file"),
     ("true_machine", "file"),
     ("true_machine", "files"),
@@ -37,7 +37,7 @@ FILES = (
     ("readings", "compensation", "file"),
     ("evaluation", "points", "file"),
 )
-CODE = (
+CODE: tuple[tuple[str, ...], ...] = (
     ("error_model",),
     ("true_machine", "error_model"),
     ("calibration", EACH),

@@ -248,15 +248,16 @@ class Campaign(Result):
         return list(sheet_data(self.sheet)["steps"])
 
     def plot(self, path: str | Path | None = None) -> Figure:
-        """Draw the criterion against the limit of time, the effect of each position, and the
-        positions in the volume.
+        """Draw the criterion against the limit, or without a curve the positions in the volume.
 
         With a path, which ends in .svg, .png or .pdf, the picture is written as well.
 
         :raises ImportError: matplotlib is missing.
         :raises ValueError: the path has another suffix.
         """
-        figure: Figure = service("draw_campaign")(self, path)
+        if not self.curve:
+            return self.prediction.plot(path)
+        figure: Figure = service("draw_curve")(self, path)
         return figure
 
 

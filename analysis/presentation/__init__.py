@@ -29,7 +29,7 @@ if TYPE_CHECKING:
         to_uncertainty,
         uncertainty_words,
     )
-    from .paper import escaped, on_paper, pitch
+    from .paper import escaped, on_paper
     from .pictures import draw_box, draw_scene
     from .result import FitResult, Result
     from .scenes import (

@@ -18,7 +18,7 @@ from ballplate.simulator.experiment.json_schema import schema
 from ballplate.simulator.experiment.machine_sections import machine_schema
 from ballplate.simulator.experiment.map_sections import map_schema
 from ballplate.simulator.inputs.quantities import (
-    UNITS,
+    KINDS,
     Angle,
     Bending,
     Duration,
@@ -91,7 +91,8 @@ def _keys(whole: Schema) -> str:
 def units() -> str:
     """The units of quantities as Markdown."""
     return "\n".join(
-        f"- {kind}: {', '.join(f'`{unit}`' for unit in names)}" for kind, names in UNITS.items()
+        f"- {kind}: {', '.join(f'`{unit}`' for unit in about.units)}"
+        for kind, about in KINDS.items()
     )
 
 

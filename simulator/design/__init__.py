@@ -25,12 +25,8 @@ if TYPE_CHECKING:
     )
     from .influences.displacements import SharedDisplacements
     from .influences.drift import (
-        HOUR,
         Clock,
         Drift,
-        DriftSettings,
-        PointDriftSettings,
-        ScaleDriftSettings,
         even_clock,
     )
     from .influences.position_scale import PositionScale

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..design.lookup import References
+from ..design.lookup import Indices, References
 from ..design.objects import SLIGHTLY, Machine, Volume
 from ..design.observations.calibration import Calibration
 from ..design.observations.distances import DistanceCalibration
@@ -150,8 +150,8 @@ def _true_machine_of_file(
         )
         text = f"is outside the file's volume ({ends} in z); stay within it"
         references.problems.add(("true_machine", "level"), text)
-    axes = slice(machine.dimension)
-    check_within(true_machine.lower[axes], true_machine.upper[axes], machine, steps, references)
+    d = machine.dimension
+    check_within(true_machine.lower[:d], true_machine.upper[:d], machine, steps, references)
 
 
 def check_true_machine(sections: Sections, machine: Machine | None, references: References) -> None:
@@ -511,7 +511,7 @@ def check_lengths(
     if rows > MOST_LENGTHS:
         text = f"Bryan gauges are read {rows} times; at most {MOST_LENGTHS} lengths are possible"
         problems.add(("positions",), text, of_key=True)
-    joint: dict[str, list[Array]] = {}
+    joint: dict[str, list[Indices]] = {}
     for steps, calibration in calibrations.items():
         name, place = calibration.artefact, (*steps, "pairs")
         if not isinstance(calibration, DistanceCalibration):

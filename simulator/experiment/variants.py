@@ -111,25 +111,7 @@ def removed(root: Node, path: str) -> Node:
 
     :raises ValueError: the path is malformed, or there is no value.
     """
-    return _less(root, list(place_of(root, path)), ())
-
-
-def _less(node: Node, steps: list[str], above: tuple[str, ...]) -> Node:
-    step, deeper = steps[0], steps[1:]
-    here = (*above, step)
-    key = int(step) if isinstance(node, Sequence) else step
-    below = child(node, key)
-    if below is None:
-        items = node.items if isinstance(node, Mapping) else ()
-        raise ValueError(f"there is no {format_path(here)}; {hint(step, items)}")
-    if isinstance(node, Sequence):
-        i = int(step)
-        kept_below = (_less(below, deeper, here),) if deeper else ()
-        return replace(node, items=(*node.items[:i], *kept_below, *node.items[i + 1 :]))
-    assert isinstance(node, Mapping)
-    if deeper:
-        return replace(node, items={**node.items, step: _less(below, deeper, here)})
-    return replace(node, items={name: item for name, item in node.items.items() if name != step})
+    return _replaced(root, steps_of(path), None, root.mark, ())
 
 
 def steps_of(path: str) -> list[str]:
@@ -168,21 +150,23 @@ def _overlap(first: tuple[str, ...], second: tuple[str, ...]) -> bool:
 
 
 def _replaced(
-    node: Node, steps: list[str], value: Node, mark: Mark, above: tuple[str, ...]
+    node: Node, steps: list[str], value: Node | None, mark: Mark, above: tuple[str, ...]
 ) -> Node:
-    if not steps:
-        return value
+    """Return a tree with the value at some steps, or without the entry there."""
     step, deeper, here = steps[0], steps[1:], (*above, steps[0])
     if isinstance(node, Mapping):
-        if step not in node.items and deeper:
+        if step not in node.items and (deeper or value is None):
             raise ValueError(f"there is no {format_path(here)}; {hint(step, node.items)}")
         below = _replaced(node.items[step], deeper, value, mark, here) if deeper else value
+        if below is None:
+            return replace(node, items={key: node.items[key] for key in node.items if key != step})
         marks = node.key_marks if deeper else {**node.key_marks, step: mark}
         return replace(node, items={**node.items, step: below}, key_marks=marks)
     if isinstance(node, Sequence):
         i = _index(node, step, above)
-        below = _replaced(node.items[i], deeper, value, mark, here)
-        return replace(node, items=(*node.items[:i], below, *node.items[i + 1 :]))
+        below = _replaced(node.items[i], deeper, value, mark, here) if deeper else value
+        kept = () if below is None else (below,)
+        return replace(node, items=(*node.items[:i], *kept, *node.items[i + 1 :]))
     named = format_path(above) or "the experiment"
     raise ValueError(f"{named} is {describe(node.value)} and has no entries; replace it as a whole")
 

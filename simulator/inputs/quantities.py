@@ -214,8 +214,12 @@ def parse_length(value: object) -> float:
 
 parse_angle = partial(parse_quantity, kind="angle")
 parse_ratio = partial(parse_quantity, kind="ratio")
-parse_length_drift = partial(parse_quantity, kind="length per time")
-parse_ratio_drift = partial(parse_quantity, kind="ratio per time")
+# Parsers of values in metres, radians and ratios, by the names of these units in results.
+PARSERS: Mapping[str, Callable[[object], float]] = {
+    "m": parse_length,
+    "rad": parse_angle,
+    "1": parse_ratio,
+}
 parse_positive_length = partial(parse_quantity, kind="length", above_zero=True)
 parse_positive_angle = partial(parse_quantity, kind="angle", above_zero=True)
 parse_positive_temperature_difference = partial(

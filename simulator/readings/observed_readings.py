@@ -28,7 +28,7 @@ class ObservedReadings:
 
     `missing` names planned readings that the file lacks, `unplanned` further readings of the file.
     `marks` are the readings' locations, the first of averaged ones. `table_notes` describes the
-    reading of tables, and `redone` rows that later readings replace. `offset_doubts` are doubts
+    reading of tables. `offset_doubts` are doubts
     about probe offsets and equal part co-ordinates in tables, `certificate_doubts` about values of
     a certificate.
     """
@@ -41,7 +41,6 @@ class ObservedReadings:
     table_notes: tuple[str, ...] = ()
     offset_doubts: tuple[str, ...] = ()
     certificate_doubts: tuple[str, ...] = ()
-    redone: tuple[str, ...] = ()
 
     @property
     def remarks(self) -> tuple[str, ...]:

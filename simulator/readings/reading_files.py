@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, TextIO
@@ -26,8 +26,6 @@ from .observed_readings import ObservedReadings, combine_standards
 from .reading_sources import Source, source_rows
 
 AXES = ("x", "y", "z")
-
-Thinning = Callable[[Sequence[FileRow], Design], tuple[tuple[FileRow, ...], tuple[str, ...]]]
 
 
 def reading_columns(design: Design, readings: Readings, x: Array) -> dict[str, list[Any]]:
@@ -59,7 +57,6 @@ def read_readings(
     design: Design,
     every_ball: bool = True,
     settings: ReadingsSettings | None = None,
-    thinned: Thinning | None = None,
 ) -> ObservedReadings:
     """Return readings of one or several files as observations of a design.
 
@@ -70,7 +67,7 @@ def read_readings(
     unplanned reading, the machine's repeatability; u_x, u_y and u_z are those of single
     co-ordinates. Influence quantities have further columns. A
     reading may occur as often as planned; an unplanned one, once. Without `every_ball`, some balls
-    may be unread. `thinned` selects rows and describes omitted ones (`redone`).
+    may be unread.
 
     The extension that reads other tables also checks that readings belong to their balls and their
     co-ordinates are of the stated type.
@@ -93,7 +90,7 @@ def read_readings(
     table = source_rows(sources, design, settings, messages, is_possible, units, empty)
     # Reports state some settings themselves.
     settings = table.settings
-    rows, redone = thinned(table.rows, design) if thinned else (table.rows, ())
+    rows = table.rows
     index, unknown = _indices(rows, design)
     lengths = np.array([row.lengths for row in rows])
     coordinates, of_axes = lengths[:, :d], lengths[:, d + 1 : 2 * d + 1]
@@ -154,7 +151,7 @@ def read_readings(
         )
         table_notes += checks.said_of(settings)
     observed = combine_standards(design, readings, x, missing, unplanned, marks)
-    observed = replace(observed, table_notes=table_notes, offset_doubts=doubt, redone=redone)
+    observed = replace(observed, table_notes=table_notes, offset_doubts=doubt)
     if checks is not None:
         checks.refuse_gross_errors(observed.design, observed.x, observed.marks, settings)
     _refuse_repeated(rows, readings, design)

@@ -125,9 +125,7 @@ WALK = {
         also=("balls.csv",),
     ),
     "run --errors": Walk(EXPERIMENT, {}, also=("balls.csv",)),
-    "next": Walk(
-        EXPERIMENT | {"READINGS": "readings.csv", "--watch": "."}, {}, also=("balls.csv",)
-    ),
+    "next": Walk(EXPERIMENT | {"READINGS": "readings.csv"}, {}, also=("balls.csv",)),
     "map --curves": Walk({"FILE": "curved-map.yaml"}, {}),
     "diff": Walk(
         {
@@ -195,7 +193,7 @@ KINDS = [
 KINDS += [("correct", "--covariance")]
 # Those that are read only where they are asked for, and not needed to walk through.
 LEFT_OUT = ("--from", "--done", "--nominal", "--store", "--folder", "--results", "--designs")
-LEFT_OUT += ("--tasks", "--readings", "--watch")
+LEFT_OUT += ("--tasks", "--readings")
 
 
 @pytest.fixture(scope="module")

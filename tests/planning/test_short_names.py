@@ -239,3 +239,17 @@ def test_the_position_of_all_rows_of_a_table_keeps_its_name(pool: Path) -> None:
     assert long in [one.name for one in plan.positions]
     assert plan.readings.columns is not None
     assert (plan.readings.columns.position, plan.readings.columns.ball) == (f"={long}", "1")
+
+
+def test_a_drift_is_left_out_of_the_choice_but_not_of_what_is_computed_of_it(pool: Path) -> None:
+    steady = planned(pool, "steady.yaml", "--positions", "6")
+    drift = "influences: [{kind: drift, scale: {standard_uncertainty: 5 ppm/h}}]\n"
+    pool.write_text(f"{POOL}{drift}")
+    drifting = planned(pool, "day.yaml", "--positions", "6")
+    assert (drifting["chosen"], drifting["value"]) == (steady["chosen"], steady["value"])
+    worth = _quantities(pool.with_name("day.yaml"))["U6"]["average"]
+    told = drifting["plan"]["quantities"]["U6"]["average"]  # type: ignore[index]
+    assert told == pytest.approx(worth, rel=1e-9)
+    assert told > 1.001 * steady["value"]  # type: ignore[operator]
+    lines = bp.plan(pool, positions=6).lines()
+    assert "positions were chosen without drift; U1 to U6 are those with the drift" in lines

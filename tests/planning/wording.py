@@ -6,7 +6,6 @@ HAS_TO_BE_CHOSEN = '"low" has to be chosen, but was interrupted'
 INCLUDES_THE_DISTANCES = (
     'U5 includes the distances of ".*", but no position of this artefact can be read'
 )
-KEPT_AS_WELL = "seed: 5   # kept as well"
 LOW_AGAIN_WAS_INTERRUPTED_AFTER_READINGS = (
     "low again was interrupted after 7 readings; 2 more complete it"
 )

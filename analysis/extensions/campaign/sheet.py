@@ -17,7 +17,6 @@ from ballplate.simulator.experiment import Candidate, ChangeTimes, Experiment, i
 from ballplate.simulator.inputs import refused, to_python
 
 from .reading_lists import planned_readings, points_csv, points_dmis, template_csv
-from .sheet_head import offsets
 from .sheet_page import sheet_page
 
 
@@ -70,7 +69,7 @@ class Sheet(Result):
         if self.experiment.dimension == 2:
             text = "spheres in DMIS are for three dimensions; write a .csv file of points"
             raise refused(self.experiment.source, text, "machine.volume")
-        styli = dict(offsets(self.experiment))
+        styli = {name: probe.offset for name, probe in self.experiment.probes.items()}
         return points_dmis(readings, self.experiment.title, diameter, styli)
 
 

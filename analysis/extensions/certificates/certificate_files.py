@@ -30,6 +30,7 @@ from ballplate.simulator.design import (
 from ballplate.simulator.experiment import Experiment, doubt_of_table
 from ballplate.simulator.inputs import (
     MOST_MESSAGES,
+    PARSERS,
     SMALLEST,
     CsvWriter,
     ExperimentError,
@@ -42,9 +43,6 @@ from ballplate.simulator.inputs import (
     hint,
     length_text,
     listing,
-    parse_angle,
-    parse_length,
-    parse_ratio,
     read_table,
     read_text,
     refused,
@@ -54,7 +52,6 @@ from ballplate.simulator.readings import Simulated
 
 COLUMNS = ("item", "first", "second", "value")
 AXES = "xyz"
-PARSERS = {"m": parse_length, "rad": parse_angle, "1": parse_ratio}
 UNIT_NAMES = {"rad": "rad", "1": "m/m"}
 
 

@@ -123,8 +123,8 @@ def rows(quantities: Mapping[str, Quantity]) -> list[Data]:
 
 
 def hours_of(experiment: Experiment) -> Data:
-    """Return the `hours` that the positions of an experiment, read for planning, take in the order
-    of least change-over, and whether their times are `usual` ones, as the file states none.
+    """Return the `hours` that the positions of an experiment, read for planning, take in a short
+    order, and whether their times are `usual` ones, as the file states none.
     """
     planned = experiment if experiment.pool else experiment.with_({"pool": {}})
     assert planned.pool is not None

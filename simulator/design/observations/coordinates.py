@@ -194,24 +194,25 @@ def read_coordinates(
     )
     if uncertainties is None:
         return None
+    standard, root = uncertainties
     of_balls = len(np.unique(balls))
     text = (
         f"co-ordinates tie {of_balls} balls together, at most {MOST_TIED_BALLS} are possible; leave"
         f" {joint_key(settings)} out"
     )
-    if uncertainties.root is not None and not references.require(
+    if root is not None and not references.require(
         of_balls <= MOST_TIED_BALLS, (*steps, joint_key(settings)), text
     ):
         return None
-    is_common = of_axes is not None and uncertainties.root is None
+    is_common = of_axes is not None and root is None
     return CoordinateCalibration(
         artefact,
         balls,
         tuple(AXIS_NAMES.index(axis) for axis in axes),
         frozen(values),
         settings.values is not None,
-        frozen(of_axes if is_common else uncertainties.standard.reshape(values.shape)),
-        root=uncertainties.root,
+        frozen(of_axes if is_common else standard.reshape(values.shape)),
+        root=root,
     )
 
 

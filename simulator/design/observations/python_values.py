@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, ClassVar, Literal, Protocol
@@ -14,10 +14,8 @@ from ...geometry.ball_layouts import BallLayout, Name, frozen
 from ...inputs.messages import Steps
 from ...inputs.own_code import own_array
 from ...inputs.quantities import (
+    PARSERS,
     QuantityError,
-    parse_angle,
-    parse_length,
-    parse_ratio,
     with_quantities,
 )
 from ...inputs.settings import Forms, NonEmpty, Text, listing
@@ -40,11 +38,6 @@ from .stated_values import (
 from .whitening import CovarianceRoot, at_least_exact, covariance_root
 
 GROUP = "ballplate.calibrations"
-PARSERS: dict[str, Callable[[object], float]] = {
-    "m": parse_length,
-    "rad": parse_angle,
-    "1": parse_ratio,
-}
 
 
 class BallFunctions(Protocol):
@@ -205,7 +198,7 @@ def read_python_values(
     )
     if uncertainties is None:
         return None
-    root = uncertainties.root or covariance_root(np.diag(uncertainties.standard**2))
+    standard, root = uncertainties
     return PythonCalibration(
         artefact,
         settings.object,
@@ -215,8 +208,8 @@ def read_python_values(
         np.asarray(balls, np.int64),
         frozen(values),
         settings.values is not None,
-        uncertainties.standard,
-        root,
+        standard,
+        root or covariance_root(np.diag(standard**2)),
     )
 
 

@@ -87,16 +87,6 @@ class CertificateEntry:
 
 
 @dataclass(frozen=True)
-class Uncertainties:
-    """Standard uncertainties (m,) of values in metres, and the root of their covariance if they
-    are correlated.
-    """
-
-    standard: Array
-    root: CovarianceRoot | None = None
-
-
-@dataclass(frozen=True)
 class FileValues:
     """Content of a file: its entries, and of a digital certificate a covariance (m, m) with its
     rounding of the requested values.
@@ -158,9 +148,10 @@ def uncertainties_of(
     lengths: Array,
     steps: Steps,
     references: References,
-) -> Uncertainties | None:
-    """Return uncertainties of values with `names`: those stated (m,) with the item, or those read
-    (m,) from its file, and those of a covariance; or report faults.
+) -> tuple[Array, CovarianceRoot | None] | None:
+    """Return standard uncertainties (m,) of values with `names`, in metres: those stated (m,) with
+    the item, or those read (m,) from its file, or those of a covariance, and the root of this if
+    they are correlated; or report faults.
 
     A part that they have in common is that at the nominal `lengths` (m,), with signs for
     co-ordinates.
@@ -205,7 +196,7 @@ def uncertainties_of(
     if matrix is None and of_values is not None:
         common = _common(settings, of_values, lengths)
         if common is None:
-            return Uncertainties(_frozen(of_values))
+            return _frozen(of_values), None
         matrix = common, np.zeros_like(common)
     assert matrix is not None
     size = np.sqrt(np.diag(matrix[0]))
@@ -219,7 +210,7 @@ def uncertainties_of(
         )
         return None
     root = _root_of(matrix, place, problems)
-    return None if root is None else Uncertainties(_frozen(size), root)
+    return None if root is None else (_frozen(size), root)
 
 
 def _disagreement(

@@ -74,8 +74,7 @@ def test_page_stands_alone_and_has_a_box_for_each_position(
     tags.feed(page)
     names = [tag for tag, _ in tags.seen]
     assert names.count("section") == 4
-    # Of each artefact, and of the volume.
-    assert names.count("svg") == 2 + 1
+    assert names.count("svg") == 1
     assert "script" not in names and "link" not in names and "img" not in names
     boxes = [found for tag, found in tags.seen if tag == "input"]
     # One for each position, and one for each probe of those that are still to be read.

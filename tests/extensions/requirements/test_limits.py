@@ -89,7 +89,7 @@ def test_what_is_not_stated_cannot_be_varied() -> None:
     with pytest.raises(NotVariableError, match="temperatures"):
         answered(small_quickstart(**FEW), 1e-7, "thermometers")
     with pytest.raises(NotVariableError, match="pool"):
-        answered(small_quickstart(**FEW), 1e-7, "hours")
+        bp.reach(small_quickstart(**FEW), "U6 average 0.1 um", "hours")
 
 
 def test_the_largest_size_that_fits_is_no_limit_of_the_design() -> None:
