@@ -164,7 +164,9 @@ def _exclusions(experiment: Experiment, changes: Sequence[Change]) -> list[AtMos
         by_subject.setdefault(change.subject, []).append(k)
     limits = [AtMost(tuple(members), 1) for members in by_subject.values()]
     pool = experiment.pool
-    for limit in () if pool is None else pool.at_most:
+    if pool is None:
+        return limits
+    for limit in pool.at_most:
         drawn = sum(pool.candidates[k].drawn for k in limit.members)
         members = [k for k, change in enumerate(changes) if change.candidate in limit.members]
         limits.append(AtMost(tuple(members), max(limit.count - drawn, 0)))

@@ -86,7 +86,8 @@ def next_positions(
     candidates.sort(key=lambda candidate: candidate[0])
     best: dict[object, tuple[Any, ...]] = {}
     for candidate in candidates:
-        best.setdefault(_kind(experiment, candidate[1].item), candidate)
+        if isinstance(position := candidate[1].item, Position):
+            best.setdefault(_kind(experiment, position), candidate)
     before = hours_of(experiment)["hours"]
     shown = []
     for order, change, lengths in list(best.values())[:MOST_SHOWN]:
