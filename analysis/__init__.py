@@ -42,7 +42,6 @@ if TYPE_CHECKING:
     from ballplate.extensions.judgement.interface import budget, compare_models, validate
     from ballplate.extensions.laboratory.interface import read_report
     from ballplate.extensions.maps.interface import (
-        adjust,
         convert,
         correct,
         curves,
@@ -130,7 +129,6 @@ __all__ = [
     "Table",
     "Target",
     "Trust",
-    "adjust",
     "assumptions",
     "budget",
     "certificate",

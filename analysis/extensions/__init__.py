@@ -177,18 +177,11 @@ SHIPPED = (
                 "convert_command",
                 "the map of a fit in another error model, with its covariance",
             ),
-            "adjust": Command(
-                "adjust_command",
-                "predict a machine's errors after adjustments, and compare with a second campaign",
-                "use",
-            ),
             "run --lengths": Command(
                 "lengths_command", "uncertainties of lengths throughout the volume against a target"
             ),
         },
-        functions=_from(
-            "interface", "adjust", "convert", "correct", "curves", "diff", "lengths", "map"
-        ),
+        functions=_from("interface", "convert", "correct", "curves", "diff", "lengths", "map"),
     ),
     _here(
         "splines",

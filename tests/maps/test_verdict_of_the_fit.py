@@ -145,7 +145,6 @@ OF_MAPS = [
     ["map", "MAP", "--grid", "2,2,2"],
     ["map", "--curves", "MAP"],
     ["map", "--convert", "MAP", "--to", "metric"],
-    ["adjust", "MAP", "--scale", "x=10 um/m"],
     ["diff", "MAP", "clean.npz"],
 ]
 
@@ -197,7 +196,7 @@ def test_diff_repeats_that_of_a_map_that_is_prior_knowledge(maps: dict[str, Path
     assert sum(wording.IN_THE_FIT_OF_THE_MAP in str(one) for one in found.notes) == 1
 
 
-@pytest.mark.parametrize("kind", ["conversion", "adjustment", "arrays"])
+@pytest.mark.parametrize("kind", ["conversion", "arrays"])
 def test_maps_made_of_a_map_carry_it(
     kind: str, maps: dict[str, Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -205,8 +204,6 @@ def test_maps_made_of_a_map_carry_it(
     before = bp.load_map(maps["beyond"])
     if kind == "conversion":
         main(["map", "--convert", str(maps["beyond"]), "--to", "empirical", "-o", "new.npz"])
-    elif kind == "adjustment":
-        main(["adjust", str(maps["beyond"]), "--scale", "x=10 um/m", "-o", "new.npz"])
     else:
         bp.write_map(before, "new.npz")
     assert bp.load_map("new.npz").lack_of_fit == before.lack_of_fit

@@ -66,12 +66,6 @@ RECIPES = (
         " country=DE --json"
     ),
     "certificate tables.yaml tables-readings.csv -o out.csv --datum all --coverage-factor 3",
-    (
-        "adjust map.yaml --scale 'x=22 um/m' --turn 'y+x=0.02 turns of 1 mm at 400 mm'"
-        " --after map.npz -o out.yaml"
-    ),
-    "adjust map.yaml --scale 'x=2 um/m' --uncertainty 2% --json",
-    "adjust map.yaml --turn 'y-x=2 arcsec' --after map.npz --force -o out.npz",
     "fit small.yaml small-readings.csv -o new.npz --date 2026-11-22",
     "correct map.yaml to-correct.csv --length A B --tasks small.yaml",
     "correct map.npz to-correct.csv -o out.csv --covariance covariance.csv --coverage-factor 3 --json",

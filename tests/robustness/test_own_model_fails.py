@@ -77,7 +77,6 @@ COMMANDS = (
     "models e.yaml readings.csv",
     "validate e.yaml readings.csv",
     "certificate e.yaml readings.csv",
-    "adjust map.yaml --scale x=10ppm",
     "compare e.yaml --trials 2",
     "correct map.yaml points.csv",
     "map --curves map.yaml",

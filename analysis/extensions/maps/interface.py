@@ -1,4 +1,4 @@
-"""Error maps from Python: corrected points, curves, lengths, differences, adjustments."""
+"""Error maps from Python: corrected points, curves, lengths, differences."""
 
 from __future__ import annotations
 
@@ -34,7 +34,6 @@ if TYPE_CHECKING:
     from ballplate.simulator.machines import Array
     from ballplate.simulator.maps import FittedMap
 
-    from .adjusted_machine import AdjustedMachine
     from .converted_map import ConvertedMap
     from .correction import Correction
     from .error_curves_result import ErrorCurves
@@ -252,39 +251,6 @@ def curves(
     return error_curves(*map_of_source(source), names, points)
 
 
-def adjust(
-    fitted: Fit | FittedMap | PathLike,
-    scale: str | Iterable[str] = (),
-    turn: str | Iterable[str] = (),
-    after: Fit | FittedMap | PathLike | None = None,
-    share: float = 0.0,
-) -> AdjustedMachine:
-    """Return the errors left by adjustments of a fitted machine, compared with a campaign `after`
-    them; both are fits, maps, or files of maps.
-
-    Changes are texts as those of `ballplate adjust`: `scale` such as "x=22 um/m", and `turn` such
-    as "y-x=12 arcsec" or "y-x=0.25 turns of 1 mm at 400 mm". `share` is the relative standard
-    uncertainty of each.
-
-    :raises ValueError: a text that is no change, or a change that the error model cannot follow.
-
-    >>> import ballplate as bp
-    >>> machine = bp.fit(bp.quickstart(), bp.simulate(bp.quickstart())).to_map()
-    >>> bp.adjust(machine, scale="x=20 um/m")
-    <AdjustedMachine of 5 x 5 ball plate in six positions: 1 change, predicted>
-    """
-    from .adjusted_machine import adjusted_machine
-    from .machine_changes import guideway_turn, scale_change
-
-    first = fitted_map_of("fitted", fitted)
-    second = None if after is None else fitted_map_of("after", after)
-    if not 0.0 <= share <= 1.0:
-        raise ValueError(f"share={share!r}; give a ratio from 0 to 1")
-    changes = [scale_change(text) for text in _texts("scale", scale)]
-    changes += [guideway_turn(text) for text in _texts("turn", turn)]
-    return adjusted_machine(first.title, first, changes, second, share)
-
-
 def correct(
     fitted: Fit | FittedMap | PathLike,
     points: Any,
@@ -347,11 +313,3 @@ def _several(name: str, value: Any) -> tuple[int, ...]:
         return tuple(value)
     ensure_whole(2, None, **{name: value})
     return (value,)
-
-
-def _texts(name: str, texts_given: str | Iterable[str]) -> tuple[str, ...]:
-    """One text or several."""
-    texts = (texts_given,) if isinstance(texts_given, str) else tuple(texts_given)
-    for text in texts:
-        ensure_type(str, 'a text such as "x=22 um/m"', **{name: text})
-    return texts
