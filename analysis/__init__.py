@@ -42,7 +42,6 @@ if TYPE_CHECKING:
     from ballplate.extensions.judgement.interface import budget, compare_models, validate
     from ballplate.extensions.laboratory.interface import read_report
     from ballplate.extensions.maps.interface import (
-        convert,
         correct,
         curves,
         diff,
@@ -135,7 +134,6 @@ __all__ = [
     "check",
     "compare",
     "compare_models",
-    "convert",
     "correct",
     "curves",
     "design",

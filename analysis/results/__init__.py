@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from .fits import Fit
     from .fitting import fit
     from .groupings import GROUPINGS, Grouping
-    from .map_of_fit import FRAMES, MappedFit, data_of, left_out_words
+    from .map_of_fit import MappedFit, data_of, left_out_words
     from .prediction import Prediction
     from .qualifications import Qualification, given_words, qualification_data, qualifications_of
     from .residuals import reading_residuals

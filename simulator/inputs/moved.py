@@ -4,7 +4,6 @@ from __future__ import annotations
 
 MOVED = {
     "ballplate budget": "ballplate run --budget",
-    "ballplate convert": "ballplate map --convert",
     "ballplate curves": "ballplate map --curves",
     "ballplate diff --csv": "-o",
     "ballplate export": "ballplate sweep --export",

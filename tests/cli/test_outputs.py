@@ -132,7 +132,6 @@ WALK = {
         },
         {"-o": "d.csv", "--plot": "d.svg"},
     ),
-    "map --convert": Walk({"MAP": "map.yaml"}, {"-o": "other.yaml"}, ("--to", "metric")),
     "plan": Walk(
         {"FILE": "pool.yaml", "--from": "drawn.yaml", "--done": "done.csv"},
         {"-o": "plan.yaml", "--sheet": "sheet.html", "--plot": "plan.svg"},

@@ -144,7 +144,6 @@ OF_MAPS = [
     ["correct", "MAP", "points.csv"],
     ["map", "MAP", "--grid", "2,2,2"],
     ["map", "--curves", "MAP"],
-    ["map", "--convert", "MAP", "--to", "metric"],
     ["diff", "MAP", "clean.npz"],
 ]
 
@@ -196,16 +195,12 @@ def test_diff_repeats_that_of_a_map_that_is_prior_knowledge(maps: dict[str, Path
     assert sum(wording.IN_THE_FIT_OF_THE_MAP in str(one) for one in found.notes) == 1
 
 
-@pytest.mark.parametrize("kind", ["conversion", "arrays"])
-def test_maps_made_of_a_map_carry_it(
-    kind: str, maps: dict[str, Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+def test_a_map_that_is_written_again_carries_it(
+    maps: dict[str, Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
     before = bp.load_map(maps["beyond"])
-    if kind == "conversion":
-        main(["map", "--convert", str(maps["beyond"]), "--to", "empirical", "-o", "new.npz"])
-    else:
-        bp.write_map(before, "new.npz")
+    bp.write_map(before, "new.npz")
     assert bp.load_map("new.npz").lack_of_fit == before.lack_of_fit
     # By hand it is not taken off.
     text = maps["beyond"].read_text()

@@ -84,8 +84,6 @@ RECIPES = (
         "diff tables.yaml tables.yaml --readings tables-readings.csv tables-again.csv"
         " --shared certificate --json"
     ),
-    "'map --convert' map.yaml --to empirical -o out.yaml",
-    "'map --convert' map.npz --to '{kind: kinematic, position_coefficients: 3}' --json",
     "compare small.yaml --trials 2 --points 5 --pairs braced --seed 2",
     (
         "compare bar-bell.yaml --variant 'length known' --trials 2 --points 5 --estimator"

@@ -80,7 +80,6 @@ COMMANDS = (
     "compare e.yaml --trials 2",
     "correct map.yaml points.csv",
     "map --curves map.yaml",
-    "map --convert map.yaml --to metric",
     "map map.yaml",
     "diff map.yaml map.yaml",
     "sweep s.yaml",

@@ -34,7 +34,6 @@ if TYPE_CHECKING:
     from ballplate.simulator.machines import Array
     from ballplate.simulator.maps import FittedMap
 
-    from .converted_map import ConvertedMap
     from .correction import Correction
     from .error_curves_result import ErrorCurves
     from .fitted_errors_result import FittedErrorMap
@@ -42,25 +41,6 @@ if TYPE_CHECKING:
     from .map_difference import MapDifference
     from .map_places import Line
     from .volumetric_results import MachineErrors
-
-
-def convert(fitted: Fit | FittedMap | PathLike, to: str) -> ConvertedMap:
-    """Return the map of a fit in another error model: a kind such as "empirical", settings such as
-    "{kind: kinematic, position_coefficients: 3}", or the path of an experiment file with the model.
-
-    Its `map` is the new one, with its covariance.
-
-    >>> import ballplate as bp
-    >>> fitted = bp.fit(bp.quickstart(), bp.simulate(bp.quickstart())).to_map()
-    >>> bp.convert(fitted, "{kind: empirical, coefficients: 5}")
-    <ConvertedMap of map: empirical, 195 parameters, the same corrections>
-    """
-    from .converted_map import convert as converted
-    from .map_files_of_machines import map_of_source
-
-    ensure_type(str, 'an error model such as "empirical"', to=to)
-    source_map, label = map_of_source(map_or_path("fitted", fitted))
-    return converted(source_map, to, label)
 
 
 def diff(

@@ -4,7 +4,6 @@ AS_ALIKE_AS_THESE = "as alike as these"
 A_MACHINE_FILE_STATES_ITS_OWN = "a machine file states its own probe"
 BOTH_REST_ON_SOME = "both rest on some of the same readings"
 BY_THE_EXPANDED_UNCERTAINTY = "by the expanded uncertainty 1.5 u of"
-CANNOT_FOLLOW_THE_OLD_ONE_EXACTLY = "cannot follow the old one exactly"
 CARRIES_CARRIES_THE_PROBE = (
     "FB1: x carries z carries the probe, y carries the workpiece; errors are the tip's position"
 )
@@ -31,7 +30,6 @@ READINGS_ARE_THE_SAME_IN_BOTH = "warning: readings are the same in both campaign
 READINGS_IN_COMMON_MAY_HIDE = "readings in common may hide a change"
 REST_ON_THE_SAME_READINGS = "rest on the same readings"
 THE_CAMPAIGNS_ARE_TAKEN = "the campaigns are taken to be independent"
-THE_NEW_ERROR_MODEL_DOES_ALL = "the new error model does all that the old one did"
 THE_SAME_IN_BOTH_CAMPAIGNS = "the same in both campaigns in x low:"
 THIS_DESCRIBES_A = "this describes a machine; use it with ballplate map"
 THIS_IS_AN_EXPERIMENT = "this is an experiment or a sweep; name a machine file"
