@@ -8,12 +8,11 @@ from ballplate.simulator.inputs.faces import lazily
 
 # Public names of this package: extensions import these alone, and its modules are private.
 if TYPE_CHECKING:
-    from .adjustments import ARCSECOND, FEW, coverage_factor, few_degrees_of_freedom, freedom_words
+    from .adjustments import FEW, few_degrees_of_freedom, freedom_words
     from .checked_designs import PlannedUncertainty, check, planned_uncertainty, predict
     from .diagnosis import has_exact_values
     from .error_functions import estimated_curves
     from .estimates import (
-        ESTIMATE_COLUMNS,
         EstimatedFunctions,
         Function,
         ParameterEstimate,

@@ -15,9 +15,8 @@ if TYPE_CHECKING:
     from .layout import lay_out
     from .loading import build, load, trees_of, with_pool
     from .machine_file import load_machine
-    from .map_files import is_map_file, read_map, write_map
+    from .map_files import is_map_file, read_map
     from .model import Candidate, ChangeTimes, Experiment, Pool, Position, Probe, ReadingGroup
-    from .model_files import absolute
     from .modules import python_models, runs_code
     from .name_rules import PLACE, check_rule
     from .named_files import (

@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     from .arrangement import ARRANGEMENTS, AXES, Arrangement
     from .bases import Basis
     from .curves import Points, SmoothedPoints
-    from .custom import CustomModelError, module_source
+    from .custom import module_source
     from .description import (
         Combination,
         MachineDescription,
@@ -38,12 +38,8 @@ if TYPE_CHECKING:
         Unit,
     )
     from .settings import (
-        ErrorModelSettings,
-        MachineFileSettings,
         PythonSettings,
         build_error_model,
-        kind_of,
-        with_defaults,
     )
     from .volumetric import (
         SQUARENESS,

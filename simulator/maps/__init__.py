@@ -12,9 +12,7 @@ if TYPE_CHECKING:
     from .fitted_map import (
         FittedMap,
         InCommon,
-        LeftOut,
         MapData,
-        determined_only,
         readings_in_common,
     )
 

@@ -150,7 +150,7 @@ WALK = {
     ),
     "run --reliability": Walk(EXPERIMENT, {"-o": "o.csv"}, also=("balls.csv",)),
     "map": Walk(
-        {"FILE": "machine.yaml", "--tasks": "design.yaml"},
+        {"FILE": "machine.yaml"},
         {"--plot": "map.png"},
         ("--grid", "2,2,2"),
         ("measured/exx.csv",),

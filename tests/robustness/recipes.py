@@ -110,7 +110,7 @@ RECIPES = (
     "map machine.yaml --line 'y = 300 mm, z = 200 mm' --points 3 --json",
     "map gec-like.yaml --grid 2,3,4 --format csv",
     "map gec-like.yaml --grid 2,2,2 --plot out.svg",
-    "map map.yaml --grid 3,2,2 --budget --draw 3 --seed 4 --tasks small.yaml",
+    "map map.yaml --grid 3,2,2 --draw 3 --seed 4",
     "map map.npz --plane 'z = 200 mm' --grid 3,3 --probe right --plot out.svg --json",
     "map map.yaml --points to-correct.csv --format csv",
     "'map --curves' map.yaml",

@@ -139,7 +139,6 @@ def map(
     draw: int | None = None,
     seed: int = 1,
     budget: bool = False,
-    tasks: Experiment | PathLike | None = None,
 ) -> MachineErrors | FittedErrorMap:
     """Return volumetric errors of a machine file or of a map, with expanded uncertainties: on a
     grid over the volume, in a plane, along a line, or at points.
@@ -147,9 +146,8 @@ def map(
     `line` is a text as in `ballplate map --line`, co-ordinates in metres of the two fixed axes, or
     two points; `plane` the co-ordinate of the axis across it. `points` is their number along a
     line, a table as for the command, or co-ordinates (m, d) in metres. For a map, `probe` names the
-    probe, and `tasks` of an experiment add lengths. `draw` is the number of realisations of the
-    random part, or of the covariance of a map, from a `seed`. `budget` adds the contributions of
-    parametric errors.
+    probe. `draw` is the number of realisations of the random part, or of the covariance of a
+    map, from a `seed`. `budget` adds the contributions of parametric errors of a machine file.
 
     >>> import ballplate as bp
     >>> bp.map("designs/park/machines/npl-like.yaml", line="y = 300 mm, z = 200 mm", points=3)
@@ -199,8 +197,7 @@ def map(
         places,
     )
     draws = None if draw is None else Draws(draw, seed)
-    chosen = () if tasks is None else (experiment_of(tasks),)
-    return map_errors(source, asked, probe, draws, budget, chosen)
+    return map_errors(source, asked, probe, draws, budget)
 
 
 def curves(
