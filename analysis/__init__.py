@@ -42,8 +42,6 @@ if TYPE_CHECKING:
     from ballplate.extensions.judgement.interface import budget, compare_models, validate
     from ballplate.extensions.laboratory.interface import read_report
     from ballplate.extensions.maps.interface import (
-        adjust,
-        convert,
         correct,
         curves,
         diff,
@@ -128,14 +126,12 @@ __all__ = [
     "Table",
     "Target",
     "Trust",
-    "adjust",
     "assumptions",
     "budget",
     "certificate",
     "check",
     "compare",
     "compare_models",
-    "convert",
     "correct",
     "curves",
     "design",

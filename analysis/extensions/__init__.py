@@ -169,22 +169,11 @@ SHIPPED = (
                 "curves_command",
                 "parametric errors of a machine file or map along their axes, with uncertainties",
             ),
-            "map --convert": Command(
-                "convert_command",
-                "the map of a fit in another error model, with its covariance",
-            ),
-            "adjust": Command(
-                "adjust_command",
-                "predict a machine's errors after adjustments, and compare with a second campaign",
-                "use",
-            ),
             "run --lengths": Command(
                 "lengths_command", "uncertainties of lengths throughout the volume against a target"
             ),
         },
-        functions=_from(
-            "interface", "adjust", "convert", "correct", "curves", "diff", "lengths", "map"
-        ),
+        functions=_from("interface", "correct", "curves", "diff", "lengths", "map"),
     ),
     _here(
         "splines",

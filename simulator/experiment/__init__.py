@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from .layout import lay_out
     from .loading import build, load, trees_of, with_pool
     from .machine_file import load_machine
-    from .map_files import is_map_file, read_map, write_map
+    from .map_files import is_map_file, read_map
     from .model import (
         AtMost,
         Candidate,

@@ -76,10 +76,6 @@ def resolve_map_prior(
     years = None if fitted is None else _years(settings, fitted, steps, references)
     if fitted is None or years is None or not _is_same(fitted, model, machine, of_file, references):
         return []
-    if fitted.conversion_residual is not None:
-        text = "was converted from another error model, and has values that no readings determined"
-        problems.add(of_file, f"{text}; use the map that fit wrote")
-        return []
     kept_indices = np.arange(len(fitted.values))
     free = [
         (name, axis)
@@ -188,7 +184,7 @@ def _is_same(
         differ = [name for name, _ in set(model_parameters) ^ set(map_parameters)]
         text = (
             f"is of another error model (parameters differ: {listing(sorted(differ), 4)}); fit with"
-            " the same model, or convert the map"
+            " the same model"
         )
         add(steps, text)
         return False

@@ -10,7 +10,7 @@ from ballplate.simulator.inputs.faces import lazily
 if TYPE_CHECKING:
     from .arrangement import ARRANGEMENTS, AXES, Arrangement
     from .curves import Points, SmoothedPoints
-    from .custom import CustomModelError, module_source
+    from .custom import module_source
     from .description import (
         Combination,
         MachineDescription,
@@ -37,12 +37,8 @@ if TYPE_CHECKING:
         Unit,
     )
     from .settings import (
-        ErrorModelSettings,
-        MachineFileSettings,
         PythonSettings,
         build_error_model,
-        kind_of,
-        with_defaults,
     )
     from .volumetric import (
         SQUARENESS,

@@ -25,17 +25,14 @@ ROUNDING = 1e-13
 # What two campaigns have of each other's readings.
 InCommon = Literal["none", "some", "same"]
 
-# Kind of what a map leaves out that was converted from another error model.
-CONVERSION = "conversion"
-
 
 @dataclass(frozen=True)
 class LeftOut:
     """A parameter that a fit estimated and its map does not apply, such as one of an influence
-    quantity; or the residual of a converted map.
+    quantity.
 
-    `kind` is as in the estimates of a fit, or `CONVERSION`; `value` and `standard_uncertainty` are
-    in `unit`, None if undetermined.
+    `kind` is as in the estimates of a fit; `value` and `standard_uncertainty` are in `unit`, None
+    if undetermined.
     """
 
     name: str
@@ -116,12 +113,6 @@ class FittedMap:
     def without_scatter(self) -> bool:
         """True if sigma, and with it the covariance, is zero except rounding."""
         return self.sigma_is_estimated and self.sigma < LEAST_SIGMA
-
-    @property
-    def conversion_residual(self) -> float | None:
-        """Largest difference in metres of corrected points from the source of a converted map."""
-        residuals = [part.value for part in self.left_out if part.kind == CONVERSION]
-        return residuals[0] if residuals else None
 
     @cached_property
     def offset_columns(self) -> Integers:

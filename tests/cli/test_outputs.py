@@ -94,11 +94,6 @@ WALK = {
         also=("balls.csv",),
         prints=False,
     ),
-    "adjust": Walk(
-        {"MAP": "map.yaml", "--after": "map-again.yaml"},
-        {"-o": "after.yaml"},
-        ("--turn", "y-x=1 urad", "--uncertainty", "2%"),
-    ),
     "correct": Walk(
         {
             "MAP": "map.yaml",
@@ -135,7 +130,6 @@ WALK = {
         },
         {"-o": "d.csv", "--plot": "d.svg"},
     ),
-    "map --convert": Walk({"MAP": "map.yaml"}, {"-o": "other.yaml"}, ("--to", "metric")),
     "plan": Walk(
         {"FILE": "pool.yaml", "--from": "drawn.yaml", "--done": "done.csv"},
         {"-o": "plan.yaml", "--sheet": "sheet.html", "--plot": "plan.svg"},
@@ -154,7 +148,7 @@ WALK = {
     ),
     "run --reliability": Walk(EXPERIMENT, {"-o": "o.csv"}, also=("balls.csv",)),
     "map": Walk(
-        {"FILE": "machine.yaml", "--tasks": "design.yaml"},
+        {"FILE": "machine.yaml"},
         {"--plot": "map.png"},
         ("--grid", "2,2,2"),
         ("measured/exx.csv",),
@@ -231,12 +225,9 @@ def shelf(tmp_path_factory: pytest.TempPathFactory) -> Path:
         str(certificate),
     ]
     assert main(arguments) == 0
-    again = ["-o", str(folder / "again.csv"), "--seed", "2"]
-    assert main(["simulate", str(folder / "design.yaml"), *again]) == 0
     (folder / "corners.csv").write_text("name,x_mm,y_mm\nA,50,50\nB,450,50\n", encoding="utf-8")
-    for table, name in ((readings, "map.yaml"), (folder / "again.csv", "map-again.yaml")):
-        fit = ["fit", str(folder / "design.yaml"), str(table), "-o", str(folder / name)]
-        assert main(fit) == 0
+    fit = ["fit", str(folder / "design.yaml"), str(readings), "-o", str(folder / "map.yaml")]
+    assert main(fit) == 0
     shutil.copy(folder / "map.yaml", folder / "second-map.yaml")
     # In the plane, where a model has few curves to be drawn.
     few = {"kind": "kinematic", "position_coefficients": 2, "rotation_coefficients": 1}

@@ -66,12 +66,6 @@ RECIPES = (
         " country=DE --json"
     ),
     "certificate tables.yaml tables-readings.csv -o out.csv --datum all --coverage-factor 3",
-    (
-        "adjust map.yaml --scale 'x=22 um/m' --turn 'y+x=0.02 turns of 1 mm at 400 mm'"
-        " --after again.yaml -o out.yaml"
-    ),
-    "adjust map.yaml --scale 'x=2 um/m' --uncertainty 2% --json",
-    "adjust map.yaml --turn 'y-x=2 arcsec' --after again.yaml --force -o out.yaml",
     "fit small.yaml small-readings.csv -o new.yaml --date 2026-11-22",
     "correct map.yaml to-correct.csv --length A B --tasks small.yaml",
     "correct again.yaml to-correct.csv -o out.csv --covariance covariance.csv --coverage-factor 3 --json",
@@ -89,8 +83,6 @@ RECIPES = (
         "diff tables.yaml tables.yaml --readings tables-readings.csv tables-again.csv"
         " --shared certificate --json"
     ),
-    "'map --convert' map.yaml --to empirical -o out.yaml",
-    "'map --convert' again.yaml --to '{kind: kinematic, position_coefficients: 3}' --json",
     "compare small.yaml --trials 2 --points 5 --pairs braced --seed 2",
     (
         "compare bar-bell.yaml --variant 'length known' --trials 2 --points 5 --estimator"
@@ -117,7 +109,7 @@ RECIPES = (
     "map machine.yaml --line 'y = 300 mm, z = 200 mm' --points 3 --json",
     "map gec-like.yaml --grid 2,3,4 --format csv",
     "map gec-like.yaml --grid 2,2,2 --plot out.svg",
-    "map map.yaml --grid 3,2,2 --budget --draw 3 --seed 4 --tasks small.yaml",
+    "map map.yaml --grid 3,2,2 --draw 3 --seed 4",
     "map again.yaml --plane 'z = 200 mm' --grid 3,3 --probe right --plot out.svg --json",
     "map map.yaml --points to-correct.csv --format csv",
     "'map --curves' map.yaml",

@@ -5,8 +5,8 @@ the points of a file, with their expanded uncertainties.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
-from functools import cached_property, partial
+from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -19,7 +19,6 @@ from ballplate.presentation import (
     records,
 )
 from ballplate.results import few_degrees_of_freedom, left_out_words
-from ballplate.simulator.design import Tasks
 from ballplate.simulator.inputs import hint, number_of
 from ballplate.simulator.machines import Integers
 from ballplate.simulator.maps import FittedMap
@@ -38,8 +37,6 @@ from .fitted_tables import (
     realisation_lines,
 )
 from .map_places import MapPlaces, PlacesAsked, map_places
-from .part_budget import PartBudget, fitted_budget
-from .part_tables import budget_data, budget_lines
 from .realisations import Draws, Realisations
 from .volumetric_errors import LengthErrors, VolumetricErrors
 from .volumetric_plots import draw_grid, draw_line, draw_points
@@ -66,12 +63,10 @@ def map_cautions(fitted: FittedMap) -> tuple[str, ...]:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class FittedErrorMap(Result):
-    """Errors of a fitted machine at points, and of `lengths`: body diagonals or the line's, and
-    measuring tasks.
+    """Errors of a fitted machine at points, and of `lengths`: body diagonals or the line's.
 
     `places` are the locations, `probes` (m,) the indices of the points' probes, `probe` that of
-    lengths. `realisations` are optional draws; `with_budget` adds the contributions of parametric
-    errors.
+    lengths. `realisations` are optional draws.
     """
 
     label: str
@@ -82,7 +77,6 @@ class FittedErrorMap(Result):
     errors: VolumetricErrors
     lengths: LengthErrors
     realisations: Realisations | None = None
-    with_budget: bool = False
 
     @property
     def title(self) -> str:
@@ -100,11 +94,6 @@ class FittedErrorMap(Result):
             else words
         )
 
-    @cached_property
-    def budget(self) -> tuple[PartBudget, ...]:
-        """Contributions of parametric errors to the errors at points and to each length."""
-        return fitted_budget(self.fitted, self.places, self.probes, self.probe)
-
     def lines(self) -> list[str]:
         fitted = self.fitted
         lines = head_lines(self.label, fitted, self.probe)
@@ -119,8 +108,6 @@ class FittedErrorMap(Result):
         ]
         if self.realisations is not None:
             lines += ["", *realisation_lines(self.realisations, self.places.names)]
-        if self.with_budget:
-            lines += ["", *budget_lines(self.budget, fitted.coverage_factor)]
         return lines
 
     def data(self) -> Data:
@@ -143,8 +130,6 @@ class FittedErrorMap(Result):
         )
         if self.realisations is not None:
             data["realisations"] = self.realisations.to_dict()
-        if self.with_budget:
-            data["budget"] = budget_data(self.budget, k)
         return data | {"warnings": self.warnings}
 
     def columns(self) -> MainTable:
@@ -204,11 +189,8 @@ def fitted_map_errors(
     asked: PlacesAsked,
     probe: str | None = None,
     draws: Draws | None = None,
-    with_budget: bool = False,
-    tasks: Tasks | None = None,
 ) -> FittedErrorMap:
-    """Return errors of a fitted machine at places, with a named probe (default: that of the map);
-    lengths of `tasks` follow the diagonals or that of a line.
+    """Return errors of a fitted machine at places, with a named probe (default: that of the map).
 
     :raises ValueError: what does not go together, is not in the volume, or no probe of the map.
     """
@@ -218,15 +200,6 @@ def fitted_map_errors(
         raise ValueError(f'no probe "{chosen}"; {hint(chosen, names)}')
     index = names.index(chosen)
     places = map_places(fitted.volume, asked, names, chosen)
-    if tasks is not None:
-        own_probes = np.full((len(places.names), 2), index)
-        places = replace(
-            places,
-            starts=np.concatenate([places.starts, tasks.points[:, 0]]),
-            ends=np.concatenate([places.ends, tasks.points[:, 1]]),
-            names=places.names + tasks.names,
-            length_probes=np.concatenate([own_probes, tasks.probes]),
-        )
     probes = np.full(len(places.points), index) if places.probes is None else places.probes
     return FittedErrorMap(
         label,
@@ -237,5 +210,4 @@ def fitted_map_errors(
         fitted_errors(fitted, places.points, probes),
         fitted_lengths(fitted, places, index),
         None if draws is None else drawn_errors(fitted, places, draws, probes, index),
-        with_budget,
     )

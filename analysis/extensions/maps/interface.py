@@ -1,4 +1,4 @@
-"""Error maps from Python: corrected points, curves, lengths, differences, adjustments."""
+"""Error maps from Python: corrected points, curves, lengths, differences."""
 
 from __future__ import annotations
 
@@ -34,8 +34,6 @@ if TYPE_CHECKING:
     from ballplate.simulator.machines import Array
     from ballplate.simulator.maps import FittedMap
 
-    from .adjusted_machine import AdjustedMachine
-    from .converted_map import ConvertedMap
     from .correction import Correction
     from .error_curves_result import ErrorCurves
     from .fitted_errors_result import FittedErrorMap
@@ -43,25 +41,6 @@ if TYPE_CHECKING:
     from .map_difference import MapDifference
     from .map_places import Line
     from .volumetric_results import MachineErrors
-
-
-def convert(fitted: Fit | FittedMap | PathLike, to: str) -> ConvertedMap:
-    """Return the map of a fit in another error model: a kind such as "empirical", settings such as
-    "{kind: kinematic, position_coefficients: 3}", or the path of an experiment file with the model.
-
-    Its `map` is the new one, with its covariance.
-
-    >>> import ballplate as bp
-    >>> fitted = bp.fit(bp.quickstart(), bp.simulate(bp.quickstart())).to_map()
-    >>> bp.convert(fitted, "{kind: empirical, coefficients: 5}")
-    <ConvertedMap of map: empirical, 195 parameters, the same corrections>
-    """
-    from .converted_map import convert as converted
-    from .map_files_of_machines import map_of_source
-
-    ensure_type(str, 'an error model such as "empirical"', to=to)
-    source_map, label = map_of_source(map_or_path("fitted", fitted))
-    return converted(source_map, to, label)
 
 
 def diff(
@@ -160,7 +139,6 @@ def map(
     draw: int | None = None,
     seed: int = 1,
     budget: bool = False,
-    tasks: Experiment | PathLike | None = None,
 ) -> MachineErrors | FittedErrorMap:
     """Return volumetric errors of a machine file or of a map, with expanded uncertainties: on a
     grid over the volume, in a plane, along a line, or at points.
@@ -168,9 +146,8 @@ def map(
     `line` is a text as in `ballplate map --line`, co-ordinates in metres of the two fixed axes, or
     two points; `plane` the co-ordinate of the axis across it. `points` is their number along a
     line, a table as for the command, or co-ordinates (m, d) in metres. For a map, `probe` names the
-    probe, and `tasks` of an experiment add lengths. `draw` is the number of realisations of the
-    random part, or of the covariance of a map, from a `seed`. `budget` adds the contributions of
-    parametric errors.
+    probe. `draw` is the number of realisations of the random part, or of the covariance of a
+    map, from a `seed`. `budget` adds the contributions of parametric errors of a machine file.
 
     >>> import ballplate as bp
     >>> bp.map("designs/park/machines/npl-like.yaml", line="y = 300 mm, z = 200 mm", points=3)
@@ -220,8 +197,7 @@ def map(
         places,
     )
     draws = None if draw is None else Draws(draw, seed)
-    chosen = () if tasks is None else (experiment_of(tasks),)
-    return map_errors(source, asked, probe, draws, budget, chosen)
+    return map_errors(source, asked, probe, draws, budget)
 
 
 def curves(
@@ -250,39 +226,6 @@ def curves(
     if isinstance(source, Path) and not is_map_file(source):
         return machine_curves(source, names, points)
     return error_curves(*map_of_source(source), names, points)
-
-
-def adjust(
-    fitted: Fit | FittedMap | PathLike,
-    scale: str | Iterable[str] = (),
-    turn: str | Iterable[str] = (),
-    after: Fit | FittedMap | PathLike | None = None,
-    share: float = 0.0,
-) -> AdjustedMachine:
-    """Return the errors left by adjustments of a fitted machine, compared with a campaign `after`
-    them; both are fits, maps, or files of maps.
-
-    Changes are texts as those of `ballplate adjust`: `scale` such as "x=22 um/m", and `turn` such
-    as "y-x=12 arcsec" or "y-x=0.25 turns of 1 mm at 400 mm". `share` is the relative standard
-    uncertainty of each.
-
-    :raises ValueError: a text that is no change, or a change that the error model cannot follow.
-
-    >>> import ballplate as bp
-    >>> machine = bp.fit(bp.quickstart(), bp.simulate(bp.quickstart())).to_map()
-    >>> bp.adjust(machine, scale="x=20 um/m")
-    <AdjustedMachine of 5 x 5 ball plate in six positions: 1 change, predicted>
-    """
-    from .adjusted_machine import adjusted_machine
-    from .machine_changes import guideway_turn, scale_change
-
-    first = fitted_map_of("fitted", fitted)
-    second = None if after is None else fitted_map_of("after", after)
-    if not 0.0 <= share <= 1.0:
-        raise ValueError(f"share={share!r}; give a ratio from 0 to 1")
-    changes = [scale_change(text) for text in _texts("scale", scale)]
-    changes += [guideway_turn(text) for text in _texts("turn", turn)]
-    return adjusted_machine(first.title, first, changes, second, share)
 
 
 def correct(
@@ -347,11 +290,3 @@ def _several(name: str, value: Any) -> tuple[int, ...]:
         return tuple(value)
     ensure_whole(2, None, **{name: value})
     return (value,)
-
-
-def _texts(name: str, texts_given: str | Iterable[str]) -> tuple[str, ...]:
-    """One text or several."""
-    texts = (texts_given,) if isinstance(texts_given, str) else tuple(texts_given)
-    for text in texts:
-        ensure_type(str, 'a text such as "x=22 um/m"', **{name: text})
-    return texts

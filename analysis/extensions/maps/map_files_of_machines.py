@@ -2,18 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from functools import reduce
 from pathlib import Path
 
-from ballplate.simulator.design import Tasks
-from ballplate.simulator.experiment import Experiment, is_map_file, read_map
+from ballplate.simulator.experiment import is_map_file, read_map
 from ballplate.simulator.maps import FittedMap
 
 from .fitted_errors_result import FittedErrorMap, fitted_map_errors
 from .map_places import PlacesAsked
 from .realisations import Draws
-from .selected_lengths import tasks_of_experiment
 from .volumetric_results import MachineErrors, machine_errors
 
 
@@ -31,10 +27,8 @@ def map_errors(
     probe: str | None = None,
     draws: Draws | None = None,
     with_budget: bool = False,
-    tasks: Sequence[Experiment] = (),
 ) -> MachineErrors | FittedErrorMap:
-    """Return errors of a machine file or of a map at places, and of lengths of an experiment with
-    `tasks`.
+    """Return errors of a machine file, with their budget if requested, or of a map at places.
 
     :raises ExperimentError: the file is wrong.
     :raises ValueError: what does not go together, or is not in the machine.
@@ -42,10 +36,8 @@ def map_errors(
     if isinstance(source, Path) and not is_map_file(source):
         if probe is not None:
             raise ValueError("a machine file states its own probe; leave the probe out")
-        if tasks:
-            raise ValueError("tasks are measured by a map of a fit; leave them out")
         return machine_errors(source, asked, draws, with_budget)
+    if with_budget:
+        raise ValueError("a budget is made of a machine file alone; leave it out")
     fitted, label = map_of_source(source)
-    lengths = [tasks_of_experiment(fitted, task) for task in tasks]
-    wanted = reduce(Tasks.beside, lengths) if lengths else None
-    return fitted_map_errors(fitted, label, asked, probe, draws, with_budget, wanted)
+    return fitted_map_errors(fitted, label, asked, probe, draws)

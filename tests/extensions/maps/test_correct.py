@@ -275,8 +275,6 @@ def test_fits_and_files_that_name_readings_are_taken_as_their_maps_are(
     for call in (
         lambda one: bp.curves(one, points=3),
         lambda one: bp.map(one, grid=(2, 2, 2)),
-        lambda one: bp.adjust(one, "x=1 ppm"),
-        lambda one: bp.convert(one, "{kind: empirical, coefficients: 5}"),
     ):
         assert call(fit).to_dict() == call(fitted).to_dict()
     with pytest.raises(TypeError, match=wording.GIVE_A_FIT_WHAT):
