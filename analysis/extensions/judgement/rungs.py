@@ -100,12 +100,13 @@ def empirical_rung(experiment: Experiment, coefficients: int) -> LadderModel:
 def rung_of_file(experiment: Experiment, model: ErrorModel) -> LadderModel:
     """The error model of the file, with its numbers of coefficients if it has no others."""
     settings: Any = experiment.error_model
+    rung = None
     if isinstance(settings, KinematicSettings):
         numbers = settings.position_coefficients, settings.rotation_coefficients
         rung = kinematic_rung(experiment, *numbers)
-    elif isinstance(settings, EmpiricalSettings):
+    elif isinstance(settings, EmpiricalSettings) and isinstance(settings.coefficients, int):
         rung = empirical_rung(experiment, settings.coefficients)
-    if isinstance(settings, KinematicSettings | EmpiricalSettings) and rung.model == model:
+    if rung is not None and rung.model == model:
         return rung
     return LadderModel(f"{FILE}{settings.kind}", settings, model)
 
