@@ -14,7 +14,6 @@ SMALLER = {
     "run": "give fewer evaluation.points, leave positions out, or use fewer --workers",
     "plan": "offer fewer candidates, give fewer evaluation.points, or use fewer --workers",
     "reach": "give fewer evaluation.points, leave positions out, or use fewer --workers",
-    "run --lengths": "take a coarser --grid",
     "run --reliability": "give fewer evaluation.points, or leave positions out",
     "simulate": "plan fewer readings",
     "fit": "leave readings or evaluation.points out",

@@ -29,7 +29,6 @@ PEOPLE = [
     "check plate.yaml",
     "run plate.yaml",
     "run --reliability plate.yaml",
-    "run --lengths plate.yaml",
     "fit plate.yaml readings.csv",
     "map machine.yaml",
     "sweep sizes.yaml --workers 1",
@@ -156,7 +155,7 @@ def test_files_are_utf_8_with_line_feeds(
     """Whatever the locale: with that of C and without Python's UTF-8 mode, files would be ASCII."""
     outputs = {
         "simulate": ("-o", tmp_path / "µ.csv"),
-        "run --lengths": ("-o", tmp_path / "ü.csv"),
+        "run --reliability": ("-o", tmp_path / "ü.csv"),
     }
     for command, (option, path) in outputs.items():
         found = subprocess.run(

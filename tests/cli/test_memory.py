@@ -35,7 +35,7 @@ def _fork() -> None:
 
 
 @pytest.mark.parametrize(
-    "command", ["check", "run", "plan", "reach", "run --lengths", "run --reliability", "compare"]
+    "command", ["check", "run", "plan", "reach", "run --reliability", "compare"]
 )
 @pytest.mark.parametrize(
     ("failure", "told"),

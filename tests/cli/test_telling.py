@@ -34,7 +34,7 @@ def test_every_command_takes_both() -> None:
         )
 
 
-@pytest.mark.parametrize("command", ["check", "run --lengths", "run --reliability"])
+@pytest.mark.parametrize("command", ["check", "run --reliability"])
 def test_results_are_the_same(command: str, capsys: pytest.CaptureFixture[str]) -> None:
     plain, quiet, verbose = (
         told(capsys, command, QUICKSTART, *more) for more in ([], ["-q"], ["-v"])
@@ -46,10 +46,7 @@ def test_results_are_the_same(command: str, capsys: pytest.CaptureFixture[str]) 
     assert re.fullmatch(
         rf"{command}: [0-9.e-]+ s, [0-9.e-]+ s of the processor in this process", lines[-1]
     )
-    steps = {"run --lengths": "lengths", "run --reliability": "observations"}
-    assert command == "check" or re.fullmatch(
-        rf"(\d+) of \1 {steps[command]}: [0-9.e-]+ s", lines[-2]
-    )
+    assert command == "check" or re.fullmatch(r"(\d+) of \1 observations: [0-9.e-]+ s", lines[-2])
 
 
 def test_files_that_an_experiment_names_are_told(capsys: pytest.CaptureFixture[str]) -> None:
@@ -103,10 +100,8 @@ def test_no_bar_when_quiet(
 ) -> None:
     with monkeypatch.context() as patched:
         patched.setattr(type(sys.stderr), "isatty", lambda self: True)
-        assert "351 lengths" in "".join(
-            told(capsys, "run", "--lengths", QUICKSTART, "--grid", "3")[2]
-        )
-        assert told(capsys, "run", "--lengths", QUICKSTART, "--grid", "3", "-q")[2] == []
+        assert " observations" in "".join(told(capsys, "run", "--reliability", QUICKSTART)[2])
+        assert told(capsys, "run", "--reliability", QUICKSTART, "-q")[2] == []
 
 
 def test_check_shows_how_far_it_has_come(
