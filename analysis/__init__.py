@@ -45,7 +45,6 @@ if TYPE_CHECKING:
         correct,
         curves,
         diff,
-        lengths,
         map,
     )
     from ballplate.extensions.pages.interface import page
@@ -141,7 +140,6 @@ __all__ = [
     "in_processes",
     "information",
     "lay_out",
-    "lengths",
     "linear_functions",
     "linearise",
     "load",

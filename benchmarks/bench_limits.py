@@ -270,7 +270,6 @@ CASES = (
         "compare, 100,000 pairs of points",
         lambda folder: ["compare", QUICKSTART, "--trials", "100", "--points", "100000"],
     ),
-    Case("lengths, 4913 points", lambda folder: ["run", "--lengths", QUICKSTART, "--grid", "17"]),
     Case(
         "simulate, 2,000,000 readings",
         lambda folder: ["simulate", many_readings(folder, 8000), "-o", folder / "r.csv"],

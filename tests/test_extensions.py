@@ -221,7 +221,7 @@ OPTIONS = {
     "campaign": (["plan", "POOL", "--positions", "6", "--sheet", "sheet.html"],),
     "laboratory": (["fit", "designs/quickstart.yaml", "designs/reports/z-low.dmo"],),
     "sweeps": (["schema", "sweep"],),
-    "maps": (["run", "designs/quickstart.yaml", "--lengths"],),
+    "maps": (["map", "designs/park/machines/npl-like.yaml", "--curves"],),
     "certificates": (
         ["fit", "designs/quickstart.yaml", "READINGS", "--certificate", "values.csv"],
         ["simulate", "designs/quickstart.yaml", "-o", "again.csv", "--certificate", "values.csv"],

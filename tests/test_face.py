@@ -41,17 +41,6 @@ def printed(capsys: pytest.CaptureFixture[str], *arguments: str) -> Any:
             lambda: bp.compare(QUICKSTART, trials=2, points=10),
             ("compare", QUICKSTART, "--trials=2", "--points=10"),
         ),
-        (
-            lambda: bp.lengths(QUICKSTART, "0.3 um", grid=(3, 2, 4), coverage_factor=3),
-            (
-                "run",
-                "--lengths",
-                QUICKSTART,
-                "--target=0.3 um",
-                "--grid=3,2,4",
-                "--coverage-factor=3",
-            ),
-        ),
         (lambda: bp.map(MACHINE, grid=(3, 2, 2)), ("map", MACHINE, "--grid=3,2,2")),
         (
             lambda: bp.map(MACHINE, line={"y": 0.3, "z": 0.2}, points=4),
@@ -200,11 +189,6 @@ WRONG: list[tuple[Callable[[], object], type[Exception], str]] = [
     ),
     (lambda: bp.compare(QUICKSTART, "full"), ValueError, 'estimator: "full" is unknown'),
     (lambda: bp.compare(QUICKSTART, trials=0), ValueError, "trials=0; give 1 at least"),
-    (lambda: bp.lengths(QUICKSTART, 0.5), TypeError, "target=0.5; give a text with a unit"),
-    (lambda: bp.lengths(QUICKSTART, "1 um", grid=1), ValueError, "grid=1; give 2 at least"),
-    (lambda: bp.lengths(QUICKSTART, "1 um", grid=(3, 3)), ValueError, "the grid has 2 numbers"),
-    (lambda: bp.lengths(QUICKSTART, "1 um", grid=(3, 3, "4")), TypeError, r"grid\[2\]='4'; give"),
-    (lambda: bp.lengths(QUICKSTART, "1 um", probe="dwn"), ValueError, 'did you mean "down"'),
     (lambda: bp.map(3), TypeError, r"machine=3; give a fit, what its to_map\(\) gives, or a path"),
     (lambda: bp.map(MACHINE, grid=(2, 2)), ValueError, "give three numbers of points"),
     (lambda: bp.map(MACHINE, points=3), ValueError, "points need a line"),
@@ -274,7 +258,6 @@ def test_every_function_reports_steps_alike(tmp_path: Path) -> None:
         lambda report: bp.reliability(QUICKSTART, report=report),
         lambda report: bp.reach(QUICKSTART, "U6 average 0.2 um", "repeatability", report=report),
         lambda report: bp.compare(QUICKSTART, trials=2, points=5, report=report),
-        lambda report: bp.lengths(QUICKSTART, "1 um", grid=3, report=report),
         lambda report: bp.sweep(small_sweep(tmp_path, 2), tmp_path / "a.sqlite", report=report),
     ):
         told: list[ProgressStep] = []

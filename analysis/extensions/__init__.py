@@ -169,11 +169,8 @@ SHIPPED = (
                 "curves_command",
                 "parametric errors of a machine file or map along their axes, with uncertainties",
             ),
-            "run --lengths": Command(
-                "lengths_command", "uncertainties of lengths throughout the volume against a target"
-            ),
         },
-        functions=_from("interface", "correct", "curves", "diff", "lengths", "map"),
+        functions=_from("interface", "correct", "curves", "diff", "map"),
     ),
     _here(
         "splines",

@@ -9,7 +9,7 @@ from ballplate.simulator.inputs.faces import lazily
 # Public names of this package: extensions import these alone, and its modules are private.
 if TYPE_CHECKING:
     from .kernel_quantities import evaluation_points
-    from .pairs import PairTile, open_above, pair_tiles, pairs_of, relative
+    from .pairs import open_above, pair_tiles, pairs_of, relative
     from .quantities import DESCRIPTIONS, QUANTITIES, RECORDED, RECORDED_IF_TOLD, functions_of
     from .scale import (
         OFFSET_TRIAL,

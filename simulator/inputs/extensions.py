@@ -57,7 +57,7 @@ class Command:
     """A command: its `module`, which has DESCRIPTION, add_options and run, its line `help` and its
     `group` in the help.
 
-    A name such as "run --lengths" makes a separate command of another command's option.
+    A name such as "run --errors" makes a separate command of another command's option.
     """
 
     module: str

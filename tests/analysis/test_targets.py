@@ -12,7 +12,7 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 from ballplate.cli import main
-from ballplate.extensions.maps.length_map import LengthMapSettings, length_map
+from ballplate.extensions.maps.length_map import length_map
 from ballplate.presentation.formatting import percent
 from ballplate.rank.verdicts import Verdict, weak_limit
 from ballplate.results.checked_designs import check, predict
@@ -59,16 +59,13 @@ def verdicts(experiment: Experiment) -> list[object]:
     """Everything that compares with the target."""
     found = predict(experiment)
     verdict: Verdict = check(experiment).verdict
-    mapped = length_map(experiment, LengthMapSettings((3, 2, 3), "down", experiment.target_uncertainty.stated,  # type: ignore[union-attr]
-                                             2.0, False, experiment.coverage_factor))  # fmt: skip
     return [
         found.quantities["U6"].within_target,
         found.quantities["tasks"].within_target,
         *(task.is_within for task in found.tasks),
         len(verdict.weak),
         weak_limit(found.design, experiment.target_uncertainty),
-        mapped.is_met,
-        int(mapped.whole.within_target[0]),
+        *length_map(experiment, (3, 2, 3)).missed.tolist(),
     ]
 
 
@@ -94,7 +91,7 @@ def test_every_comparison_says_which_uncertainty_it_is_of(
     for factor, words in ((1.0, "standard uncertainty u"), (2.0, "expanded uncertainty U = 2 u")):
         file = str(written(tmp_path, with_target("0.2 um", factor)))
         for command, expected in (
-            (["run"], 2), (["check"], 1), (["run", "--lengths"], 1), (["reach", "--by", "repeats"], 1),
+            (["run"], 2), (["check"], 1), (["reach", "--by", "repeats"], 1),
             (["reach", "--by", "repeats", "--goal", "tasks"], 1), (["check", "--goal", "lengths"], 2),
         ):  # fmt: skip
             main([command[0], file, *command[1:]])
@@ -201,19 +198,12 @@ def test_weak_directions_fail_where_they_shall_not_be(tmp_path: Path) -> None:
     assert main(["check", str(written(tmp_path, with_target("5 um"))), "--fail-weak"]) == 0
 
 
-def test_lengths_and_reach_fail_on_request(tmp_path: Path) -> None:
+def test_reach_fails_on_request(tmp_path: Path) -> None:
     """By the uncertainty that the file means: 2 u is beyond a limit that u is within."""
     largest = predict(experiment_of(tmp_path, with_target("1 um"))).quantities["U6"].maximum
     for factor, status in ((1.0, 0), (2.0, 1)):
         file = str(written(tmp_path, with_target(f"{1.5e6 * largest:.6f} um", factor)))
         assert main(["reach", file, "--by", "repeats", "--fail"]) == status
-        assert main(["run", "--lengths", file, "--grid", "2"]) == 0
-        mapped = length_map(
-            load(file)[0],
-            LengthMapSettings((2, 2, 2), "down", load(file)[0].target_uncertainty.stated),
-        )  # type: ignore[union-attr]
-        of_corners = factor * float(mapped.whole.maximum_ratio[0]) > 1
-        assert main(["run", "--lengths", file, "--grid", "2", "--fail"]) == int(of_corners)
 
 
 def test_a_weak_direction_tells_at_how_many_points_and_what_all_do(tmp_path: Path) -> None:

@@ -107,7 +107,7 @@ def test_files_are_utf_8_with_line_feeds(
     """Whatever the locale: with that of C and without Python's UTF-8 mode, files would be ASCII."""
     outputs = {
         "simulate": ("-o", tmp_path / "µ.csv"),
-        "run --lengths": ("-o", tmp_path / "ü.csv"),
+        "run --reliability": ("-o", tmp_path / "ü.csv"),
     }
     for command, (option, path) in outputs.items():
         found = subprocess.run(

@@ -140,12 +140,6 @@ WALK = {
         {"-o": "sheet.html", "--readings": "table.csv", "--points": "points.csv"},
         prints=False,
     ),
-    "run --lengths": Walk(
-        EXPERIMENT,
-        {"-o": "l.csv"},
-        ("--grid", "3"),
-        ("balls.csv",),
-    ),
     "run --reliability": Walk(EXPERIMENT, {"-o": "o.csv"}, also=("balls.csv",)),
     "map": Walk(
         {"FILE": "machine.yaml"},
@@ -625,12 +619,14 @@ def test_every_reason_is_told_at_once(
 
 def test_a_file_to_which_standard_output_goes(files: Path, tmp_path: Path) -> None:
     path = tmp_path / "l.csv"
-    arguments = line("run --lengths", files, {"-o": path}, "--force")
+    arguments = line("run --reliability", files, {"-o": path}, "--force")
     with path.open("w") as stream:
         found = subprocess.run(
             [sys.executable, "-m", "ballplate", *arguments], stdout=stream, stderr=subprocess.PIPE
         )
-    told = f"ballplate run --lengths: -o {path} is where standard output goes; name another file\n"
+    told = (
+        f"ballplate run --reliability: -o {path} is where standard output goes; name another file\n"
+    )
     assert (found.returncode, found.stderr.decode()) == (2, told)
 
 
@@ -678,7 +674,7 @@ def fault(
 
 FAULTS = ("limit of size", "full disk at the last", "held open by another program", "interrupted")
 # What becomes of several files is the same whatever command writes them.
-SEVERAL = ("simulate", "run --lengths")
+SEVERAL = ("simulate", "run --reliability")
 WRITING = [command for command, walk in WALK.items() if walk.writes]
 
 
@@ -964,7 +960,7 @@ def test_a_pipe_is_written_as_it_is(tmp_path: Path) -> None:
 
 def test_standard_output_by_its_name(files: Path) -> None:
     """Before what is printed."""
-    arguments = line("run --lengths", files, {"-o": Path("/dev/stdout")})
+    arguments = line("run --reliability", files, {"-o": Path("/dev/stdout")})
     command = [sys.executable, "-m", "ballplate", *arguments]
     found = subprocess.run(command, stdout=subprocess.PIPE, encoding="utf-8")
     assert found.returncode in (0, 1)

@@ -56,18 +56,6 @@ ENDING = {
     "report": (("sweep", "--report", "small.sqlite", "-o", "page.html"), 2.0),
     "export": (("sweep", "--export", "small.sqlite", "-o", "table.csv"), 0.8),
     "reach": (("reach", DESIGNS / "npl/5.3.yaml", "--variant", "kinematic fit"), 1.5),
-    "lengths": (
-        (
-            "run",
-            "--lengths",
-            DESIGNS / "quickstart.yaml",
-            "--grid",
-            12,
-            "-o",
-            "points.csv",
-        ),
-        2.5,
-    ),
     "reliability": (
         (
             "run",

@@ -8,7 +8,6 @@ from pathlib import Path
 import pytest
 from ballplate.estimators import distances as estimators
 from ballplate.extensions.maps import correction
-from ballplate.extensions.maps import length_map as lengths
 from ballplate.extensions.maps import volumetric_errors as volumetric
 from ballplate.extensions.reliability import remainders as leftover
 from ballplate.extensions.requirements import root_search as search
@@ -76,7 +75,6 @@ LIMITS = {
     "`sweep` | cases": (load.MOST_CELLS,),
     "`sweep` | values": (axes.MOST_VALUES,),
     "`reach`": (search.MOST_POINTS,),
-    "`run --lengths` |": (lengths.MOST_POINTS,),
     "`correct --covariance`": (correction.MOST_CO_ORDINATES,),
     "`map`": (volumetric.MOST_POINTS,),
     "`spline`": (read.MOST_POINTS, curve.MOST_COEFFICIENTS, curve_options.MOST_ORDER),

@@ -69,7 +69,6 @@ COMMANDS = (
     "plan pool.yaml --positions 2",
     "next e.yaml readings.csv",
     "reach e.yaml",
-    "run --lengths e.yaml --target 1um",
     "run --reliability e.yaml",
     "simulate e.yaml -o new.csv",
     "fit e.yaml readings.csv",

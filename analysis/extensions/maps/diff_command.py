@@ -11,13 +11,12 @@ from ballplate.cli import (
     add_json,
     add_output,
     add_picture,
+    coverage_factor,
     day,
     show,
     whole,
     write,
 )
-
-from .lengths_command import coverage_factor
 
 DESCRIPTION = (
     "Compare two campaigns, or a campaign with an expected map: lengths, errors at points of the"

@@ -1,4 +1,4 @@
-"""Error maps from Python: corrected points, curves, lengths, differences."""
+"""Error maps from Python: corrected points, curves, differences."""
 
 from __future__ import annotations
 
@@ -10,19 +10,15 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from ballplate.arguments import (
     PathLike,
-    experiment_of,
     fit_map_or_path,
     fitted_map_of,
     map_or_path,
     table_of,
 )
-from ballplate.simulator.computing import Report, unreported
-from ballplate.simulator.experiment import Experiment
 from ballplate.simulator.inputs import (
     GivenText,
     ensure_one_of,
     ensure_positive,
-    ensure_report,
     ensure_type,
     ensure_whole,
     hint,
@@ -37,7 +33,6 @@ if TYPE_CHECKING:
     from .correction import Correction
     from .error_curves_result import ErrorCurves
     from .fitted_errors_result import FittedErrorMap
-    from .length_tables import LengthMap
     from .map_difference import MapDifference
     from .map_places import Line
     from .volumetric_results import MachineErrors
@@ -92,40 +87,6 @@ def diff(
         None if target is None else target.standard,
         (days[0], days[1]),
     )
-
-
-def lengths(
-    experiment: Experiment | PathLike,
-    target: str | None = None,
-    grid: int | Sequence[int] = 6,
-    probe: str | None = None,
-    coverage_factor: float | None = None,
-    with_repeatability: bool = False,
-    report: Report = unreported,
-) -> LengthMap:
-    """Return uncertainties of all lengths between points of a grid over the volume, against a
-    target.
-
-    `target` replaces that of the experiment, as a text with a unit; `grid` is the number of points
-    along every axis, or along each. `with_repeatability` includes the repeatability of both
-    readings of a length.
-
-    >>> import ballplate as bp
-    >>> bp.lengths(bp.quickstart(), "1 um + L/1000000", grid=3).is_met
-    True
-    """
-    from .length_map import length_map, length_settings
-
-    ensure_type(str, 'a text with a unit, such as "0.5 um + L/1000000"', target=target)
-    ensure_type(str, "the name of a probe", probe=probe)
-    ensure_type(bool, "True or False", with_repeatability=with_repeatability)
-    ensure_positive("a number above 0 and at most 100", 100.0, coverage_factor=coverage_factor)
-    ensure_report(report)
-    counts = _several("grid", grid)
-    ensure_whole(2, **{f"grid[{k}]": count for k, count in enumerate(counts)})
-    chosen = experiment_of(experiment)
-    settings = length_settings(chosen, target, counts, probe, coverage_factor, with_repeatability)
-    return length_map(chosen, settings, report)
 
 
 def map(

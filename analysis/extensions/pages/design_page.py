@@ -27,9 +27,9 @@ from .uncertainty_sections import (
 
 FOOT = (
     "Lengths are in micrometres and angles in microradians unless stated otherwise; u are standard"
-    " uncertainties, U = k u expanded ones, predicted at zero machine error. Every value is"
-    " that of ballplate run, lengths, reliability, check --suggest, run --errors or sheet with"
-    " --json: its data-path names the command and the path in the output."
+    " uncertainties, U = k u expanded ones, predicted at zero machine error. Every value but those"
+    " of lengths throughout the volume is that of ballplate run, reliability, check --suggest, run"
+    " --errors or sheet with --json: its data-path names the command and the path in the output."
 )
 
 
@@ -73,7 +73,7 @@ def design_page(contents: DesignContents) -> str:
         PageSection("reliability", "Reliability", _reliability(quoted, contents.unreliable)),
         PageSection("sheet", "Run sheet", _sheet(quoted["sheet"])),
     ]
-    verdict = _verdict(run, contents.target, quoted["lengths"])
+    verdict = _verdict(run, contents.target)
     top = introduction(verdict, _is_good(run), contents.file)
     return written(Page(contents.title, top, sections, FOOT))
 
@@ -97,7 +97,7 @@ def _is_good(run: QuotedData) -> bool:
     return is_sure and not misses_target(run.data)
 
 
-def _verdict(run: QuotedData, target: str, lengths: QuotedData) -> Html:
+def _verdict(run: QuotedData, target: str) -> Html:
     data = run.data
     count = len(data["weakly_determined"])
     weak = (
@@ -122,31 +122,13 @@ def _verdict(run: QuotedData, target: str, lengths: QuotedData) -> Html:
     else:
         expected = "" if data["as_expected"] else ", though the file expects a deficiency"
         first = sentence(f"Full rank{expected}: the readings determine all ", counts, f"{weak}.")
-    second = sentence(lengths_words(run, target), *_throughout(run, lengths))
+    second = sentence(lengths_words(run, target))
     qualified = (
         sentence(each.text("text"), ".")
         for each in run.at("qualifications").each()
         if each.data["kind"] != "undetermined"
     )
     return joined([first, second, *qualified])
-
-
-def _throughout(run: QuotedData, lengths: QuotedData) -> list[str | Html]:
-    """Section on lengths throughout the volume relative to the target, compared with those between
-    the evaluation points, which may be more favourable.
-    """
-    judged = run.data["quantities"].get("U6", {}).get("within_target") is not None
-    shares = {
-        lengths.data["coverage_factor"]: "share_expanded_within",
-        1.0: "share_within",
-    }
-    share = shares.get(lengths.data["target_coverage_factor"])
-    whole = lengths.at("all")
-    if not judged or share is None or whole.data[share] is None:
-        return []
-    undetermined = run.data["quantities"]["U6"]["undetermined"]
-    are = "determined, and within the target" if undetermined else "within it"
-    return [" Of the lengths throughout the volume, ", whole.share(share), f" are {are}."]
 
 
 def _rank(run: QuotedData) -> Html:

@@ -9,7 +9,7 @@ from time import perf_counter
 from typing import Any
 
 import numpy as np
-from ballplate.extensions.maps.length_map import length_map, length_settings
+from ballplate.extensions.maps.length_map import length_map
 from ballplate.extensions.pages.level_maps import MISSED
 from ballplate.extensions.pages.page_facts import target_in_words
 from ballplate.extensions.repair.written import plane_of
@@ -32,9 +32,6 @@ NODES = 9
 
 # Nodes of the map of points along each axis, and of that of lengths, which has all lengths between.
 MAP_NODES, LENGTH_NODES = 11, 9
-
-# What lengths are compared with where the file states no target; the map shows them in metres.
-NO_TARGET = "1 um"
 
 
 @single_threaded
@@ -201,18 +198,15 @@ def _length_map(experiment: Experiment, linearisation: Linearisation) -> Data:
     largest uncertainty in metres without one; None if one of them is undetermined.
     """
     counts = (LENGTH_NODES, LENGTH_NODES, len(LEVELS))[: experiment.dimension]
-    target = target_in_words(experiment)
-    settings = length_settings(experiment, target or NO_TARGET, counts)
-    lengths = length_map(experiment, settings, at=linearisation)
-    groups = lengths.by_point
-    values = groups.missed if target else groups.maximum
-    values = np.where(groups.undetermined > 0, np.nan, values)
+    lengths = length_map(experiment, counts, at=linearisation)
+    has_target = experiment.target_uncertainty is not None
+    values = lengths.missed if has_target else lengths.maximum
+    values = np.where(lengths.undetermined > 0, np.nan, values)
     of_levels = values.reshape(LENGTH_NODES, LENGTH_NODES, -1).T
-    ratios = settings.target_factor * groups.maximum_ratio
     scale = {
-        "unit": "missed" if target else "m",
+        "unit": "missed" if has_target else "m",
         "bounds": MISSED,
-        "largest": float(np.nanmax(ratios, initial=0.0)),
+        "largest": float(np.nanmax(lengths.maximum_ratio, initial=0.0)),
     }
     return {**in_slices(linearisation.design, of_levels), "scale": scale}
 

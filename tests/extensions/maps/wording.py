@@ -3,20 +3,13 @@
 AS_ALIKE_AS_THESE = "as alike as these"
 A_MACHINE_FILE_STATES_ITS_OWN = "a machine file states its own probe"
 BOTH_REST_ON_SOME = "both rest on some of the same readings"
-BY_THE_EXPANDED_UNCERTAINTY = "by the expanded uncertainty 1.5 u of"
 CARRIES_CARRIES_THE_PROBE = (
     "FB1: x carries z carries the probe, y carries the workpiece; errors are the tip's position"
-)
-CHANGE_NONE_OF_THESE_LENGTHS = (
-    "leave these lengths unchanged, but may change those of another --grid"
 )
 DEGREES_OF_FREEDOM_IS_ITSELF_UNCERTAIN = "degrees of freedom is itself uncertain by"
 DOES_NOT_HOLD_WHAT_CERTIFICATES_DO = "does not hold what certificates do"
 GIVE_A_FIT_WHAT = "give a fit, what its to_map"
 IS_NO_MAP_FILE = "is no map file"
-LENGTHS_ARE_UNDETERMINED_AND_MEET = "lengths are undetermined and meet no target, such as ("
-LENGTHS_BETWEEN_POINTS = "153 lengths between 18 points of a grid, with the probe down"
-MET_BY_THE_STANDARD_UNCERTAINTY = "met by the standard uncertainty u of"
 NO_CERTIFIED_VALUE_IN_COMMON = "no certified value in common"
 NO_CHANGE_IS_SHOWN = "no change is shown"
 OF_POINTS_LIE_OUTSIDE_THE_VOLUME = "1 of 3 points lie outside the volume of the map"

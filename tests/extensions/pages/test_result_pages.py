@@ -13,6 +13,7 @@ import ballplate as bp
 import numpy as np
 import pytest
 from ballplate.cli import main
+from ballplate.extensions.maps.length_map import length_map
 from ballplate.extensions.pages.design_contents import page_of_design
 
 from tests.extensions.pages import wording
@@ -122,9 +123,8 @@ def test_every_figure_of_a_designs_page_is_that_of_the_json(variant: str) -> Non
     page = page_of_design(experiment, prediction)
     data = {"run": prediction.to_dict(), "reliability": bp.reliability(experiment).to_dict()}
     data["check"] = bp.check(experiment, suggest=is_deficient).to_dict()
-    has_target = experiment.target_uncertainty is not None
-    grid = 7 if variant == "plane" else 5
-    data["lengths"] = bp.lengths(experiment, None if has_target else "1 um", grid).to_dict()
+    grid = (7, 7) if variant == "plane" else (5, 5, 5)
+    data["lengths"] = length_map(experiment, grid).to_dict()
     data["sheet"] = bp.sheet(experiment).to_dict()
     data["errors"] = bp.information(experiment).to_dict()
     assert assert_quoted(page, data) > 100
@@ -139,12 +139,12 @@ def test_the_map_has_bands_of_the_share_of_lengths_that_miss_the_target(met: str
     the points whose lengths all meet the target.
     """
     experiment = small()
-    points = bp.lengths(experiment, "1 um", 5).to_dict()["by_point"]
-    largest = np.array([one["maximum_ratio"] for one in points])
+    of_one = experiment.with_(target_uncertainty="1 um", coverage_factor=1)
+    largest = length_map(of_one, (5, 5, 5)).maximum_ratio
     limit = {
         "some": np.quantile(largest, 0.3),
         "all": 2 * largest.max(),
-        "none": min(one["average_ratio"] for one in points) / 20,
+        "none": largest.min() / 100,
     }
     target = {"target_uncertainty": f"{limit[met]:.6g} um", "coverage_factor": 1}
     changed = experiment.with_(**target)

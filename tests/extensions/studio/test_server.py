@@ -13,7 +13,7 @@ from ballplate.designs import shipped
 
 pytest.importorskip("starlette", reason="the studio is an extra")
 
-from ballplate.extensions.maps.length_map import length_map, length_settings
+from ballplate.extensions.maps.length_map import length_map
 from ballplate.extensions.studio.server import application
 from ballplate.extensions.studio.session import RefusedError, Session
 from ballplate.results.checked_designs import predict
@@ -386,19 +386,17 @@ def test_what_is_no_action_is_answered_with_an_error(client, body):
     assert answer.status_code in (200, 400) and answer.json()["error"]
 
 
-def test_the_map_of_lengths_is_that_of_run(client, design):
+def test_the_map_of_lengths_is_that_of_the_page(client, design):
     found = client.post("/api/drawn", json={"map": "lengths", "motion": 0}).json()
     assert found["motions"] is None
     (experiment,) = load(design)
-    lengths = length_map(experiment, length_settings(experiment, grid=(9, 9, 3)))
+    lengths = length_map(experiment, (9, 9, 3))
     drawn = found["map"]
     assert drawn["scale"]["unit"] == "missed"
-    groups = lengths.by_point
-    assert drawn["scale"]["largest"] == pytest.approx(groups.maximum_ratio.max())
-    missed = 1.0 - groups.within_target / groups.count
+    assert drawn["scale"]["largest"] == pytest.approx(lengths.maximum_ratio.max())
     shares = {
         tuple(point): share
-        for point, share in zip(lengths.points.round(9).tolist(), missed, strict=True)
+        for point, share in zip(lengths.points.round(9).tolist(), lengths.missed, strict=True)
     }
     for level in drawn["slices"]:
         for y, row in zip(drawn["y"], level["values"], strict=True):
