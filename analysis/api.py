@@ -403,8 +403,7 @@ def plan(
     >>> corners = {"x": ["50 mm"], "y": ["50 mm"]}
     >>> places = {"planes": ["z"], "levels": ["100 mm", "400 mm"], "corners": corners}
     >>> pool = {"candidates": [places | {"probes": ["down"]}]}
-    >>> chosen = plan(quickstart().with_(pool=pool), positions=7)
-    >>> chosen.headline()
+    >>> plan(quickstart().with_(pool=pool), positions=7).headline()
     '7 of 8 candidates, U6 0.137 µm, given chain of axes MB2, temperatures exactly known'
     """
     from .planning.campaign_choice import Request, campaign

@@ -119,10 +119,12 @@ def test_numbers_of_a_sweep(tmp_path: Path, capsys: pytest.CaptureFixture[str]) 
     opened.close()
     assert not is_part[frame["cell"] == best].any()
     assert main(["sweep", "--report", store, "--format", "csv", "-o", "-"]) == 0
-    rows = [line.split(",")[2:4] for line in capsys.readouterr().out.splitlines()]
-    assert rows[1] == (["5", "0"] if is_part[0] else ["0", "5"])
-    for row in rows[2:4]:
-        assert [cell == "-" for cell in row] == is_part.tolist()
+    rows = [line.split(",")[2:] for line in capsys.readouterr().out.splitlines()]
+    *undetermined, given = rows[1]
+    assert undetermined == (["5", "0"] if is_part[0] else ["0", "5"])
+    assert f"cases {0 if is_part[0] else 1}: 5 undetermined directions" in given
+    for *values, _ in rows[2:4]:
+        assert [cell == "-" for cell in values] == is_part.tolist()
 
 
 def test_reach_of_a_deficient_design() -> None:
