@@ -39,7 +39,13 @@ def test_no_traceback_of_an_answer_that_is_interrupted(tmp_path: Path) -> None:
     (tmp_path / "slow.py").write_text(SLOW)
     words = [sys.executable, "slow.py", "studio", "new.yaml", "--no-browser"]
     with subprocess.Popen(
-        words, cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+        words,
+        cwd=tmp_path,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        # A shell starts what runs in the background with this signal ignored.
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
     ) as process:
         assert process.stdout is not None and process.stderr is not None
         address = process.stdout.readline().strip()
