@@ -70,7 +70,7 @@ TABLE: tuple[tuple[str, str, str], ...] = (
     (f"{PLAN} --hours 3", "--positions 2", "no more than 3 h, 2 positions"),
     (f"{PLAN} --positions 3", "--readings 12", "no more than 12 readings, 3 positions"),
     (f"{PLAN} --from planned.yaml --positions 1", "--done planned-readings.csv", "status 0"),
-    (f"{PLAN} --from planned.yaml --positions 1 --done begun.csv", "--moved", "again"),
+    (f"{PLAN} --from planned.yaml --positions 1 --done begun.csv", "--moved", "it is left so"),
     (f"{PLAN} --positions 2", "--from planned.yaml", "chosen before"),
     (f"{PLAN} --positions 2", "-o out.yaml", "# Chosen by ballplate plan from pool.yaml"),
     (f"{PLAN} --positions 2", "--sheet out.html", "--file out.html"),
