@@ -1,7 +1,7 @@
 """Reference pages made from the program itself: what stands in their place is never written by
 hand.
 
-A page says `<!-- file format -->` or `<!-- limits of files -->` where the reference is to stand.
+A page says `<!-- file format -->` or `<!-- commands -->` where the reference is to stand.
 """
 
 from __future__ import annotations
@@ -9,11 +9,9 @@ from __future__ import annotations
 import argparse
 import json
 from collections.abc import Iterator
-from functools import partial
 from pathlib import Path
 from typing import Any
 
-import limits
 from ballplate.cli import GROUPS
 from ballplate.cli import parser as command_line
 from ballplate.extensions.sweeps.sweep_schema import schema as sweep_schema
@@ -266,7 +264,6 @@ PARTS = {
     "<!-- units -->": units,
     "<!-- command table -->": command_table,
     "<!-- commands -->": commands,
-    **{f"<!-- limits of {name} -->": partial(limits.table, name) for name in limits.LIMITS},
 }
 
 

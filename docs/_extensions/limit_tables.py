@@ -1,4 +1,7 @@
-"""The limits of size, as tables of what the program itself compares with."""
+"""The limits of size, as tables of what the program itself compares with.
+
+A page says `<!-- limits of files -->`, of experiments or of commands, where the table is to stand.
+"""
 
 from __future__ import annotations
 
@@ -25,6 +28,7 @@ from ballplate.simulator.experiment import (
 )
 from ballplate.simulator.geometry import artefacts, listed_directions
 from ballplate.simulator.inputs import decoding, messages, settings, tables, yamltree
+from sphinx.application import Sphinx
 
 MEGABYTE = 10**6
 
@@ -96,3 +100,13 @@ def table(name: str) -> str:
         written = (f"{n:,}".replace(",", " ") if n > 9999 else str(n) for n in numbers)
         lines.append(f"| {what} | {', '.join(written)} |")
     return "\n".join(lines)
+
+
+def _fill(app: Sphinx, page: str, source: list[str]) -> None:
+    for name in LIMITS:
+        source[0] = source[0].replace(f"<!-- limits of {name} -->", table(name))
+
+
+def setup(app: Sphinx) -> dict[str, bool]:
+    app.connect("source-read", _fill)
+    return {"parallel_read_safe": True, "parallel_write_safe": True}
