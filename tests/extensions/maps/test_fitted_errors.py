@@ -152,10 +152,17 @@ def test_undetermined_offsets_are_no_errors_of_the_machine() -> None:
     found = bp.map(fitted, points=[[0.9, 0.8, 0.7]])
     ends = np.concatenate([found.lengths.starts, found.lengths.ends])
     pairs = [(k, 4 + k) for k in range(4)]
-    # Errors of some 10 µm per metre turn the direction along which a length counts.
-    for k, one in enumerate(bp.correct(fitted, ends, "right", pairs).lengths):
+    corrected = bp.correct(fitted, ends, "right", pairs)
+    covariance = corrected.covariance().reshape(8, 3, 8, 3)
+    for k, (start, end) in enumerate(pairs):
+        one = corrected.lengths[k]
         assert found.lengths.errors[k] == pytest.approx(one.value - one.read, abs=1e-14)
-        assert found.lengths.uncertainties[k] == pytest.approx(one.standard_uncertainty, rel=1e-4)
+        # Along the line between the scale readings, which the errors turn by some 10 µrad.
+        way = (ends[end] - ends[start]) / found.lengths.nominal[k]
+        moving = np.zeros((8, 3))
+        moving[start], moving[end] = -way, way
+        u = np.sqrt(np.einsum("ai,aibj,bj->", moving, covariance, moving))
+        assert found.lengths.uncertainties[k] == pytest.approx(u, rel=1e-9)
     n = len(fitted.values)
     p = fitted.probes.offsets[fitted.probes.names.index("right")]
     assert len(fitted.scale) == n + 3 and fitted.probe == "right"
