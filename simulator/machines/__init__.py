@@ -45,7 +45,6 @@ if TYPE_CHECKING:
         VolumetricModel,
         meaning,
         squareness_field,
-        symbol,
         thermal_field,
     )
 

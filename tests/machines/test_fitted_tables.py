@@ -113,8 +113,8 @@ def test_wrong_fits_are_told(fit: str, told: str, tmp_path: Path) -> None:
     assert "errors.EXX" in str(refused.value)
 
 
-def test_the_map_says_what_was_fitted(tmp_path: Path) -> None:
-    text = str(bp.map(machine(tmp_path, "{order: 6}"), grid=(2, 2, 2)))
+def test_the_curves_say_what_was_fitted(tmp_path: Path) -> None:
+    text = str(bp.curves(machine(tmp_path, "{order: 6}")))
     residuals = VALUES - np.polynomial.Polynomial.fit(POSITIONS, VALUES, 5)(POSITIONS)
     sigma = np.sqrt((residuals**2).sum() / (25 - 6))
     assert f"polynomial fitted to the table of 25 points, sigma {sigma:.2g} µm" in text

@@ -32,10 +32,9 @@ if TYPE_CHECKING:
 
     from .correction import Correction
     from .error_curves_result import ErrorCurves
-    from .fitted_errors_result import FittedErrorMap
+    from .error_map import ErrorMap
     from .map_difference import MapDifference
     from .map_places import Line
-    from .volumetric_results import MachineErrors
 
 
 def diff(
@@ -100,9 +99,10 @@ def map(
     draw: int | None = None,
     seed: int = 1,
     budget: bool = False,
-) -> MachineErrors | FittedErrorMap:
-    """Return volumetric errors of a machine file or of a map, with expanded uncertainties: on a
-    grid over the volume, in a plane, along a line, or at points.
+) -> ErrorMap:
+    """Return volumetric errors of a machine file, with standard deviations of its random part, or
+    of a map, with expanded uncertainties: on a grid over the volume, in a plane, along a line, or
+    at points.
 
     `line` is a text as in `ballplate map --line`, co-ordinates in metres of the two fixed axes, or
     two points; `plane` the co-ordinate of the axis across it. `points` is their number along a
@@ -112,14 +112,14 @@ def map(
 
     >>> import ballplate as bp
     >>> bp.map("designs/park/machines/npl-like.yaml", line="y = 300 mm, z = 200 mm", points=3)
-    <ErrorsOnLine of npl-like: 3 points, resultant 16.17 µm at most>
+    <ErrorMap of npl-like: 3 points, resultant 16.17 µm at most>
     >>> fitted = bp.fit(bp.quickstart(), bp.simulate(bp.quickstart())).to_map()
     >>> bp.map(fitted, points=[[0.5, 0.5, 0.5]]).errors.uncertainties.round(8)
     array([[2.2e-07, 1.9e-07, 1.7e-07]])
     """
     import numpy as np
 
-    from .map_files_of_machines import map_errors
+    from .error_map import map_errors
     from .map_places import PlacesAsked, parse_places, parse_plane
     from .realisations import MOST_DRAWS, Draws
     from .volumetric_errors import MOST_POINTS
@@ -177,7 +177,7 @@ def curves(
     from ballplate.simulator.experiment import is_map_file
 
     from .error_curves_result import error_curves, machine_curves
-    from .map_files_of_machines import map_of_source
+    from .error_sources import map_of_source
 
     ensure_whole(2, 10_000, points=points)
     names = (errors,) if isinstance(errors, str) else tuple(errors)

@@ -137,7 +137,9 @@ def test_a_line_a_plane_and_points_are_places_of_the_same_map(fitted: FittedMap)
     inside = np.flatnonzero(np.isclose(plane.errors.points, [0.45, 0.3, 0.2]).all(axis=1))
     assert plane.errors.errors[inside[0]] == pytest.approx(line.errors.errors[1], abs=1e-20)
     csv = list(given.point_lines())
-    assert csv[0].startswith("point,x_mm") and csv[2].startswith('"middle, low",450,300,200,')
+    assert csv[0].startswith("point,probe,x_mm") and csv[2].startswith(
+        '"middle, low",down,450,300,200,'
+    )
     assert [row["point"] for row in given.rows()] == table["name"].tolist()
 
 
@@ -282,7 +284,7 @@ def test_every_model_has_errors_and_curves(kind: str, tmp_path: Path) -> None:
     draw = np.random.default_rng(5).random((6, fitted.dimension))
     points = volume.lower + volume.size * draw
     found, given = bp.map(fitted, points=points, draw=2), fit.correct(points)
-    offset = fitted.probes.offsets[found.probe]
+    offset = fitted.probes.offsets[fitted.probes.names.index(fitted.probe)]
     u = given.standard_uncertainties
     if not fitted.probes.free.any():
         assert found.errors.uncertainties == pytest.approx(u, rel=1e-6, nan_ok=True)
