@@ -66,7 +66,6 @@ def diff(
     """
     from ballplate.simulator.inputs import Target, parse_length_function, stated_day
 
-    from .comparison import ComparisonSettings
     from .sources import map_difference
 
     ensure_whole(2, 5, grid=grid)
@@ -81,10 +80,12 @@ def diff(
     sides = [fit_map_or_path(name, side) for name, side in (("first", first), ("second", second))]
     return map_difference(
         (sides[0], sides[1]),
-        ComparisonSettings(coverage_factor, grid, probe),
-        shared is not None,
-        None if target is None else target.standard,
-        (days[0], days[1]),
+        coverage_factor=coverage_factor,
+        grid=grid,
+        probe=probe,
+        shared=shared is not None,
+        stated=None if target is None else target.standard,
+        dates=(days[0], days[1]),
     )
 
 
