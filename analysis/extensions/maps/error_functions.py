@@ -16,7 +16,6 @@ from ballplate.simulator.machines import (
     SQUARENESS_ERRORS,
     Array,
     HasLines,
-    SmoothedPoints,
     SquarenessError,
     Unit,
     meaning,
@@ -134,7 +133,7 @@ def _stated_as(along: AlongAxis) -> str:
     if along.values is None:
         return "random"
     form = "polynomial" if measured is None else f"table of {len(measured.positions)} points"
-    if isinstance(measured, SmoothedPoints):
+    if measured is not None and measured.order:
         sigma = number(1e6 * measured.fitted.sigma, 2)
         curve = "spline" if measured.knots else "polynomial"
         form = f"{curve} fitted to the {form}, sigma {sigma} {SHOWN[along.unit]}"
