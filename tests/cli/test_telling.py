@@ -99,7 +99,7 @@ def test_no_bar_when_quiet(
 ) -> None:
     with monkeypatch.context() as patched:
         patched.setattr(type(sys.stderr), "isatty", lambda self: True)
-        assert " observations" in "".join(told(capsys, "run", "--reliability", QUICKSTART)[2])
+        assert "observations: " in "".join(told(capsys, "run", "--reliability", QUICKSTART)[2])
         assert told(capsys, "run", "--reliability", QUICKSTART, "-q")[2] == []
 
 

@@ -122,7 +122,6 @@ LINES = (
     "models small.yaml small-readings.csv --coefficients 3 --json",
     "plan pool.yaml --positions 2 --workers 1 --json",
     "certificate small.yaml small-readings.csv --json",
-    "diff map.yaml map.npz --grid 2 --json",
     "spline curve.csv --json",
 )
 
