@@ -24,7 +24,6 @@ from numpy.typing import NDArray
 from tests.estimation.test_against_dense import (
     deficient_grid_of_four,
     grid_of_four,
-    length_standard_by_distance,
     repeats,
     with_points,
 )
@@ -94,7 +93,6 @@ def covariance_of(jacobian: Real, spread: dense.Spread) -> Real:
     [
         (grid_of_four, 5, 0),
         (repeats, 5, 0),
-        (length_standard_by_distance, 5, 0),
         (deficient_grid_of_four, 7, 6),
     ],
 )
