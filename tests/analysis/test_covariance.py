@@ -260,14 +260,6 @@ def test_many_fits_in_two_dimensions_scatter_as_the_covariance_says(tmp_path: Pa
     )
 
 
-@pytest.mark.long
-def test_many_fits_with_offsets_and_lengths_scatter_as_the_covariance_says(tmp_path: Path) -> None:
-    design = offsets_and_lengths(tmp_path)
-    assert_scatter(
-        design, ("machine", "offset", "length", "task", "plate/r3c3: x", "plate/r3c3: z"), 300
-    )
-
-
 @pytest.fixture(scope="module")
 def fitted() -> Fit:
     experiment = bp.quickstart()

@@ -83,7 +83,7 @@ def hole_plates(points: int = 10) -> Reference:
     return reference(*true_experiment(bp.experiment(sections)))
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_every_data_set_ends_where_a_fit_does() -> None:
     """Ones left to a separate estimate counted as converged if others made a further pass: spread
     / U of 1.6, where fits had 1.0.

@@ -184,35 +184,6 @@ def test_biases_are_flagged_by_their_standard_errors_and_seldom_by_chance(kind: 
     assert sum("bias" in one.flags for one in biased) > 150
 
 
-def test_actual_errors_are_compared_as_root_mean_squares() -> None:
-    """Computed once more, data set by data set; one point of almost no uncertainty does not rule
-    the ratio.
-    """
-    shared = quickstart()
-    parts = [estimate_batch(shared, 1, k) for k in range(2)]
-    of_angles = [aim for aim in targets(shared) if aim.symbol == "U2"][0]
-    tiny = [
-        replace(aim, uncertainty=aim.uncertainty.copy())
-        for aim in targets(shared)
-        if aim.symbol == "U4"
-    ][0]
-    tiny.uncertainty[0] *= 1e-3
-    for aim in (of_angles, tiny):
-        first, second = (accumulate(shared, (aim,), part, BATCH) for part in parts)
-        found = outcome(shared, (aim,), first + second).comparisons[aim.symbol].actual
-        errors = np.concatenate([aim.change(part.found) + aim.base for part in parts])
-        of_units = []
-        for unit in set(aim.units):
-            own = [k for k, one in enumerate(aim.units) if one == unit]
-            of_units += [np.mean(errors[:, own] ** 2) / np.mean(aim.uncertainty[own] ** 2)] * len(
-                own
-            )
-        assert found.value == pytest.approx(np.sqrt(np.mean(of_units)), rel=1e-12)
-        assert 0.8 < found.value < 1.25
-    # In units of its own uncertainty the one point's errors would rule.
-    assert np.sqrt(np.mean((errors / tiny.uncertainty) ** 2)) > 10
-
-
 @pytest.mark.parametrize("workers", [1, 2])
 def test_the_same_bits_however_the_work_is_shared(workers: int) -> None:
     """700 data sets are a whole task and a part of another."""
