@@ -222,7 +222,7 @@ FULL = {
 
 
 def test_replicates_of_a_model_that_is_not_linear(tmp_path: Path) -> None:
-    assert_honest(experiment(tmp_path, bar(3), ALL, **TRUE, **FULL), 128)
+    assert_honest(experiment(tmp_path, bar(3), ALL, **TRUE, **FULL), 64)
 
 
 def assert_honest(made: Experiment, count: int) -> None:

@@ -99,7 +99,7 @@ def test_a_certificate_that_differs_from_the_drawing_is_no_bias(tmp_path: Path, 
 
 
 def test_replicates_scatter_as_foretold(tmp_path: Path) -> None:
-    done = trials(with_bar(tmp_path, 4, "2 um", "ignored"), 1024)
+    done = trials(with_bar(tmp_path, 4, "2 um", "ignored"), 256)
     assert done.outcome is not None
     for one in done.outcome.comparisons.values():
         assert abs(one.spread.value - 1.0) < 4.0 * one.spread.error

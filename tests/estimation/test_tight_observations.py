@@ -284,7 +284,10 @@ TIGHT = [
 
 @pytest.mark.parametrize(
     ("positions", "certificate", "repeatability", "more"),
-    [pytest.param(*one[1:], id=one[0]) for one in TIGHT],
+    [
+        pytest.param(*one[1:], id=one[0], marks=[pytest.mark.long] * (one[0] == "distances"))
+        for one in TIGHT
+    ],
 )
 def test_every_uncertainty_beside_what_is_known_all_but_exactly(
     positions: tuple[int, ...], certificate: str, repeatability: float, more: list[Known]
