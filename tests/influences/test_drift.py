@@ -27,7 +27,6 @@ from tests.influences.campaigns import (
     Real,
     dense_spread,
     file_with,
-    plain,
     told_on_page,
 )
 from tests.reference import dense
@@ -139,30 +138,6 @@ def test_the_verdict_tells_what_cannot_be_told_apart(
     for axis in "xyz":
         assert (f"drift along {axis}" in told) == (deficiency > 0)
     assert (wording.DRIFT_OF_THE_SCALES in told) == (deficiency > 3)
-
-
-def test_one_plate_in_one_position_does_not_tell_its_drift(tmp_path: Path) -> None:
-    """Balls that are read once each, of a plate of which no more is known: the deficiency is that
-    of the dense computation, and the drift is named.
-    """
-    place = {"name": "one", "plane": "z", "level": "250 mm", "probes": ["down"]}
-    place |= {"corner": {"x": "0 mm", "y": "0 mm"}}
-    design = lay_out(
-        file_with(
-            tmp_path,
-            [{"kind": "drift", "axes": {}, "times": TIMES}],
-            positions=[place],
-            calibration=[],
-        )
-    )
-    found, of = dense_spread(
-        design, lambda d, x, e: law(d, x, np.append(e, 0.0)), np.full(3, np.inf)
-    )
-    judged = verdict(linearise(design))
-    without = verdict(linearise(plain(design)))
-    assert judged.deficiency == found.deficiency == without.deficiency + 3
-    assert "drift along x" in "; ".join(map(str, judged.null))
-    assert of.parameters
 
 
 def with_times(path: Path, values: Real, column: str) -> Path:

@@ -119,7 +119,7 @@ def test_what_is_left_to_a_separate_estimate_has_not_converged() -> None:
 
 @pytest.mark.parametrize(
     "design",
-    [small(), small(kept=True), with_length_standard(False), with_unknown_probes(True)],
+    [small(), small(kept=True), with_length_standard(False), with_unknown_probes()],
     ids=["distances", "neighbours", "length", "probes and length"],
 )
 def test_an_estimate_by_itself_is_that_of_the_passes(

@@ -214,13 +214,6 @@ def test_a_file_without_a_pool_says_so(capsys: pytest.CaptureFixture[str]) -> No
     assert "pool: missing; add candidates" in capsys.readouterr().err
 
 
-def test_nothing_affordable_is_told(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    path = tmp_path / "pool.yaml"
-    path.write_text(TEXT)
-    assert main(["plan", str(path), "--hours", "0.1", "--workers", "1"]) == 3
-    assert wording.NO_POSITION_CAN_BE_READ in capsys.readouterr().err
-
-
 def test_the_pool_is_not_overwritten_by_the_choice(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

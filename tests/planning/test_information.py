@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from itertools import combinations
 from pathlib import Path
 
@@ -152,27 +151,6 @@ def test_what_no_candidate_determines_is_left_out(tmp_path: Path) -> None:
     )
 
 
-def test_rounding_determines_nothing_where_balls_take_up_all(tmp_path: Path) -> None:
-    # In one position, free balls are wherever any scale and squareness want them.
-    path = tmp_path / "one.yaml"
-    path.write_text(
-        "title: one\nmachine: {volume: [600 mm, 600 mm, 600 mm], repeatability: 0.5 um}\n"
-        "error_model: {kind: metric}\nprobes: {down: [0 mm, 0 mm, 0 mm]}\n"
-        "artefacts: {plate: {kind: grid, balls: [3, 3], size: [300 mm, 300 mm]}}\n"
-        "evaluation: {points: {random: 6, seed: 1}}\npositions: []\npool: {candidates: [\n"
-        "  {name: flat, artefact: plate, planes: [z], levels: [100 mm],\n"
-        "   corners: {x: 100 mm, y: 50 mm}, probes: [down]}]}\n"
-    )
-    (experiment,) = load(path, planning=True)
-    assert experiment.pool is not None
-    candidates = experiment.pool.candidates
-    full = predict(with_chosen(experiment, candidates))
-    information = pool_information(experiment, candidates)
-    assert information.deficiency == full.verdict.deficiency == 6
-    with pytest.raises(ExperimentError, match=wording.NO_SELECTION_DETERMINES_ANY):
-        criterion(information, experiment, "U6")
-
-
 def test_priors_about_poses_are_refused(tmp_path: Path) -> None:
     drawn = (
         "positions: [{name: low, artefact: plate, plane: z, level: 100 mm, corner: {x: 0 mm, y: 0"
@@ -210,29 +188,6 @@ pool:
 CERTIFIED = """calibration:
   - {artefact: small, kind: coordinates, balls: all, standard_uncertainty: 0.5 um}
   - {artefact: large, kind: distances, pairs: corners, standard_uncertainty: 30 um}
-"""
-
-PLATE_AND_BAR = """
-title: a plate and a bar
-machine: {volume: [600 mm, 500 mm, 450 mm], repeatability: 1 um}
-error_model: {kind: metric}
-probes: {down: [0 mm, 0 mm, -40 mm], right: [40 mm, 0 mm, 0 mm]}
-artefacts:
-  bar: {kind: two_spheres, length: 230 mm, role: length_standard}
-  plate: {kind: grid, balls: [3, 2], size: [240 mm, 160 mm]}
-calibration:
-  - {artefact: bar, kind: distances, pairs: all, standard_uncertainty: 29.2 um}
-  - {artefact: plate, kind: distances, pairs: neighbours, standard_uncertainty: 0.641 um}
-evaluation: {points: {random: 12, seed: 3}, probe: down}
-pool:
-  candidates:
-    - name: bar
-      artefact: bar
-      pose: {origin: [110 mm, 166 mm, 96 mm], rotation: [0 deg, -42 deg, 9 deg]}
-      probes: [down]
-    - {name: y, artefact: plate, plane: y, level: 198 mm, corner: {x: 156 mm, z: 159 mm}, probes: [down, right]}
-    - {name: z, artefact: plate, plane: z, level: 116 mm, corner: {x: 251 mm, y: 151 mm}, probes: [down]}
-    - {name: x, artefact: plate, plane: x, level: 506 mm, corner: {y: 133 mm, z: 111 mm}, probes: [down, right]}
 """
 
 
@@ -337,20 +292,3 @@ def test_two_plates_of_unlike_certificates(tmp_path: Path, positions: int) -> No
         match=wording.INCLUDES_THE_DISTANCES,
     ):
         campaign(experiment, Request("U5", Budget(positions=1)))
-
-
-def test_rounding_holds_nothing_of_a_standard_that_is_left_out(tmp_path: Path) -> None:
-    """A bar with a loose certificate, which told the machine's parameters where no position placed
-    it.
-    """
-    (experiment,) = load(written(tmp_path, PLATE_AND_BAR), planning=True)
-    assert experiment.pool is not None
-    candidates = experiment.pool.candidates
-    chosen = [k for k, one in enumerate(candidates) if one.item.artefact == "plate"]
-    alone = replace(
-        experiment, pool=replace(experiment.pool, candidates=tuple(candidates[k] for k in chosen))
-    )
-    for name in ("A", "U6"):
-        with_bar = value(problem_of(experiment, name), chosen)  # type: ignore[arg-type]
-        without = value(problem_of(alone, name), range(len(chosen)))  # type: ignore[arg-type]
-        assert with_bar == pytest.approx(without, rel=1e-9) and np.isfinite(without)
