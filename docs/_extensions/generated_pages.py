@@ -165,11 +165,9 @@ def _form(part: Schema, whole: Schema) -> str:
         return _list_form(part, whole)
     if kind == "object":
         below = part.get("additionalProperties")
-        return (
-            f"name → {_form(below, whole)}"
-            if isinstance(below, dict) and below
-            else "name → any value"
-        )
+        names = ", ".join(part.get("propertyNames", {}).get("enum", ["name"]))
+        is_any = not isinstance(below, dict) or not below
+        return f"{names} → {'any value' if is_any else _form(below, whole)}"
     if kind == "string":
         return QUANTITIES.get(part.get("pattern", ""), "text")
     if kind == ["string", "integer"]:
