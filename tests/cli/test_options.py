@@ -16,7 +16,6 @@ from typing import Any
 import openpyxl
 import pytest
 from ballplate.cli import parser
-from ballplate.planning import campaign_choice
 
 from tests.cli.option_table import READING, TABLE, TABLES
 from tests.robustness.kit import POOL, make_kit
@@ -84,7 +83,7 @@ SILENT = (
     *("run --errors", "run --reliability", "schema", "spline", "studio"),
     *("sweep", "sweep --export", "sweep --report"),
 )
-# Shown by other tests: the page and the cluster by their own, the processes as they change nothing.
+# Shown by other tests, as the page; or what no small command shows: a search ends alike from any seed.
 ELSEWHERE = {
     "studio --variant",
     "studio --port",
@@ -234,16 +233,3 @@ def test_every_option_is_in_the_table() -> None:
     ]
     silent = {f"{name} --quiet" for name in SILENT}
     assert sorted(missing) == sorted(silent | ELSEWHERE)
-
-
-def test_seed_of_a_plan(kit: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The search of a small pool ends at the best choice from any start."""
-    seeds, starts = [], campaign_choice.starts
-
-    def noted(*arguments: Any) -> Any:
-        seeds.append(arguments[-1])
-        return starts(*arguments)
-
-    monkeypatch.setattr(campaign_choice, "starts", noted)
-    plan = "plan pool.yaml --positions 2 --workers 1 --seed 7"
-    assert outcome(plan.split(), kit)[0] == 0 and set(seeds) == {7}

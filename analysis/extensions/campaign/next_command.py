@@ -60,6 +60,7 @@ def run(options: Namespace) -> int:
     except (GoalError, QuantityError) as error:
         raise UsageError(error) from None
     for note in step.notes:
-        complain(note)
+        if not options.quiet or note.startswith("warning: "):
+            complain(note)
     show(options, step)
     return 0 if step.is_met else 1
