@@ -293,7 +293,7 @@ def numbered_columns(words: Vocabulary, count: int) -> Headings:
 def _stated_roles(cells: Sequence[str], words: Vocabulary) -> dict[str, HeadedColumn]:
     return {
         role: _stated_column(name, cells)
-        for role in (*TEXTS, "u", "diameter")
+        for role in (*TEXTS, "u")
         if (name := getattr(words.stated, role, None)) is not None
     }
 
