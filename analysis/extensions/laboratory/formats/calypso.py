@@ -143,7 +143,6 @@ class _Reader:
     unit: Fraction | None
     rows_taken: list[Located] = field(default_factory=list)
     others: Counter[str] = field(default_factory=Counter)
-    ends_in_text: bool = False
 
     def rows(self) -> Iterator[tuple[Mark, dict[str, str], dict[str, str]]]:
         """Yield each row by column, and other cells by heading; rows that end before the last
@@ -160,7 +159,6 @@ class _Reader:
                 continue
             if len(cells) == 1 or (not table.is_of_features and not _has_number(cells)):
                 self.others["line (text)"] += 1
-                self.ends_in_text = text.is_cut and number == len(text.lines)
                 continue
             mark = text.mark(number)
             is_cut = text.is_cut and number == len(text.lines)
@@ -295,14 +293,7 @@ def read(content: bytes, file: str, unit: Fraction | None) -> Report:
         reader.take(mark, row, marks)
     problems.finish()
     features = tuple(located.complete() for located in reader.complete())
-    remarks = text.remarks
-    if reader.ends_in_text:
-        last = shorten(text.lines[-1].strip(), 30)
-        remarks += (
-            f'{file}: the last line, "{last}", is no row, and has no end; the file may have been'
-            " cut off",
-        )
-    return Report(file, CALYPSO.title, features, reader.others, remarks)
+    return Report(file, CALYPSO.title, features, reader.others, text.remarks)
 
 
 CALYPSO = Format("calypso", "Calypso table", recognises, read)

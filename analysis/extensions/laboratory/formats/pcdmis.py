@@ -134,8 +134,8 @@ class _Reader:
         elif ended.columns:
             self.others[f"dimension (no row {' or '.join(AXES)})"] += 1
 
-    def finish(self) -> tuple[str, ...]:
-        """End the file; add a note if its last line is incomplete and of unknown form.
+    def finish(self) -> None:
+        """End the file.
 
         :raises ExperimentError: earlier faults, or the file ends before the first row of a
             dimension or within its name.
@@ -151,17 +151,6 @@ class _Reader:
             problem = "the file ends within this line; it was cut off, take a whole copy"
             self.problems.add(self.text.mark(len(self.text.lines)), problem)
         self.problems.finish()
-        return self.text.remarks + self._about_the_end(last)
-
-    def _about_the_end(self, last: str) -> tuple[str, ...]:
-        words = last.split()
-        is_row = self.dimension is not None and words[:1] and words[0].upper() in tuple(AXES)
-        if not self.text.is_cut or is_row or ENDING.fullmatch(last) or PROBE.fullmatch(last):
-            return ()
-        return (
-            f'{self.text.file}: the last line, "{shorten(last.strip(), 30)}", has no end; the file'
-            " may have been cut off",
-        )
 
     def _start(self, title: str, words: str, unit: str | None, mark: Mark) -> None:
         located = LOCATION.match(words)
@@ -269,9 +258,9 @@ def read(content: bytes, file: str, unit: Fraction | None) -> Report:
     reader = _Reader(text, ReportProblems(file), unit)
     for number, line in enumerate(text.lines, start=1):
         reader.take(number, line)
-    remarks = reader.finish()
+    reader.finish()
     features = tuple(located.complete() for located in reader.complete)
-    return Report(file, PCDMIS.title, features, reader.others, remarks)
+    return Report(file, PCDMIS.title, features, reader.others, text.remarks)
 
 
 PCDMIS = Format("pcdmis", "PC-DMIS report", lambda text: BEGINNING.search(text) is not None, read)
