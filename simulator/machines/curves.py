@@ -118,15 +118,15 @@ class SmoothedPoints(Points):
 
         :raises SplineError: the points do not determine it.
         """
-        fitted, length = pieces(self.fitted), upper - lower
+        length = upper - lower
         powers = length ** np.arange(self.order)
         plain = super().curve(interpolation, lower, upper)
         return SmoothCurve(
             plain.t,
             plain.y,
             interpolation,
-            tuple(((fitted.breaks - lower) / length).tolist()),
-            tuple(map(tuple, (fitted.coefficients * powers).tolist())),
+            tuple(((self.fitted.space.breaks - lower) / length).tolist()),
+            tuple(map(tuple, (pieces(self.fitted) * powers).tolist())),
         )
 
 

@@ -11,7 +11,6 @@ from ballplate.extensions.maps import correction
 from ballplate.extensions.maps import volumetric_errors as volumetric
 from ballplate.extensions.reliability import remainders as leftover
 from ballplate.extensions.requirements import root_search as search
-from ballplate.extensions.splines import curve_options
 from ballplate.extensions.splines import error_curve as curve
 from ballplate.extensions.splines import read_points as read
 from ballplate.extensions.sweeps import axes, bundle, load
@@ -77,7 +76,7 @@ LIMITS = {
     "`reach`": (search.MOST_POINTS,),
     "`correct --covariance`": (correction.MOST_CO_ORDINATES,),
     "`map`": (volumetric.MOST_POINTS,),
-    "`spline`": (read.MOST_POINTS, curve.MOST_COEFFICIENTS, curve_options.MOST_ORDER),
+    "`spline`": (read.MOST_POINTS, curve.MOST_COEFFICIENTS),
 }
 
 
