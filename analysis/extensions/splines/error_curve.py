@@ -182,13 +182,13 @@ def _on_profile(
     if same:
         raise SplineError(same)
     _refuse_distant(places, ends)
-    added = [
+    first, last = (
         None if place is None or (places == place).all(axis=1).any() else np.array(place)
         for place in ends
-    ]
+    )
     try:
         profile, profile_points, breaks = along(
-            places, points.features, np.array(nominal).reshape(-1, 2), *added, len(corners)
+            places, points.features, np.array(nominal).reshape(-1, 2), first, last, len(corners)
         )
     except NotOnProfileError as error:
         text = "the point ({0}, {1}) is not on the profile between two points; correct it, or give"
