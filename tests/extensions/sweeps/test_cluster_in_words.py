@@ -15,7 +15,6 @@ from ballplate.extensions.sweeps.cluster import (
     ClusterError,
     OtherVersionError,
     _on_worker,
-    _refuse,
 )
 from ballplate.extensions.sweeps.task import CellTask
 
@@ -24,16 +23,6 @@ from tests.extensions.sweeps.support import ROOT, command, small_sweep, stored
 
 Start = Callable[..., subprocess.Popen[bytes]]
 
-# A worker whose Python has everything but ballplate.
-WITHOUT = """
-import importlib.metadata, sys
-real = importlib.metadata.version
-def version(name):
-    if name == "ballplate":
-        raise importlib.metadata.PackageNotFoundError(name)
-    return real(name)
-importlib.metadata.version = version
-"""
 # One with another version.
 OTHER = """
 import importlib.metadata
@@ -106,11 +95,10 @@ def ended(path: Path, address: str) -> str:
 @pytest.mark.parametrize(
     ("worker", "words"),
     [
-        (WITHOUT, "no ballplate"),
         (OTHER, "ballplate 0.0.7"),
         (OTHER_CODE, "other code of ballplate 0.1.0"),
     ],
-    ids=["no ballplate", "another version", "other code"],
+    ids=["another version", "other code"],
 )
 def test_workers_with_other_code_are_refused(
     worker: str,
@@ -169,11 +157,3 @@ def test_no_worker(
 def test_a_worker_that_comes_later_computes_nothing_with_other_code() -> None:
     with pytest.raises(OtherVersionError):
         _on_worker(cluster.Bundle("", "", ()), "other", CellTask(0))
-
-
-def test_all_workers_that_differ_are_counted() -> None:
-    with pytest.raises(
-        ClusterError,
-        match=wording.THE_WORKER_HAS_NO_BALLPLATE,
-    ):
-        _refuse({"a": "ballplate 1", "b": "no ballplate", "c": "ballplate 2"}, "ballplate 1")
