@@ -135,9 +135,7 @@ def _bare(settings: DescribedMachineSettings, problems: Problems) -> MachineDesc
         axis: AxisTemperature(
             excess.expansion, excess.deviation, excess.standard_uncertainty or 0.0
         )
-        for axis, excess in (
-            {} if settings.temperature is None else settings.temperature.stated
-        ).items()
+        for axis, excess in (settings.temperature or {}).items()
     }
     machine = MachineDescription(
         title=settings.title,
@@ -306,11 +304,14 @@ def _read_tables(root: Mapping, source: Path, problems: Problems, trust: Trust) 
 
 
 def _line(
-    settings: Any, machine: MachineDescription, axis: int, steps: Steps, problems: Problems
+    values: dict[str, float] | None,
+    machine: MachineDescription,
+    axis: int,
+    steps: Steps,
+    problems: Problems,
 ) -> Three | None:
-    if settings is None:
+    if values is None:
         return None
-    values = settings.stated
     if AXES[axis] in values:
         problems.add(
             (*steps, AXES[axis]), f"the line runs along {AXES[axis]}; leave it out", of_key=True
