@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import ClassVar, Literal
+from typing import ClassVar, Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -214,7 +215,7 @@ def _axes(settings: CoordinatesSettings, steps: Steps, references: References) -
     dimension, uncertainty = references.dimension, settings.standard_uncertainty
     place = (*steps, "standard_uncertainty")
     if uncertainty is None or isinstance(uncertainty, float):
-        axes = list(settings.axes or AXIS_NAMES[:dimension])
+        axes: list[Axis] = list(settings.axes or get_args(Axis)[:dimension])
         place = (*steps, "axes")
         is_once = references.require(
             len(set(axes)) == len(axes), place, "names an axis twice; name each once"
@@ -240,7 +241,7 @@ def _axes(settings: CoordinatesSettings, steps: Steps, references: References) -
 def _certified_coordinates(
     settings: CoordinatesSettings,
     balls: NDArray[np.intp],
-    axes: list[str],
+    axes: Sequence[str],
     layout: BallLayout,
     steps: Steps,
     references: References,
@@ -275,7 +276,7 @@ def _certified_coordinates(
 def _table_of_coordinates(
     settings: CoordinatesSettings,
     balls: NDArray[np.intp],
-    axes: list[str],
+    axes: Sequence[str],
     layout: BallLayout,
     steps: Steps,
     references: References,
