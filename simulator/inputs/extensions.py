@@ -323,11 +323,3 @@ def function(name: str) -> Any:
     :raises MissingExtensionError: its extension is not installed.
     """
     return getattr(module_with("functions", name), name)
-
-
-def optional_function(name: str) -> Any | None:
-    """Return such a function, or None if its extension is not installed."""
-    try:
-        return function(name)
-    except MissingExtensionError:
-        return None
