@@ -21,7 +21,7 @@ from ..inputs.validation import validated
 from ..inputs.yamltree import Mapping, Scalar, read_tree, to_python
 from ..machines.arrangement import AXES
 from ..machines.arrangement_settings import arrangement_of
-from ..machines.curves import NAMES, Points, SmoothedPoints
+from ..machines.curves import NAMES, Points
 from ..machines.description import (
     AxisTemperature,
     MachineDescription,
@@ -230,7 +230,7 @@ def _smoothed(
     knots = tuple(sorted(settings.knots or ()))
     if settings.every is not None:
         knots = at_every(x, settings.every, float(x[0]), float(x[-1]))
-    smoothed = SmoothedPoints(points.positions, points.values, settings.order, knots)
+    smoothed = Points(points.positions, points.values, settings.order, knots)
     try:
         if len(x) < settings.order + len(knots):
             text = f"{len(x)} points do not determine {settings.order + len(knots)} coefficients"

@@ -132,11 +132,6 @@ def test_what_is_undetermined_says_so(results: list[Result]) -> None:
     assert "rank deficiency" in deficient.to_latex()
 
 
-def test_check_has_a_row() -> None:
-    frame = bp.check(bp.quickstart()).to_frame()
-    assert len(frame) == 1 and frame["rank deficiency"][0] == 0 and frame["rank"][0] == "full rank"
-
-
 def test_without_rows_the_result_is_told_in_words(monkeypatch: pytest.MonkeyPatch) -> None:
     found = bp.check(bp.quickstart())
     monkeypatch.setattr(type(found), "columns", lambda _: ({}, ()))

@@ -281,23 +281,6 @@ def test_what_cannot_be_laid_out_has_no_scale(tmp_path: Path) -> None:
     assert lengths_with_offsets(without, 1e-6) is None
 
 
-@pytest.mark.parametrize(
-    ("evaluated", "count"),
-    [
-        ("points: [[0 mm, 0 mm, 0 mm]]", 0),
-        ("points: [[0 mm, 0 mm, 0 mm], [0 mm, 0 mm, 0 mm]]", 0),
-        ("points: {random: 20}", 190),
-    ],
-)
-def test_without_two_points_there_are_no_lengths_to_be_uncertain_of(
-    tmp_path: Path, evaluated: str, count: int
-) -> None:
-    text = ONE_PROBE.replace("points: {random: 20}", evaluated)
-    found = lengths_with_offsets(experiment_of(tmp_path, text), 1e-6)
-    assert (0 if found is None else found.count) == count
-    assert (found is None) == (count == 0)
-
-
 @dataclass(frozen=True)
 class Strains:
     """An error model whose parameters strain the volume: e = sum of a_k times matrices (d, d) times
