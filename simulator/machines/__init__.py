@@ -40,7 +40,6 @@ if TYPE_CHECKING:
         build_error_model,
     )
     from .volumetric import (
-        SQUARENESS,
         VolumetricModel,
         meaning,
         squareness_field,
