@@ -34,8 +34,6 @@ if TYPE_CHECKING:
     from .result import FitResult, Result
     from .scenes import (
         MOST_BALLS,
-        RISE,
-        TURN,
         box,
         box_edges,
         hull,

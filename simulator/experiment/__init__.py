@@ -25,7 +25,6 @@ if TYPE_CHECKING:
         Probe,
         ReadingGroup,
     )
-    from .model_files import absolute
     from .modules import python_models, runs_code
     from .name_rules import PLACE, check_rule
     from .named_files import (

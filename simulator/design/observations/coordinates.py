@@ -172,7 +172,7 @@ def read_coordinates(
     if isinstance(uncertainty, float):
         of_axes = np.full(len(axes), uncertainty)
     elif uncertainty is not None:
-        of_axes = np.array([uncertainty[axis] for axis in axes])
+        of_axes = np.array([uncertainty[axis] for axis in sorted(uncertainty)])
     names = [(layout.names[ball], axis) for ball in balls for axis in axes]
     of_item = None if of_axes is None else np.tile(of_axes, len(balls))
     uncertainties = uncertainties_of(
@@ -210,7 +210,7 @@ def read_coordinates(
     )
 
 
-def _axes(settings: CoordinatesSettings, steps: Steps, references: References) -> list[Axis] | None:
+def _axes(settings: CoordinatesSettings, steps: Steps, references: References) -> list[str] | None:
     """Return the calibrated axes, or report faults."""
     dimension, uncertainty = references.dimension, settings.standard_uncertainty
     place = (*steps, "standard_uncertainty")
