@@ -29,8 +29,10 @@ PROBES = {"x": ["right", "left"], "y": ["back", "front"], "z": ["down"]}
 IN_PLANE = {"x": "yz", "y": "zx", "z": "xy"}
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("name", SHAPES)
+@pytest.mark.parametrize(
+    "name",
+    [pytest.param(name, marks=[pytest.mark.long] * (k > 0)) for k, name in enumerate(SHAPES)],
+)
 def test_the_start_is_near_a_plan_of_its_size(name: str) -> None:
     drafted = bp.design(**BRIDGE | SHAPES[name])
     candidates = [
