@@ -29,10 +29,8 @@ PROBES = {"x": ["right", "left"], "y": ["back", "front"], "z": ["down"]}
 IN_PLANE = {"x": "yz", "y": "zx", "z": "xy"}
 
 
-@pytest.mark.parametrize(
-    "name",
-    [pytest.param(name, marks=[pytest.mark.long] * (k > 0)) for k, name in enumerate(SHAPES)],
-)
+@pytest.mark.long
+@pytest.mark.parametrize("name", SHAPES)
 def test_the_start_is_near_a_plan_of_its_size(name: str) -> None:
     drafted = bp.design(**BRIDGE | SHAPES[name])
     candidates = [
