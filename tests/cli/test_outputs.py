@@ -149,7 +149,7 @@ WALK = {
         ("measured/exx.csv",),
     ),
     "spline": Walk(
-        {"FILE": "points.csv", "--nominal": "nominal.csv"},
+        {"FILE": "points.csv"},
         {
             "-o": "s.csv",
             "--compensated": "m.csv",
