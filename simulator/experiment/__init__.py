@@ -48,7 +48,6 @@ if TYPE_CHECKING:
     )
     from .sections import Line, Seed
     from .spans import unspanned
-    from .star_tables import doubt_of_table
     from .variants import (
         is_same_place,
         node_at,
