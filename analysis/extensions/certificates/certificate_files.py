@@ -16,7 +16,6 @@ from collections.abc import Iterator
 from dataclasses import replace
 from itertools import chain
 from pathlib import Path
-from types import SimpleNamespace
 from typing import TextIO
 
 import numpy as np
@@ -280,11 +279,11 @@ def is_calibration_table(source: GivenText) -> bool:
     return "item" not in names and (of_pairs or names >= {"ball", "x", "y"})
 
 
-# The functions that read and write values of certificates.
-CertificateFiles = SimpleNamespace(
-    ensure_certified=ensure_certified,
-    certified_values=certified_values,
-    with_drawn_values=with_drawn_values,
-    write=write_certificate,
-    read=read_certificate,
-)
+class CertificateFiles:
+    """The functions that read and write values of certificates."""
+
+    ensure_certified = staticmethod(ensure_certified)
+    certified_values = staticmethod(certified_values)
+    with_drawn_values = staticmethod(with_drawn_values)
+    write = staticmethod(write_certificate)
+    read = staticmethod(read_certificate)

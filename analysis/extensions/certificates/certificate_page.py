@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from ballplate.presentation import escaped
 
-from .certified_balls import NO_ACCREDITATION, PlateCertificate
+from .certified_balls import NO_ACCREDITATION, CertifiedBalls
 
 STYLE = """
 :root { color-scheme: light; }
@@ -44,7 +44,7 @@ thead { display: table-header-group; }
 """
 
 
-def certificate_page(certificate: PlateCertificate) -> str:
+def certificate_page(certificate: CertifiedBalls) -> str:
     """The certificate as a page of HTML: statement, facts, remarks, co-ordinates, distances."""
     title = f"Ball co-ordinates of {certificate.artefact}"
     remarks = "".join(f"<p>{escaped(text)}</p>" for text in certificate.remarks)
@@ -89,7 +89,7 @@ def _table(rows: Sequence[Sequence[str]], names: int) -> str:
     )
 
 
-def _of_distances(certificate: PlateCertificate) -> str:
+def _of_distances(certificate: CertifiedBalls) -> str:
     count = len(certificate.names)
     note = (
         "Any distance and its uncertainty follow from co-ordinates and their covariance, which the"

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from itertools import combinations
+from pathlib import Path
 
 import numpy as np
+from ballplate.presentation import write_file
 from ballplate.results import Fit, data_of
 from ballplate.simulator.computing import blank, single_threaded
 from ballplate.simulator.design import TemperaturesSettings
@@ -18,14 +20,67 @@ from ballplate.simulator.inputs import MOST_NAMES, hint, listing, refused, to_py
 from ballplate.simulator.machines import Array, Integers
 from ballplate.uncertainty import OWN_SCALES, expansion, pairs_of, scale_of
 
+from .certificate_csv import coordinates_csv, covariance_csv
 from .certificate_files import certified_values
-from .certified_balls import ABOUT, PlateCertificate, PlateDistance
+from .certificate_page import certificate_page
+from .certified_balls import ABOUT, CertifiedBalls, PlateDistance
 from .datum import Datum, chosen_datum, in_datum, relative_to
+from .digital_form import digital_certificate
 
 # Of so many balls all distances are stated, of more those between corners, or the first ones.
 MOST_BALLS_FOR_ALL_DISTANCES = 16
 # What is smaller, in metres, is rounding.
 ROUNDING = 1e-14
+
+
+def _tables(certificate: CertifiedBalls, path: Path) -> dict[Path, str]:
+    beside = covariance_path(path)
+    return {path: coordinates_csv(certificate, beside.name), beside: covariance_csv(certificate)}
+
+
+# Texts of a certificate by the names of files, by the ending of the name that is given.
+FORMS: dict[str, Callable[[CertifiedBalls, Path], dict[Path, str]]] = {
+    ".html": lambda certificate, path: {path: certificate_page(certificate)},
+    ".csv": _tables,
+    ".xml": lambda certificate, path: {path: digital_certificate(certificate)},
+}
+
+
+def covariance_path(path: Path) -> Path:
+    """Where the covariance of a table of co-ordinates stands.
+
+    >>> covariance_path(Path("plate.csv")).name
+    'plate-covariance.csv'
+    """
+    return path.with_name(f"{path.stem}-covariance{path.suffix}")
+
+
+class PlateCertificate(CertifiedBalls):
+    """A certificate that can be written."""
+
+    def texts(self, path: str | Path) -> dict[Path, str]:
+        """The certificate as the ending of a name says: a page (.html), tables (.csv, with the
+        covariance in a second one beside it) or a digital calibration certificate (.xml); by the
+        names of files.
+
+        :raises ValueError: another ending, or a digital certificate without what it has to state.
+        """
+        path = Path(path)
+        write = FORMS.get(path.suffix.lower())
+        if write is None:
+            raise ValueError(
+                f'a certificate\'s name ends in {", ".join(FORMS)}, unlike "{path.name}"'
+            )
+        return write(self, path)
+
+    def save(self, path: str | Path) -> None:
+        """Write it, see `texts`.
+
+        :raises OSError: a file cannot be written.
+        :raises ValueError: the name has another ending, or a digital certificate lacks something.
+        """
+        for name, text in self.texts(path).items():
+            write_file(name, text.encode())
 
 
 @single_threaded

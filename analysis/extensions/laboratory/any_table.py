@@ -231,9 +231,10 @@ class _Reader:
                 messages.append(mark.message("", str(error)))
                 return math.nan
 
-        u, of_all = roles.get("u"), math.nan
-        if u is not None and u.constant is not None:
-            u, of_all = None, parse_positive_length(u.constant)
+        u = roles["u"].place if "u" in roles else None
+        of_all = math.nan
+        if u is not None and (constant := roles["u"].constant) is not None:
+            u, of_all = None, parse_positive_length(constant)
         for line, cells in self.form.rows:
             if len(messages) >= MOST_MESSAGES:
                 break
@@ -249,7 +250,7 @@ class _Reader:
                 where = " ".join(cells[i] for i in nominal)
                 names = names[0], f"{names[0]}: {where}", names[2]
             x = [number(cells, i, mark) for i in axes]
-            x.append(of_all if u is None else number(cells, u.place, mark))
+            x.append(of_all if u is None else number(cells, u, mark))
             if "k" in roles and not math.isnan(x[-1]):
                 x[-1] /= _coverage_factor(roles["k"], cells, sign, mark, messages)
             x += [

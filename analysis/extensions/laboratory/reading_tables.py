@@ -5,7 +5,6 @@ co-ordinates that the design has.
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping, Sequence
-from types import SimpleNamespace
 
 import numpy as np
 from ballplate.simulator.design import Design
@@ -180,7 +179,9 @@ def _places(rows: Sequence[FileRow], design: Design, settings: ReadingsSettings)
     return x + np.where((probe >= 0)[:, None], added[probe], 0.0)
 
 
-# The functions that read tables that are not plain.
-OtherTables = SimpleNamespace(
-    of_sources=any_source_rows, of_table=any_table_rows, of_workbook=workbook_tables
-)
+class OtherTables:
+    """The functions that read tables that are not plain."""
+
+    of_sources = staticmethod(any_source_rows)
+    of_table = staticmethod(any_table_rows)
+    of_workbook = staticmethod(workbook_tables)
