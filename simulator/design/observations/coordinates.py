@@ -215,7 +215,7 @@ def _axes(settings: CoordinatesSettings, steps: Steps, references: References) -
     dimension, uncertainty = references.dimension, settings.standard_uncertainty
     place = (*steps, "standard_uncertainty")
     if uncertainty is None or isinstance(uncertainty, float):
-        axes: list[Axis] = list(settings.axes or get_args(Axis)[:dimension])
+        axes: list[str] = list(settings.axes or get_args(Axis)[:dimension])
         place = (*steps, "axes")
         is_once = references.require(
             len(set(axes)) == len(axes), place, "names an axis twice; name each once"
