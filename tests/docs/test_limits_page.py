@@ -7,9 +7,9 @@ from pathlib import Path
 
 import pytest
 from ballplate.estimators import distances as estimators
+from ballplate.extensions.diagnosis import remainders as leftover
 from ballplate.extensions.maps import correction
 from ballplate.extensions.maps import volumetric_errors as volumetric
-from ballplate.extensions.reliability import remainders as leftover
 from ballplate.extensions.requirements import root_search as search
 from ballplate.extensions.splines import curve_options
 from ballplate.extensions.splines import error_curve as curve

@@ -11,11 +11,11 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from ballplate.extensions.questions.asking import answers_at
-from ballplate.extensions.reliability.exact_values import diagnosis_of_all
-from ballplate.extensions.reliability.refits import diagnosis_with_refits
-from ballplate.extensions.reliability.remainders import too_many_entries
-from ballplate.extensions.reliability.wording import refit_words
+from ballplate.extensions.diagnosis.asking import answers_at
+from ballplate.extensions.diagnosis.exact_values import diagnosis_of_all
+from ballplate.extensions.diagnosis.refits import diagnosis_with_refits
+from ballplate.extensions.diagnosis.remainders import too_many_entries
+from ballplate.extensions.diagnosis.wording import refit_words
 from ballplate.presentation import chance_words
 from ballplate.simulator.computing import ProgressStep, Report, single_threaded, unreported
 from ballplate.simulator.design import Design, State

@@ -9,10 +9,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from ballplate.extensions.reliability.cause_search import Search
-from ballplate.extensions.reliability.hat import whitened_residuals
-from ballplate.extensions.reliability.remainders import leftover
-from ballplate.extensions.reliability.scatter import (
+from ballplate.extensions.diagnosis.cause_search import Search
+from ballplate.extensions.diagnosis.hat import whitened_residuals
+from ballplate.extensions.diagnosis.remainders import leftover
+from ballplate.extensions.diagnosis.scatter import (
     log_chances,
     ratio,
     scatters,
@@ -28,8 +28,8 @@ from ballplate.simulator.readings.generate import noisy_certificate, noisy_readi
 from ballplate.simulator.readings.observed_readings import observe
 from numpy.typing import NDArray
 
-from tests.extensions.reliability.designs import MIXED, PLANE, experiment
-from tests.extensions.reliability.test_against_dense import numeric
+from tests.extensions.diagnosis.designs import MIXED, PLANE, experiment
+from tests.extensions.diagnosis.test_against_dense import numeric
 
 Real = NDArray[np.float64]
 

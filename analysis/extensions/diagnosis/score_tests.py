@@ -7,17 +7,6 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from ballplate.extensions.reliability.bias_patterns import LinearisedDesign
-from ballplate.extensions.reliability.cause_search import (
-    Search,
-    basis_of,
-    explained_by,
-    further_basis,
-)
-from ballplate.extensions.reliability.power import noncentrality
-from ballplate.extensions.reliability.remainders import HIDDEN, Leftover
-from ballplate.extensions.reliability.rivals import clear_odds, log_p, standing, variance
-from ballplate.extensions.reliability.smooth import rows_of
 from ballplate.simulator.computing import svd
 from ballplate.simulator.design import (
     Design,
@@ -29,7 +18,18 @@ from ballplate.simulator.design import (
 from ballplate.simulator.estimation import estimate
 from ballplate.simulator.machines import Array
 
+from .bias_patterns import LinearisedDesign
+from .cause_search import (
+    Search,
+    basis_of,
+    explained_by,
+    further_basis,
+)
 from .possible_causes import CHAIN, GROSS, MODEL, PossibleCause, possible_causes
+from .power import noncentrality
+from .remainders import HIDDEN, Leftover
+from .rivals import clear_odds, log_p, standing, variance
+from .smooth import rows_of
 
 # Chance that any of the assumptions of a right experiment is contradicted.
 LEVEL = 0.01

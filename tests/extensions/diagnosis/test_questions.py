@@ -9,9 +9,9 @@ from pathlib import Path
 import ballplate as bp
 import numpy as np
 import pytest
+from ballplate.extensions.diagnosis import score_tests
+from ballplate.extensions.diagnosis.cause_search import Search, explained_by
 from ballplate.extensions.judgement.compared_models import compared_models
-from ballplate.extensions.questions import score_tests
-from ballplate.extensions.reliability.cause_search import Search, explained_by
 from ballplate.results.fits import Fit
 from ballplate.results.fitting import fit
 from ballplate.simulator.estimation.gauss_newton import estimate, linearised_fit
@@ -22,7 +22,7 @@ from ballplate.simulator.machines.arrangement import ARRANGEMENTS
 from ballplate.simulator.readings.observed_readings import observe
 from ballplate.simulator.readings.simulated import simulated_readings
 
-from tests.extensions.questions.campaigns import (
+from tests.extensions.diagnosis.campaigns import (
     CAUSES,
     DESIGNS,
     QUICKSTART,
@@ -32,7 +32,7 @@ from tests.extensions.questions.campaigns import (
     rates,
     visible,
 )
-from tests.extensions.reliability.designs import PLANE, experiment
+from tests.extensions.diagnosis.designs import PLANE, experiment
 
 CHAIN = "the arrangement of the axes is"
 

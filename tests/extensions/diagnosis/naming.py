@@ -1,7 +1,7 @@
 """How often a fit names the right cause: data sets with one mistake or one model error each, and a
 table of them.
 
-Run as `python -m tests.extensions.reliability.naming` it prints a table; docs/reference/validation.md has it of
+Run as `python -m tests.extensions.diagnosis.naming` it prints a table; docs/reference/validation.md has it of
 fewer data sets.
 """
 
@@ -15,10 +15,10 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-from ballplate.extensions.reliability.cause_search import FAMILY, Search, diagnosis
-from ballplate.extensions.reliability.events import Cause, cause
-from ballplate.extensions.reliability.power import noncentrality
-from ballplate.extensions.reliability.suspects import Diagnosis
+from ballplate.extensions.diagnosis.cause_search import FAMILY, Search, diagnosis
+from ballplate.extensions.diagnosis.events import Cause, cause
+from ballplate.extensions.diagnosis.power import noncentrality
+from ballplate.extensions.diagnosis.suspects import Diagnosis
 from ballplate.simulator.design.arrays import Design, Readings
 from ballplate.simulator.design.observations.distances import CalibratedDistances
 from ballplate.simulator.estimation.gauss_newton import estimate, linearised_fit

@@ -8,11 +8,6 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from ballplate.extensions.reliability.cause_search import Search, basis_of, explained_by
-from ballplate.extensions.reliability.remainders import Leftover, too_many_entries
-from ballplate.extensions.reliability.scatter import Scatter, scatters, with_scatter
-from ballplate.extensions.reliability.scatter import log_chances as scatter_chances
-from ballplate.extensions.reliability.suspects import Diagnosis, Suspect
 from ballplate.presentation import number
 from ballplate.results import Fit, ParameterEstimate
 from ballplate.simulator.computing import single_threaded, svd
@@ -21,7 +16,11 @@ from ballplate.simulator.machines import Array
 from ballplate.uncertainty import uncertainties
 
 from .answered import Answers, AssumptionAnswer, Contradicted
+from .cause_search import Search, basis_of, explained_by
 from .possible_causes import GROSS, MODEL, PossibleCause
+from .remainders import Leftover, too_many_entries
+from .scatter import Scatter, scatters, with_scatter
+from .scatter import log_chances as scatter_chances
 from .score_tests import (
     LEVEL,
     Contradiction,
@@ -32,6 +31,7 @@ from .score_tests import (
     reduced,
     tested,
 )
+from .suspects import Diagnosis, Suspect
 
 # Kinds of suspects that are causes themselves; all others are errors of single observations.
 ASKED = ("probe", "scale", "expansion")

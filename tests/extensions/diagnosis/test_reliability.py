@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 from ballplate.cli import main
 
-from tests.extensions.reliability import wording
+from tests.extensions.diagnosis import wording
 
 QUICKSTART = "designs/quickstart.yaml"
 Rows = list[dict[str, str]]

@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-from ballplate.extensions.reliability.refits import other_chains
 from ballplate.simulator.design import (
     Clock,
     Design,
@@ -27,6 +26,8 @@ from ballplate.simulator.design import (
 )
 from ballplate.simulator.geometry import AXIS_NAMES
 from ballplate.simulator.machines import Array, ErrorModel, Integers, Unit
+
+from .refits import other_chains
 
 # Balls of a position that extend by less than this, in metres, tell nothing of a scale there.
 LEAST_EXTENT = 1e-3

@@ -9,10 +9,10 @@ import ballplate as bp
 import numpy as np
 import pytest
 from ballplate.cli import main
-from ballplate.extensions.reliability.bias_patterns import patterns
-from ballplate.extensions.reliability.effects import changes_of
-from ballplate.extensions.reliability.redundancy import reliability_of
-from ballplate.extensions.reliability.response import responses
+from ballplate.extensions.diagnosis.bias_patterns import patterns
+from ballplate.extensions.diagnosis.effects import changes_of
+from ballplate.extensions.diagnosis.redundancy import reliability_of
+from ballplate.extensions.diagnosis.response import responses
 from ballplate.simulator.design.arrays import Design, State, nominal_state
 from ballplate.simulator.design.observations.priors import Priors
 from ballplate.simulator.design.observations.readings import expected_readings
@@ -22,8 +22,8 @@ from ballplate.simulator.estimation.linearisation import linearise
 from ballplate.simulator.experiment.layout import lay_out
 from numpy.typing import NDArray
 
-from tests.extensions.reliability import wording
-from tests.extensions.reliability.designs import MIXED, PLATE, experiment
+from tests.extensions.diagnosis import wording
+from tests.extensions.diagnosis.designs import MIXED, PLATE, experiment
 from tests.reference.designs import altered
 
 Real = NDArray[np.float64]

@@ -6,11 +6,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from ballplate.extensions.reliability import effects
-from ballplate.extensions.reliability.bias_patterns import patterns
-from ballplate.extensions.reliability.redundancy import reliability
-from ballplate.extensions.reliability.remainders import entries, leftover
-from ballplate.extensions.reliability.response import responses
+from ballplate.extensions.diagnosis import effects
+from ballplate.extensions.diagnosis.bias_patterns import patterns
+from ballplate.extensions.diagnosis.redundancy import reliability
+from ballplate.extensions.diagnosis.remainders import entries, leftover
+from ballplate.extensions.diagnosis.response import responses
 from ballplate.results.fitting import fit
 from ballplate.simulator.estimation.functions import BallPlaces, Distances, displacements
 from ballplate.simulator.estimation.linearisation import linearise
@@ -19,7 +19,7 @@ from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.inputs.messages import ExperimentError
 from ballplate.simulator.readings.reading_files import read_readings
 
-from tests.extensions.reliability import wording
+from tests.extensions.diagnosis import wording
 
 QUICKSTART = Path("designs/quickstart.yaml")
 CERTIFIED = Path("designs/certified")
@@ -41,7 +41,7 @@ def test_reliability_of_too_many(monkeypatch: pytest.MonkeyPatch) -> None:
     (experiment,) = load(QUICKSTART)
     rows, columns = entries(lay_out(experiment))
     monkeypatch.setattr(
-        "ballplate.extensions.reliability.remainders.MOST_ENTRIES", rows * columns - 1
+        "ballplate.extensions.diagnosis.remainders.MOST_ENTRIES", rows * columns - 1
     )
     with pytest.raises(ExperimentError) as caught:
         reliability(experiment)
@@ -51,7 +51,7 @@ def test_reliability_of_too_many(monkeypatch: pytest.MonkeyPatch) -> None:
         f" many to test for gross errors; at most {rows - 1} are possible with {columns} parameters"
         " of machine, poses and tied balls: read fewer balls, or in fewer positions"
     )
-    monkeypatch.setattr("ballplate.extensions.reliability.remainders.MOST_ENTRIES", rows * columns)
+    monkeypatch.setattr("ballplate.extensions.diagnosis.remainders.MOST_ENTRIES", rows * columns)
     reliability(experiment)
 
 
@@ -59,11 +59,11 @@ def test_fit_of_too_many(monkeypatch: pytest.MonkeyPatch) -> None:
     (experiment,) = load(CERTIFIED / "three-planes.yaml")
     observed = read_readings(CERTIFIED / "three-planes.csv", lay_out(experiment))
     rows, columns = entries(observed.design)
-    monkeypatch.setattr("ballplate.extensions.reliability.remainders.MOST_ENTRIES", rows * columns)
+    monkeypatch.setattr("ballplate.extensions.diagnosis.remainders.MOST_ENTRIES", rows * columns)
     tested = fit(experiment, observed)
     assert tested.untested == "" and tested.cautions == ()
     monkeypatch.setattr(
-        "ballplate.extensions.reliability.remainders.MOST_ENTRIES", rows * columns - 1
+        "ballplate.extensions.diagnosis.remainders.MOST_ENTRIES", rows * columns - 1
     )
     found = fit(experiment, observed)
     assert (

@@ -10,10 +10,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from ballplate.extensions.reliability.cause_search import diagnosis
-from ballplate.extensions.reliability.hat import whitened_residuals
-from ballplate.extensions.reliability.suspects import Diagnosis, Suspect
-from ballplate.extensions.reliability.wording import diagnosis_lines, unexplained_words
+from ballplate.extensions.diagnosis.cause_search import diagnosis
+from ballplate.extensions.diagnosis.hat import whitened_residuals
+from ballplate.extensions.diagnosis.suspects import Diagnosis, Suspect
+from ballplate.extensions.diagnosis.wording import diagnosis_lines, unexplained_words
 from ballplate.simulator.design.arrays import Design
 from ballplate.simulator.design.observations.distances import CalibratedDistances
 from ballplate.simulator.estimation.gauss_newton import Solution, estimate, linearised_fit
@@ -26,8 +26,8 @@ from ballplate.simulator.readings.reading_files import read_readings
 from numpy.typing import NDArray
 from scipy.stats import chi2
 
-from tests.extensions.reliability.designs import PLATE, experiment
-from tests.extensions.reliability.test_search import jacobian
+from tests.extensions.diagnosis.designs import PLATE, experiment
+from tests.extensions.diagnosis.test_search import jacobian
 
 Real = NDArray[np.float64]
 CERTIFIED = Path("designs/certified")

@@ -11,9 +11,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-from ballplate.extensions.reliability.cause_search import diagnosis
-from ballplate.extensions.reliability.names import name
-from ballplate.extensions.reliability.redundancy import reliability_of
+from ballplate.extensions.diagnosis.cause_search import diagnosis
+from ballplate.extensions.diagnosis.names import name
+from ballplate.extensions.diagnosis.redundancy import reliability_of
 from ballplate.simulator.design.arrays import Design, nominal_state
 from ballplate.simulator.design.observations.lengths import Lengths
 from ballplate.simulator.design.observations.readings import expected_readings
@@ -21,7 +21,7 @@ from ballplate.simulator.estimation.gauss_newton import gauss_newton, linearised
 from ballplate.simulator.experiment.layout import lay_out
 from numpy.typing import NDArray
 
-from tests.extensions.reliability.test_against_dense import distances_of, orthonormal
+from tests.extensions.diagnosis.test_against_dense import distances_of, orthonormal
 from tests.reference import dense
 from tests.reference.standards import bar, experiment, flat
 

@@ -11,10 +11,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from ballplate.extensions.reliability.bias_patterns import patterns
-from ballplate.extensions.reliability.cause_search import Search, diagnosis
-from ballplate.extensions.reliability.tails import log_chance
-from ballplate.extensions.reliability.wording import diagnosis_words
+from ballplate.extensions.diagnosis.bias_patterns import patterns
+from ballplate.extensions.diagnosis.cause_search import Search, diagnosis
+from ballplate.extensions.diagnosis.tails import log_chance
+from ballplate.extensions.diagnosis.wording import diagnosis_words
 from ballplate.simulator.design.arrays import nominal_state
 from ballplate.simulator.design.observations.readings import expected_readings
 from ballplate.simulator.estimation.gauss_newton import estimate, linearised_fit
@@ -28,8 +28,8 @@ from ballplate.simulator.readings.observed_readings import observe
 from numpy.typing import NDArray
 from scipy.stats import beta, binom
 
-from tests.extensions.reliability.designs import PLATE, experiment
-from tests.extensions.reliability.test_search import jacobian
+from tests.extensions.diagnosis.designs import PLATE, experiment
+from tests.extensions.diagnosis.test_search import jacobian
 
 QUICKSTART, CAMPAIGN = Path("designs/quickstart.yaml"), Path("designs/planning/campaign.yaml")
 

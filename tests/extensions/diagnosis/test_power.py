@@ -9,17 +9,17 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from ballplate.extensions.reliability.bias_patterns import Patterns, patterns
-from ballplate.extensions.reliability.cause_search import diagnosis
-from ballplate.extensions.reliability.hat import hat_rows, row_count
-from ballplate.extensions.reliability.power import (
+from ballplate.extensions.diagnosis.bias_patterns import Patterns, patterns
+from ballplate.extensions.diagnosis.cause_search import diagnosis
+from ballplate.extensions.diagnosis.hat import hat_rows, row_count
+from ballplate.extensions.diagnosis.power import (
     alarm_limit,
     chance_of_alarm,
     noncentrality,
 )
-from ballplate.extensions.reliability.redundancy import reliability_of
-from ballplate.extensions.reliability.reliability_result import Reliability
-from ballplate.extensions.reliability.remainders import Columns, leftover
+from ballplate.extensions.diagnosis.redundancy import reliability_of
+from ballplate.extensions.diagnosis.reliability_result import Reliability
+from ballplate.extensions.diagnosis.remainders import Columns, leftover
 from ballplate.simulator.design.arrays import Design
 from ballplate.simulator.design.observations.coordinates import CalibratedCoordinates
 from ballplate.simulator.design.observations.distances import CalibratedDistances
@@ -35,7 +35,7 @@ from numpy.typing import NDArray
 from scipy.special import nctdtr
 from scipy.stats import binom
 
-from tests.extensions.reliability.designs import MIXED, PLANE, PLATE, experiment
+from tests.extensions.diagnosis.designs import MIXED, PLANE, PLATE, experiment
 
 Real = NDArray[np.float64]
 FALSE_ALARM, POWER = 0.001, 0.8

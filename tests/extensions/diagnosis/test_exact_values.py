@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 import yaml
 
-from tests.extensions.reliability import wording
+from tests.extensions.diagnosis import wording
 
 QUICKSTART = Path("designs/quickstart.yaml")
 SIDE, DIAGONAL = 750.0, float(np.hypot(750.0, 750.0))

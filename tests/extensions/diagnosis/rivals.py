@@ -1,7 +1,7 @@
 """Campaigns with one error each on designs other than those of the page, and the sums of squares
 of what a fit names, by fits of files that state it.
 
-Run as `python -m tests.extensions.questions.rivals` it prints how often another cause is named.
+Run as `python -m tests.extensions.diagnosis.rivals` it prints how often another cause is named.
 """
 
 from __future__ import annotations

@@ -7,7 +7,7 @@ from __future__ import annotations
 import mpmath
 import numpy as np
 import pytest
-from ballplate.extensions.reliability.tails import log_chance, normal_equivalent
+from ballplate.extensions.diagnosis.tails import log_chance, normal_equivalent
 from scipy.stats import chi2, f, norm
 
 

@@ -1,7 +1,7 @@
 """How often one wrong probe offset is named: single mistakes in the offsets of three designs, and
 what reading and fit say of each.
 
-Run as `python -m tests.extensions.reliability.offsets` it prints the rates with their confidence limits.
+Run as `python -m tests.extensions.diagnosis.offsets` it prints the rates with their confidence limits.
 """
 
 from __future__ import annotations
@@ -16,13 +16,13 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import numpy as np
+from ballplate.extensions.diagnosis.cause_search import FAMILY, Search
+from ballplate.extensions.diagnosis.hat import row_places
+from ballplate.extensions.diagnosis.power import noncentrality
+from ballplate.extensions.diagnosis.refits import diagnosis_with_refits
+from ballplate.extensions.diagnosis.wording import diagnosis_words
 from ballplate.extensions.laboratory.gross_error_messages import refuse_gross_errors
 from ballplate.extensions.laboratory.offsets_applied import doubt_about_offsets
-from ballplate.extensions.reliability.cause_search import FAMILY, Search
-from ballplate.extensions.reliability.hat import row_places
-from ballplate.extensions.reliability.power import noncentrality
-from ballplate.extensions.reliability.refits import diagnosis_with_refits
-from ballplate.extensions.reliability.wording import diagnosis_words
 from ballplate.simulator.design.arrays import Design
 from ballplate.simulator.design.observations.priors import Priors
 from ballplate.simulator.estimation.gauss_newton import estimate, linearised_fit
@@ -37,7 +37,7 @@ from ballplate.simulator.readings.observed_readings import observe
 from numpy.typing import NDArray
 from scipy.stats import beta
 
-from tests.extensions.reliability.designs import PLATE, experiment
+from tests.extensions.diagnosis.designs import PLATE, experiment
 
 Real = NDArray[np.float64]
 

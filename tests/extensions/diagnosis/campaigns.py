@@ -1,6 +1,6 @@
 """Simulated campaigns that contradict one assumption of their experiment, and what the fit says.
 
-Run as `python -m tests.extensions.questions.campaigns` it prints the rates with their confidence
+Run as `python -m tests.extensions.diagnosis.campaigns` it prints the rates with their confidence
 limits.
 """
 
@@ -13,10 +13,10 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import numpy as np
-from ballplate.extensions.questions.score_tests import LEVEL, tested
-from ballplate.extensions.reliability.bias_patterns import LinearisedDesign
-from ballplate.extensions.reliability.cause_search import Search
-from ballplate.extensions.reliability.smooth import rows_of
+from ballplate.extensions.diagnosis.bias_patterns import LinearisedDesign
+from ballplate.extensions.diagnosis.cause_search import Search
+from ballplate.extensions.diagnosis.score_tests import LEVEL, tested
+from ballplate.extensions.diagnosis.smooth import rows_of
 from ballplate.results.fitting import fit
 from ballplate.simulator.estimation.gauss_newton import estimate, linearised_fit
 from ballplate.simulator.experiment.layout import lay_out
@@ -29,8 +29,8 @@ from scipy.optimize import brentq
 from scipy.stats import f as fisher
 from scipy.stats import ncf
 
-from tests.extensions.reliability.designs import PLATE, experiment
-from tests.extensions.reliability.offsets import OBLIQUE, limits
+from tests.extensions.diagnosis.designs import PLATE, experiment
+from tests.extensions.diagnosis.offsets import OBLIQUE, limits
 
 Real = NDArray[np.float64]
 

@@ -14,7 +14,7 @@ from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.machines.arrangement import ARRANGEMENTS
 from scipy.stats import chi2
 
-from tests.extensions.questions.rivals import (
+from tests.extensions.diagnosis.rivals import (
     DESIGNS,
     ERRORS,
     Refit,

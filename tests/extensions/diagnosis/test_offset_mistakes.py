@@ -8,19 +8,19 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from ballplate.extensions.diagnosis import refits
+from ballplate.extensions.diagnosis.refits import diagnosis_with_refits
 from ballplate.extensions.laboratory.wrong_offsets import (
     WrongOffsets,
     offset_differences,
     with_offsets,
 )
-from ballplate.extensions.reliability import refits
-from ballplate.extensions.reliability.refits import diagnosis_with_refits
 from ballplate.simulator.estimation.gauss_newton import estimate, linearised_fit
 from ballplate.simulator.experiment.layout import lay_out
 
-from tests.extensions.reliability import wording
-from tests.extensions.reliability.designs import experiment
-from tests.extensions.reliability.offsets import (
+from tests.extensions.diagnosis import wording
+from tests.extensions.diagnosis.designs import experiment
+from tests.extensions.diagnosis.offsets import (
     DESIGNS,
     Mistake,
     Plan,

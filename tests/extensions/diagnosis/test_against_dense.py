@@ -10,10 +10,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from ballplate.extensions.reliability.bias_patterns import Patterns, patterns
-from ballplate.extensions.reliability.hat import row_places, whitened_residuals
-from ballplate.extensions.reliability.redundancy import reliability_of
-from ballplate.extensions.reliability.reliability_result import Reliability
+from ballplate.extensions.diagnosis.bias_patterns import Patterns, patterns
+from ballplate.extensions.diagnosis.hat import row_places, whitened_residuals
+from ballplate.extensions.diagnosis.redundancy import reliability_of
+from ballplate.extensions.diagnosis.reliability_result import Reliability
 from ballplate.simulator.design.arrays import Design, State, nominal_state
 from ballplate.simulator.design.observations.coordinates import CalibratedCoordinates
 from ballplate.simulator.design.observations.distances import CalibratedDistances
@@ -27,7 +27,7 @@ from ballplate.simulator.geometry.motions import rotation_from_vector
 from numpy.typing import NDArray
 
 from tests.estimation.test_against_dense import certified_coordinates, repeats, with_length_standard
-from tests.extensions.reliability.designs import MIXED, PLANE, PLATE, experiment
+from tests.extensions.diagnosis.designs import MIXED, PLANE, PLATE, experiment
 from tests.reference import dense
 from tests.reference.designs import altered
 

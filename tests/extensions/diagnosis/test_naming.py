@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 from scipy.stats import binom
 
-from tests.extensions.reliability.naming import (
+from tests.extensions.diagnosis.naming import (
     MISTAKES,
     MODEL_ERRORS,
     OUTCOMES,
