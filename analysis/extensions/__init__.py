@@ -128,7 +128,7 @@ SHIPPED = (
             ),
         },
         functions=_from("interface", "reliability"),
-        services=_from("searched_fit", "diagnosed") | _from("asking", "assumptions_asked"),
+        services=_from("searched_fit", "diagnosed"),
     ),
     _here(
         "certificates",

@@ -193,6 +193,16 @@ class LinearisedDesign:
         row, column = np.nonzero(white)
         return self.places["length"].start + row, column, white[row, column]
 
+    def biases(self, displacement: Array) -> Array:
+        """Return biases (rows, k) of all observations by displacements (readings, d, k) of all
+        readings.
+        """
+        biases = np.zeros((row_count(self.design), displacement.shape[2]))
+        white = self.weight[:, :, None] * displacement[self.chosen]
+        biases[self.places["reading"]] = white.reshape(self.weight.size, -1)
+        biases[self.places["length"]] = self.white.whitened(self.along_lengths(displacement))
+        return biases
+
 
 def _block(
     kind: str,

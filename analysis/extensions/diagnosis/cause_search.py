@@ -1,287 +1,320 @@
-"""Search of a fit's residuals for their cause: gross errors, errors of the model, drifts, noise."""
+"""Search of a fit's residuals for their causes: one list of hypotheses, one measure, one answer.
+
+Hypotheses are spaces of biases, tested to first order by the sum of squares of the residuals that
+they explain. The best one is removed, and the search is repeated with what remains.
+"""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field, replace
 
 import numpy as np
-from ballplate.simulator.computing import pinv, single_threaded
-from ballplate.simulator.design import Design, State, expected_readings
-from ballplate.simulator.estimation import Linearisation, linearise
+from ballplate.simulator.computing import pinv, single_threaded, svd
+from ballplate.simulator.estimation import Linearisation, estimate, linearise, linearised_fit
 from ballplate.simulator.machines import Array, Integers
 
 from .bias_patterns import patterns
-from .events import SLIP, Cause, all_directions, cause, event_groups
-from .remainders import HIDDEN, Columns, Leftover, leftover, orthonormal
-from .rivals import BELIEVED, LOG_ODDS_LIMIT, log_p
+from .events import ASSUMED, SLIP, Cause, all_directions, cause, event_groups
+from .hypotheses import CHAIN, Hypothesis, hypotheses
+from .remainders import HIDDEN, Columns, Explained, Leftover, leftover
 from .scatter import Scatter, log_chances, ratio, scatters, with_scatter
-from .smooth import Smooth, smooth_errors
-from .suspects import Diagnosis, MoreScatter, Suspect, Unexplained
-from .tails import log_chance, normal_equivalent
+from .tails import log_chance
 
-# Significance level of the whole search: half for gross errors, half for everything else.
+# Significance level of the whole search: half for single observations and events, half for
+# assumptions, terms of the model and noise.
 FAMILY = 0.01
 
-# Largest number of gross errors in a diagnosis.
+# Odds by which a cause must be more probable than each of the others to be named.
+LOG_ODDS_LIMIT = math.log(1000.0)
+
+# Stated uncertainties are accepted if the residuals without a cause have at least this p-value.
+BELIEVED = math.log(1e-2)
+
+# Largest number of causes.
 MOST = 10
 
 # Residuals of readings without noise, in standard uncertainties: rounding.
 ROUNDING = 1e-6
 
-# A direction with at most this remaining share equals one that was removed.
-SAME = 1e-3
+# Share of a hypothesis's direction that residuals must show; share below which it is part of
+# another one.
+SHOWN, SAME = 1e-6, 1e-3
 
 # p-values below which a position is one of several that expand together, and a direction one of a
 # cause's several.
 TOGETHER, DIRECTIONS = math.log(1e-4), math.log(1e-2)
 
-# p-value below which a smooth error explains more than a gross error that it contains.
+# p-value below which a smooth error explains more than a cause that it contains.
 CONTAINED = math.log(1e-2)
 
-# Residuals below this share of the stated uncertainties are not attributed to the model, a drift or
-# noise.
+# Residuals below this share of the stated uncertainties have no further cause.
 HARMLESS = 0.1
 
-# Standard uncertainties from which on a machine error is not one of the noise only.
-CLEAR_ERRORS = 10.0
+# Excess of the sum of squares, in variances, up to which another cause is not told apart.
+APART = 9.0
 
-# Squared standard deviations that bound the possible starts of a slip.
-RANGE = 9.0
+# Assumptions of which a failure explains nearly any residuals: it leaves nothing, or is none.
+WIDE_ASSUMED = (CHAIN, "reproducibility")
 
 # Steps of the estimate of some readings' standard deviation.
 WEIGHINGS = 4
 
 
+@dataclass(frozen=True)
+class Found:
+    """A cause: `columns` of the patterns, or a `hypothesis`, with its biases (n, k).
+
+    `log_p` and its `limit` are logarithms of p-values, `sigma` the root of the mean square of what
+    remains. `others` and `of_others` are causes not told apart from it. A slip came between the
+    readings `first` and `last`.
+    """
+
+    biases: Array
+    log_p: float
+    limit: float
+    columns: Integers = field(default_factory=lambda: np.zeros(0, np.int64))
+    hypothesis: Hypothesis | None = None
+    others: tuple[Integers, ...] = ()
+    of_others: tuple[Hypothesis, ...] = ()
+    first: int = -1
+    last: int = -1
+    sigma: float = math.nan
+
+    @property
+    def p_value(self) -> float:
+        """The p-value times the number of tests."""
+        return min(0.5 * FAMILY * math.exp(min(self.log_p - self.limit, 100.0)), 1.0)
+
+
 @single_threaded
-def diagnosis(at: Linearisation, x: Array, freedom: int, sigma_is_estimated: bool) -> Diagnosis:
-    """Search the residuals of a linearised fit for their cause; the estimate itself does not
-    change.
-
-    Causes are spaces of biases, tested to first order by the sum of squares that they explain: by
-    chi-squared if sigma is given and the remaining residuals are as stated, otherwise by Fisher's
-    F. The limits are Bonferroni's for `FAMILY`. A gross error is removed if it is clearly less
-    probable by chance than each smooth error and each increased noise, and the search is repeated.
-    If the remaining residuals show smooth errors, no gross error is named, unless all are less than
-    `HARMLESS` of the stated ones.
-    """
+def searched(at: Linearisation, x: Array, sigma_is_estimated: bool) -> Search | None:
+    """Return the finished search of a linearised fit's residuals; None without residuals."""
+    freedom = at.degrees_of_freedom
     if freedom < 3 or at.factor.sum_of_squares <= ROUNDING**2 * freedom:
-        return Diagnosis()
-    return Search(at, x, freedom, sigma_is_estimated).diagnosis()
-
-
-@dataclass(frozen=True)
-class _Event:
-    """The most significant event: logarithm of its p-value, and its patterns."""
-
-    log_p: float
-    columns: Integers
-
-
-@dataclass(frozen=True)
-class _Chosen:
-    """A cause: patterns, logarithm of the p-value, possible starts of a slip, equivalent causes
-    of its kind.
-    """
-
-    columns: Integers
-    log_p: float
-    range: tuple[int, int]
-    equivalents: tuple[tuple[int, ...], ...]
+        return None
+    return Search(at, x, sigma_is_estimated).run()
 
 
 class Search:
-    """All tests of a fit's residuals, after removal of the causes found so far."""
+    """All tests of a fit's residuals; after `run`, the causes `found`, one of the `model` that
+    explains the residuals instead, and readings with more noise.
+    """
 
-    def __init__(self, at: Linearisation, x: Array, freedom: int, sigma_is_estimated: bool) -> None:
-        self.design, self.state, self.x, self.estimated = at.design, at.state, x, sigma_is_estimated
-        # Noise slightly determines directions that the nominal design does not: functions
-        # of the noise itself, which would explain it.
-        self.drawn = linearise(at.design)
-        self.nominal = nominal = leftover(self.drawn, None, freedom)
-        events = patterns(at.design, self.drawn.state, None, every_start=True)
-        self.of_drawn = Columns(events.matrix, event_groups(events), nominal)
-        start = leftover(at, x, freedom)
-        # Rotations of a milliradian move readings by millimetres: smooth errors then show in
-        # directions that the nominal design hides, which noise itself does not determine.
-        variance = start.sum_of_squares / freedom if sigma_is_estimated else 1.0
-        u = at.of_shared(np.eye(len(at.layout))[at.layout.model])
-        is_clear = at.state.a**2 > CLEAR_ERRORS**2 * variance * u**2
-        machine = replace(self.drawn.state, a=np.where(is_clear, at.state.a, 0.0))
-        expected = _expected(at.design, machine)
-        linearised = linearise(at.design, machine, expected, self.drawn.spectrum)
-        shown = leftover(linearised, expected, freedom)
-        self.dimensions = [
-            basis_of(shown, smooth.columns).shape[1]
-            for smooth in smooth_errors(at.design, self.drawn.state)
-        ]
-        self.sum_of_squares, self.freedom = start.sum_of_squares, freedom
-        self._begin(start)
+    def __init__(
+        self, at: Linearisation, x: Array, sigma_is_estimated: bool, removed: Array | None = None
+    ) -> None:
+        """Begin a search; with biases `removed` already, wide ones, there are no further wide
+        causes.
+        """
+        self.at, self.design, self.state, self.x = at, at.design, at.state, x
+        self.estimated, self.is_last = sigma_is_estimated, removed is not None
+        self.found: list[Found] = []
+        self.model: Found | None = None
+        self.scatter: tuple[Scatter, float, Found] | None = None
+        start = leftover(at, x, at.degrees_of_freedom)
+        self._begin(start if removed is None else start.without(removed))
 
     def _begin(self, start: Leftover) -> None:
         self.left = self.start = start
-        self.width = start.common.shape[1]
         self.patterns = patterns(self.design, self.state, self.x, every_start=True)
         self.groups = event_groups(self.patterns)
-        self.columns = Columns(self.patterns.matrix, self.groups, start, self.of_drawn)
-        self.tests = max(self.columns.tests(), 1)
-        # Residuals are independent of the estimate, but not of the readings. Therefore directions
-        # are those at the readings that the estimate expects.
-        expected = _expected(self.design, self.state)
-        linearised = linearise(self.design, self.state, expected, self.drawn.spectrum)
-        self.expected = leftover(linearised, expected, start.freedom)
-        smooths = smooth_errors(self.design, self.state)
-        reduced = [
-            replace(smooth, columns=self.visible(smooth.columns, most))
-            for smooth, most in zip(smooths, self.dimensions, strict=True)
-        ]
-        self.smooth = [smooth for smooth in reduced if smooth.columns.shape[1]]
+        self.columns = Columns(self.patterns.matrix, self.groups, start)
+        self.hypotheses = list(hypotheses(self.design, self.state))
+        self.bases = [basis_of(start, each.biases) for each in self.hypotheses]
         self.scatters = scatters(self.design)
-        self.other_tests = max(len(self.smooth) + len(self.scatters), 1)
+        self.is_assumed = [
+            np.isin(self.patterns.kind[group[:, 0]], list(ASSUMED)) for group in self.groups
+        ]
+        shown = [self.columns.explained(n).dimensions > 0 for n in range(len(self.groups))]
+        each = list(zip(shown, self.is_assumed, strict=True))
+        single = sum(int((is_shown & ~assumed).sum()) for is_shown, assumed in each)
+        others = sum(int((is_shown & assumed).sum()) for is_shown, assumed in each)
+        others += len(self.scatters) + sum(basis.shape[1] > 0 for basis in self.bases)
+        self.tests = max(single, 1)
+        self.limit = math.log(0.5 * FAMILY / self.tests)
+        self.other_limit = math.log(0.5 * FAMILY / max(others, 1))
 
-    def visible(self, columns: Array, most: int) -> Array:
-        """Return a basis (n, q) of what residuals show of biases (n, k), in `most` directions."""
-        return basis_of(self.start, basis_of(self.expected, columns, most))
+    def log_p(self, square: float, dimensions: float, left: Leftover) -> float:
+        """Return the logarithm of the p-value of a sum of squares in some `dimensions`."""
+        total, freedom = left.sum_of_squares, left.freedom
+        if dimensions <= 0 or freedom - dimensions < 1:
+            return 0.0
+        rest = float(log_chance(total - square, total, freedom - dimensions, freedom, True))
+        by_size = not self.estimated and rest > BELIEVED
+        return float(log_chance(square, total, dimensions, freedom, by_size))
 
-    @property
-    def limit(self) -> float:
-        """Logarithm of the significance level of a gross error."""
-        return math.log(0.5 * FAMILY / self.tests)
+    def _log_p_of(self, basis: Array, left: Leftover) -> float:
+        """Return the logarithm of the p-value of an orthonormal basis (n, q)."""
+        return self.log_p(float(((basis.T @ left.residual) ** 2).sum()), basis.shape[1], left)
 
-    @property
-    def other_limit(self) -> float:
-        """Logarithm of the significance level of any other cause."""
-        return math.log(0.5 * FAMILY / self.other_tests)
+    def _given(self, removed: Array, biases: Array) -> float:
+        """Return the logarithm of the p-value of biases (n, k) after removal of others."""
+        left = self.left.without(removed)
+        return self._log_p_of(basis_of(left, biases), left)
 
-    def diagnosis(self) -> Diagnosis:
-        """Search until no further gross error is significant."""
-        chosen: list[_Chosen] = []
-        scatter = None
-        while True:
-            event = self._best_event()
-            smooth = self._smooth_chances(event)
-            of_each_scatter = log_chances(self.scatters, self.left, self.estimated)
-            of_smooth, of_scatter = (
-                float(smooth.min(initial=0.0)),
-                float(of_each_scatter.min(initial=0.0)),
-            )
-            alternative = min(of_smooth, of_scatter)
-            significant = event.log_p < self.limit and len(chosen) < MOST and self.left.freedom >= 3
-            if significant and event.log_p < alternative - LOG_ODDS_LIMIT:
-                columns = self._testable(self._with_other_directions(self._together(event.columns)))
-                chosen.append(
-                    _Chosen(columns, event.log_p, self._range(columns), self._equivalents(columns))
-                )
-                self._remove(columns)
-            elif self.left.sum_of_squares < HARMLESS**2 * self.left.freedom:
-                return Diagnosis(tuple(self._suspects(chosen)), scatter)
-            elif scatter is None and of_scatter < min(self.other_limit, of_smooth - LOG_ODDS_LIMIT):
-                noisiest, limit = self.scatters[int(of_each_scatter.argmin())], self.other_limit
-                times = self._weigh(noisiest)
-                scatter = MoreScatter(
-                    self.design,
-                    noisiest,
-                    times,
-                    normal_equivalent(of_scatter),
-                    normal_equivalent(limit),
-                )
-                for earlier in chosen:
-                    self._remove(earlier.columns)
-            elif alternative < self.other_limit:
-                words = (
-                    self.smooth[int(smooth.argmin())].words if of_smooth < self.other_limit else ""
-                )
-                return Diagnosis(
-                    (), scatter, self._unexplained(words, alternative, self.other_limit)
-                )
-            elif significant:
-                return Diagnosis((), scatter, self._unexplained("", event.log_p, self.limit))
-            else:
-                return Diagnosis(tuple(self._suspects(chosen)), scatter)
+    def chances(self) -> Array:
+        """Return logarithms of the p-values (h,) of all hypotheses."""
+        return np.array([self._log_p_of(self._remaining(basis), self.left) for basis in self.bases])
 
-    def _unexplained(self, words: str, log_p: float, limit: float) -> Unexplained:
-        """Return the statement on residuals that no gross error explains, before any weighing."""
-        total, freedom = self.sum_of_squares, self.freedom
-        too_large = float(log_chance(total, total, freedom, freedom, True)) < BELIEVED
-        statistics = normal_equivalent(log_p), normal_equivalent(limit)
-        return Unexplained(words, math.sqrt(total / freedom), too_large, *statistics)
-
-    def log_p(self, square: float, dimensions: float, remainder: Leftover) -> float:
-        """Return the logarithm of the p-value of a sum of squares among the residuals
-        `remainder`.
+    def best_event_chance(self, is_chosen: Callable[[str], bool]) -> tuple[float, int]:
+        """Return the smallest logarithm of the p-values of events of some kinds, and their
+        number.
         """
-        total, freedom = remainder.sum_of_squares, remainder.freedom
-        return log_p(square, dimensions, total, freedom, self.estimated)
-
-    def _best_event(self) -> _Event:
-        """Return the event with the smallest p-value; of equal ones, the first."""
-        best = _Event(0.0, np.zeros(0, np.int64))
+        best, count = 0.0, 0
         total, freedom = self.left.sum_of_squares, self.left.freedom
+        kinds = {kind: is_chosen(kind) for kind in np.unique(self.patterns.kind).tolist()}
         for number, group in enumerate(self.groups):
             explained = self.columns.explained(number)
-            log_chances_of_group = log_chance(
-                explained.square, total, explained.dimensions, freedom, False
-            )
-            best_index = int(
-                np.flatnonzero(log_chances_of_group <= log_chances_of_group.min() * (1.0 - 1e-9))[0]
-            )
-            found = self.log_p(
-                explained.square[best_index], explained.dimensions[best_index], self.left
-            )
-            if found < best.log_p * (1.0 + 1e-9):
-                best = _Event(found, group[best_index])
-        return best
-
-    def _smooth_chances(self, event: _Event) -> Array:
-        """Return logarithms of the p-values (k,) of all smooth errors as alternatives to an event.
-
-        A smooth error that contains the event is an alternative only if it explains more than the
-        event.
-        """
-        event_basis = basis_of(self.left, self._dense(event.columns))
-        chances = np.zeros(len(self.smooth))
-        for k, smooth in enumerate(self.smooth):
-            basis = further_basis(self.left, smooth.columns, self.width)
-            chances[k] = self.log_p(*explained_by(self.left, basis), self.left)
-            beyond = event_basis - basis @ (basis.T @ event_basis)
-            if event_basis.shape[1] and (beyond**2).sum() <= SAME:
-                further_log_p = self._conditional(event.columns, basis)
-                chances[k] = min(chances[k], event.log_p) if further_log_p < CONTAINED else 0.0
-        return chances
-
-    def _is_part(self, smooth: Smooth, columns: Integers) -> bool:
-        """Return whether a smooth error is merely a cause in one of its directions."""
-        if smooth.columns.shape[1] > len(columns):
-            return False
-        cause_basis = basis_of(self.start, self._dense(columns))
-        remainder = smooth.columns - cause_basis @ (cause_basis.T @ smooth.columns)
-        return bool(((remainder**2).sum(axis=0) <= SAME).all())
+            chosen = np.array([kinds[kind] for kind in self.patterns.kind[group[:, 0]].tolist()])
+            chosen &= explained.dimensions > 0
+            if chosen.any():
+                square, dimensions = explained.square[chosen], explained.dimensions[chosen]
+                k = int(log_chance(square, total, dimensions, freedom, False).argmin())
+                best = min(best, self.log_p(square[k], dimensions[k], self.left))
+                count += int(chosen.sum())
+        return best, count
 
     def _dense(self, columns: Integers) -> Array:
         return self.patterns.matrix[:, columns].toarray()
 
-    def _remove(self, columns: Integers) -> None:
-        self.left = self.left.without(self._dense(columns))
-        self.columns.update(self.left)
+    def _remaining(self, basis: Array) -> Array:
+        """Return the part of a basis orthogonal to what was removed."""
+        removed = self.left.common[:, self.start.common.shape[1] :]
+        if not removed.shape[1]:
+            return basis
+        return orthonormal(basis - removed @ (removed.T @ basis))
 
-    def _weigh(self, scatter: Scatter) -> float:
-        """Estimate the noise of some readings, restart with their weights, and return the ratio
-        to the stated noise.
+    def run(self) -> Search:
+        """Search until no further cause is significant, and return the search that ended."""
+        while True:
+            event = self._best_event()
+            bases = [self._remaining(basis) for basis in self.bases]
+            chances = np.array([self._log_p_of(basis, self.left) for basis in bases])
+            named = np.array([bool(each.parameters) for each in self.hypotheses])
+            candidate = self._best_candidate(event, chances, named)
+            wide = self._wide(candidate, bases, np.where(named, 0.0, chances))
+            noise = log_chances(self.scatters, self.left, self.estimated)
+            of_wide, of_noise = float(wide.min(initial=0.0)), float(noise.min(initial=0.0))
+            is_clear = candidate.log_p < min(of_wide, of_noise) - LOG_ODDS_LIMIT
+            significant = candidate.log_p < candidate.limit
+            if significant and is_clear and len(self.found) < MOST and self.left.freedom >= 3:
+                self._take(candidate, bases, chances, named)
+            elif self.left.sum_of_squares < HARMLESS**2 * self.left.freedom:
+                return self
+            elif self.scatter is None and of_noise < min(
+                self.other_limit, of_wide - LOG_ODDS_LIMIT
+            ):
+                self._weigh(self.scatters[int(noise.argmin())], of_noise)
+            elif of_wide < self.other_limit:
+                return self._end_with_wide(bases, wide)
+            elif significant or of_noise < self.other_limit:
+                return self._unexplained(None, min(candidate.log_p, of_noise))
+            else:
+                return self
+
+    def _best_candidate(self, event: Found, chances: Array, named: Array) -> Found:
+        """Return the event, or a hypothesis of few parameters that is more probable."""
+        k = int(np.argmin(np.where(named, chances, 0.0))) if named.any() else -1
+        if k < 0 or not chances[k] < min(self.other_limit, event.log_p - 0.5 * LOG_ODDS_LIMIT):
+            return event
+        each = self.hypotheses[k]
+        return Found(each.biases, float(chances[k]), self.other_limit, hypothesis=each)
+
+    def _best_event(self) -> Found:
+        """Return the event with the smallest p-value beyond its limit; of equal ones, the first."""
+        best, columns = (0.0, self.limit), np.zeros(0, np.int64)
+        total, freedom = self.left.sum_of_squares, self.left.freedom
+        for number, group in enumerate(self.groups):
+            explained = self.columns.explained(number)
+            chances = log_chance(explained.square, total, explained.dimensions, freedom, False)
+            limits = np.where(self.is_assumed[number], self.other_limit, self.limit)
+            excess = chances - limits
+            tolerance = 1e-9 * float(np.abs(chances).max(initial=0.0))
+            k = int(np.flatnonzero(excess <= excess.min() + tolerance)[0])
+            found = self.log_p(explained.square[k], explained.dimensions[k], self.left)
+            if found - limits[k] < best[0] - best[1] - 1e-9 * abs(found):
+                best, columns = (found, float(limits[k])), group[k]
+        return Found(self._dense(columns), *best, columns)
+
+    def _wide(self, candidate: Found, bases: list[Array], chances: Array) -> Array:
+        """Return logarithms of the p-values (h,) of wide hypotheses as alternatives to a candidate.
+
+        One that contains the candidate is an alternative only if it explains more.
         """
-        times, stated_design, remainder = 1.0, self.design, self.left
-        for _ in range(WEIGHINGS):
-            times *= ratio(remainder, scatter.rows)
-            self.design = with_scatter(stated_design, scatter, times)
-            linearised = linearise(self.design, self.state, self.x, self.drawn.spectrum)
-            remainder = leftover(linearised, self.x, self.start.freedom)
-        self._begin(remainder)
-        return times
+        if candidate.log_p >= candidate.limit:
+            return chances
+        own, chances = basis_of(self.left, candidate.biases), chances.copy()
+        for k in np.flatnonzero(chances < 0.0).tolist():
+            if own.shape[1] and _is_within(own, bases[k]):
+                explains_more = self._given(candidate.biases, bases[k]) < CONTAINED
+                chances[k] = min(chances[k], candidate.log_p) if explains_more else 0.0
+        return chances
 
-    def _conditional(self, removed: Integers, biases: Array) -> float:
-        """Return the logarithm of the p-value of biases (n, k) after removal of some patterns."""
-        remainder = self.left.without(self._dense(removed))
-        return self.log_p(*explained_by(remainder, basis_of(remainder, biases)), remainder)
+    def _take(self, candidate: Found, bases: list[Array], chances: Array, named: Array) -> None:
+        """Enter a cause with those not told apart from it, and remove it."""
+        if candidate.hypothesis is None:
+            columns = self._with_other_directions(self._together(candidate.columns))
+            candidate = replace(candidate, columns=columns, biases=self._dense(columns))
+        basis = basis_of(self.left, candidate.biases)
+        # Wide hypotheses, not those that contain the cause, without which it is not significant.
+        others = [
+            self.hypotheses[k]
+            for k in np.flatnonzero((chances < self.other_limit) & ~named).tolist()
+            if not _is_within(basis, bases[k]) and self._given(bases[k], basis) >= candidate.limit
+        ]
+        within = basis if candidate.hypothesis is None else basis[:, :0]
+        others += [
+            each
+            for each, one in zip(self.hypotheses, bases, strict=True)
+            if 0 < one.shape[1] <= within.shape[1] and _is_within(one, within)
+        ]
+        if candidate.hypothesis is not None:
+            near = chances < candidate.log_p + 0.5 * APART
+            others += [
+                each
+                for each, one, is_near in zip(self.hypotheses, bases, near, strict=True)
+                if is_near and one.shape[1] <= basis.shape[1] and each is not candidate.hypothesis
+            ]
+        unique = {each.words: each for each in others}
+        candidate = replace(candidate, of_others=tuple(unique.values()))
+        self._remove(self._not_told_apart(candidate, basis))
+
+    def _remove(self, found: Found) -> None:
+        self.left = self.left.without(found.biases)
+        self.columns.update(self.left)
+        sigma = math.sqrt(self.left.sum_of_squares / max(self.left.freedom, 1))
+        self.found.append(replace(found, sigma=sigma))
+
+    def _not_told_apart(self, found: Found, basis: Array) -> Found:
+        """Return a cause with the events of no more dimensions that explain nearly as much, and
+        with the range of a slip.
+        """
+        square = float(((basis.T @ self.left.residual) ** 2).sum())
+        freedom = self.left.freedom - basis.shape[1]
+        variance = (self.left.sum_of_squares - square) / max(freedom, 1) if self.estimated else 1.0
+        own = cause(self.patterns, found.columns) if len(found.columns) else None
+        slip = own if own and own.kind == "slip" else None
+        starts, others = [slip.start] if slip else [], dict[Cause, Integers]()
+        for number, group in enumerate(self.groups):
+            explained: Explained = self.columns.explained(number)
+            near = (explained.square >= square - APART * variance) & (explained.dimensions > 0)
+            near &= explained.dimensions <= basis.shape[1]
+            for row in group[near]:
+                other = cause(self.patterns, row)
+                if slip and other.kind == "slip" and other.subjects == slip.subjects:
+                    starts.append(other.start)
+                elif other != own:
+                    others.setdefault(other, row)
+            if slip and self.patterns.kind[group[0, 0]] in SLIP:
+                here = self.patterns.subject[group[:, 0]] == slip.subjects[0]
+                if group.shape[1] == len(found.columns):
+                    best = explained.square[here].max() - APART * variance
+                    some = group[here & (explained.square >= best), 0]
+                    starts += self.patterns.start[some].tolist()
+        found = replace(found, others=tuple(others.values()))
+        return replace(found, first=min(starts), last=max(starts)) if slip else found
 
     def _together(self, columns: Integers) -> Integers:
         """Return those of several expanding positions, or distances in error, that are
@@ -289,7 +322,7 @@ class Search:
         """
         while len(columns) > 1 and self.patterns.kind[columns[0]] in ("expansion", "distance"):
             chances = [
-                self._conditional(np.delete(columns, k), self._dense(columns[[k]]))
+                self._given(self._dense(np.delete(columns, k)), self._dense(columns[[k]]))
                 for k in range(len(columns))
             ]
             worst = int(np.argmax(chances))
@@ -301,146 +334,133 @@ class Search:
     def _with_other_directions(self, columns: Integers) -> Integers:
         """Return a cause in all its directions if the others explain more."""
         every = all_directions(self.patterns, columns)
-        if len(every) == len(columns):
-            return columns
-        return every if self._conditional(columns, self._dense(every)) < DIRECTIONS else columns
+        is_wider = len(every) > len(columns)
+        if is_wider and self._given(self._dense(columns), self._dense(every)) < DIRECTIONS:
+            return every
+        return columns
 
-    def _testable(self, columns: Integers) -> Integers:
-        """Return the directions of a cause that show separately, the most visible one first."""
-        if len(columns) == 1:
-            return columns
-        dense = self._dense(columns)
-        size = np.linalg.norm(dense, axis=0)
-        size[size == 0.0] = 1.0
-        remainder, is_chosen = self.left.of(dense / size), np.zeros(len(columns), bool)
-        while True:
-            share = np.where(is_chosen, 0.0, (remainder**2).sum(axis=0))
-            most = int(np.flatnonzero(share >= share.max() * (1.0 - 1e-6))[0])
-            if share[most] <= HIDDEN:
-                return columns[is_chosen]
-            is_chosen[most] = True
-            unit = remainder[:, most] / np.sqrt(share[most])
-            remainder = remainder - unit[:, None] * (unit @ remainder)
+    def _weigh(self, scatter: Scatter, log_p: float) -> None:
+        """Estimate the noise of some readings, and restart with their weights."""
+        times, stated, remainder = 1.0, self.design, self.left
+        for _ in range(WEIGHINGS):
+            times *= ratio(remainder, scatter.rows)
+            self.design = with_scatter(stated, scatter, times)
+            linearised = linearise(self.design, self.state, self.x, self.at.spectrum)
+            remainder = leftover(linearised, self.x, self.start.freedom)
+        limit, earlier = self.other_limit, self.found
+        self._begin(remainder)
+        sigma = math.sqrt(remainder.sum_of_squares / remainder.freedom)
+        none = np.zeros((len(remainder.residual), 0))
+        self.scatter = scatter, times, Found(none, log_p, limit, sigma=sigma)
+        self.found = []
+        by_words = {each.words: each.biases for each in self.hypotheses}
+        for each in earlier:
+            words = each.hypothesis.words if each.hypothesis else ""
+            self._remove(replace(each, biases=by_words.get(words, self._dense(each.columns))))
 
-    def _range(self, columns: Integers) -> tuple[int, int]:
-        """Return the first and last reading before which a slip may have come, -1 without a
-        slip.
+    def _unexplained(self, hypothesis: Hypothesis | None, log_p: float) -> Search:
+        """Return this search, which ends with residuals that no cause explains but, if known, terms
+        of the model.
         """
-        slip = cause(self.patterns, columns)
-        if slip.kind != "slip":
-            return -1, -1
-        all_patterns, wide = self.patterns, len(all_directions(self.patterns, columns))
-        is_slip = np.isin(all_patterns.kind, SLIP)
-        number = next(
-            k for k, one in enumerate(self.groups) if one.shape[1] == wide and is_slip[one[0]].all()
-        )
-        group = self.groups[number]
-        starts_here = np.flatnonzero(all_patterns.subject[group[:, 0]] == slip.subjects[0])
-        square = self.columns.explained(number).square[starts_here]
-        # The range has all starts that leave at most `RANGE` variances more than the best.
-        variance = (
-            (self.left.sum_of_squares - square.max()) / self.left.freedom if self.estimated else 1.0
-        )
-        starts = all_patterns.start[
-            group[starts_here[square >= square.max() - RANGE * variance], 0]
+        self.found = []
+        none = np.zeros((len(self.left.residual), 0))
+        self.model = Found(none, log_p, self.other_limit, hypothesis=hypothesis)
+        return self
+
+    def _end_with_wide(self, bases: list[Array], chances: Array) -> Search:
+        """Return the search that ends with a wide hypothesis: that of what another chain or
+        displacements leave, if that is nothing wide, or this one, with terms of the model.
+        """
+        best = int(chances.argmin())
+        some = np.flatnonzero(chances < self.other_limit).tolist()
+        same = [
+            k for k in some if k == best or self._given(bases[k], bases[best]) >= self.other_limit
         ]
-        return min(int(starts.min()), slip.start), max(int(starts.max()), slip.start)
+        named = [k for k in same if self.hypotheses[k].assumed in WIDE_ASSUMED]
+        if named and not self.is_last:
+            k = min(named, key=lambda k: float(chances[k]))
+            widest = max(bases[best].shape[1], bases[k].shape[1])
+            others = [j for j in same if j != k and bases[j].shape[1] <= widest]
+            is_chain = self.hypotheses[k].assumed == CHAIN
+            if is_chain:
+                k, *chains = self._best_chains(some) or [k]
+                others = chains + [j for j in others if self.hypotheses[j].assumed != CHAIN]
+            found = Found(
+                self.hypotheses[k].biases[:, :0],
+                float(chances[k]),
+                self.other_limit,
+                hypothesis=self.hypotheses[k],
+                of_others=tuple(self.hypotheses[j] for j in others),
+            )
+            rest = self._without(self.hypotheses[k])
+            # Displacements leave nothing; another chain at most single causes.
+            is_explained = rest is not None and rest.model is None
+            if rest and is_explained and (is_chain or not (rest.found or rest.scatter)):
+                sigma = math.sqrt(rest.start.sum_of_squares / max(rest.start.freedom, 1))
+                rest.found.insert(0, replace(found, sigma=sigma))
+                return rest
+        return self._unexplained(self.hypotheses[best], float(chances[best]))
 
-    def _equivalents(self, columns: Integers) -> tuple[tuple[int, ...], ...]:
-        """Return groups of distances of other balls that explain as much as the given distances
-        of one ball.
+    def _without(self, hypothesis: Hypothesis) -> Search | None:
+        """Return the finished search of what a wide hypothesis leaves; None without a fit."""
+        at, removed = self.at, hypothesis.biases
+        if hypothesis.design is not None:
+            solution = estimate(hypothesis.design, self.x)
+            if solution.status != "converged":
+                return None
+            at, removed = linearised_fit(hypothesis.design, solution), removed[:, :0]
+        return Search(at, self.x, self.estimated, removed).run()
+
+    def _best_chains(self, some: list[int]) -> list[int]:
+        """Return the other chains that fit best, with those that are not clearly worse."""
+        fits = []
+        for k in some:
+            design = self.hypotheses[k].design
+            if design is not None:
+                solution = estimate(design, self.x)
+                if solution.status == "converged":
+                    fits.append((solution.factor.sum_of_squares, k))
+        if not fits:
+            return []
+        least = min(fits)[0]
+        variance = max(least / self.start.freedom, 1.0) if self.estimated else 1.0
+        most = least + 2.0 * LOG_ODDS_LIMIT * variance
+        return [k for square, k in sorted(fits) if square <= most]
+
+    def sizes(self) -> Iterator[tuple[Array, Array]]:
+        """Yield the sizes (k,) of each cause with standard uncertainties (k,), estimated together;
+        none of a wide one.
         """
-        if len(columns) == 1 or self.patterns.kind[columns[0]] != "distance":
-            return ()
-        equivalents, dense = [], self._dense(columns)
-        for group in self.groups:
-            if group.shape[1] > 1 and self.patterns.kind[group[0, 0]] == "distance":
-                candidates = (row for row in group if not np.array_equal(row, columns))
-                equivalents += [
-                    tuple(row.tolist())
-                    for row in candidates
-                    if self._conditional(row, dense) > CONTAINED
-                ]
-        return tuple(equivalents)
-
-    def _suspects(self, chosen: list[_Chosen]) -> Iterator[Suspect]:
-        """Return the suspects with their sizes, estimated together."""
-        if not chosen:
-            return
-        sigma = math.sqrt(self.left.sum_of_squares / self.left.freedom) if self.estimated else 1.0
-        matrix = self._dense(np.concatenate([cause_found.columns for cause_found in chosen]))
+        none = self.start.common[:, :0]
+        matrix = np.concatenate([none, *(found.biases for found in self.found)], axis=1)
         size = np.linalg.norm(matrix, axis=0)
+        size[size == 0.0] = 1.0
         inverse = pinv(self.start.of(matrix / size), rcond=HIDDEN)
+        left = self.left
+        sigma = math.sqrt(left.sum_of_squares / left.freedom) if self.estimated else 1.0
         values = inverse @ self.start.residual / size
         uncertainties = sigma * np.linalg.norm(inverse, axis=1) / size
-        first_row = 0
-        for cause_found in chosen:
-            rows = slice(first_row, first_row + len(cause_found.columns))
-            first_row = rows.stop
-            yield Suspect(
-                self.patterns,
-                cause_found.columns,
-                values[rows],
-                uncertainties[rows],
-                normal_equivalent(cause_found.log_p),
-                normal_equivalent(self.limit),
-                tuple(
-                    dict.fromkeys(
-                        [*self._alternatives(cause_found.columns), *cause_found.equivalents]
-                    )
-                ),
-                tuple(
-                    dict.fromkeys(
-                        smooth.words
-                        for smooth in self.smooth
-                        if self._is_part(smooth, cause_found.columns)
-                    )
-                ),
-                *cause_found.range,
-            )
-
-    def _alternatives(self, columns: Integers) -> tuple[tuple[int, ...], ...]:
-        """Return patterns of other causes that leave the same residuals."""
-        own_cause = cause(self.patterns, columns)
-        alternatives: dict[Cause, tuple[int, ...]] = {}
-        self.columns.update(self.start)
-        before = self.columns.information
-        every = all_directions(self.patterns, columns)
-        for removed in [columns] if len(every) == len(columns) else [columns, every]:
-            self.columns.update(self.start.without(self._dense(removed)))
-            is_gone = (self.columns.information <= SAME * before) & (before > 0.0)
-            for group in self.groups:
-                if group.shape[1] != len(removed):
-                    continue
-                for row in group[is_gone[group].all(axis=1)]:
-                    alternative = cause(self.patterns, row)
-                    if alternative != own_cause:
-                        alternatives.setdefault(alternative, tuple(row.tolist()))
-        return tuple(alternatives.values())
+        start = 0
+        for found in self.found:
+            end = start + found.biases.shape[1]
+            yield values[start:end], uncertainties[start:end]
+            start = end
 
 
-def _expected(design: Design, state: State) -> Array:
-    """Return the scale readings (m, d) that a state lets expect, with its machine errors."""
-    offsets = state.probes[design.readings.probe]
-    x = expected_readings(design, state, design.readings)
-    return x + offsets - design.model.error(x, state.a, offsets)
+def orthonormal(remainder: Array) -> Array:
+    """Return an orthonormal basis (n, q) of what is shown of unit columns (n, k)."""
+    u, values, _ = svd(remainder, full_matrices=False)
+    return u[:, values**2 > SHOWN]
 
 
-def basis_of(remainder: Leftover, columns: Array, most: int | None = None) -> Array:
-    """Return an orthonormal basis (n, q) of the remainder of columns (n, k), as `orthonormal`."""
-    return orthonormal(remainder.of(columns), np.linalg.norm(columns, axis=0), most)
+def basis_of(remainder: Leftover, columns: Array) -> Array:
+    """Return an orthonormal basis (n, q) of the remainder of columns (n, k)."""
+    size = np.linalg.norm(columns, axis=0)
+    use = size > 0.0
+    return orthonormal(remainder.of(columns[:, use] / size[use]))
 
 
-def further_basis(remainder: Leftover, basis: Array, since: int) -> Array:
-    """Return the part of an orthonormal basis orthogonal to all removed columns but the first
-    `since`.
-    """
-    later = remainder.common[:, since:]
-    if not later.shape[1]:
-        return basis
-    return orthonormal(basis - later @ (later.T @ basis), np.ones(basis.shape[1]))
-
-
-def explained_by(remainder: Leftover, basis: Array) -> tuple[float, float]:
-    """Return the sum of squares that an orthonormal `basis` (n, q) explains, and its dimensions."""
-    return float(((basis.T @ remainder.residual) ** 2).sum()), float(basis.shape[1])
+def _is_within(inner: Array, outer: Array) -> bool:
+    """Return whether an orthonormal basis is within another one."""
+    beyond = inner - outer @ (outer.T @ inner)
+    return bool(((beyond**2).sum(axis=0) <= SAME).all())

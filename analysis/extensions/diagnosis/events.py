@@ -17,6 +17,13 @@ BY_AXIS: tuple[str, ...] = ("reading", "end", "ball", "moved", "probe")
 # Largest number of certified distances of one ball in a group.
 MOST_DISTANCES = 12
 
+# What is assumed of kinds of patterns that act on more than an observation or event.
+ASSUMED = {
+    "probe": "tips",
+    "scale": "certificates",
+    "expansion": "temperature of artefacts",
+}
+
 SLIP: tuple[str, ...] = ("shift", "turn")
 
 

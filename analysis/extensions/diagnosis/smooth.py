@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import product
 
 import numpy as np
@@ -11,9 +11,6 @@ from ballplate.simulator.design import Design, State, locations, rotation_sensit
 from ballplate.simulator.geometry import AXIS_NAMES
 from ballplate.simulator.machines import Array
 from numpy.polynomial import legendre
-
-from .bias_patterns import LinearisedDesign
-from .hat import row_count
 
 # Scale readings closer than this (m) are at the same location.
 SAME_PLACE = 1e-3
@@ -33,20 +30,10 @@ DRIFT = 6
 Displacements = Iterator[tuple[str, Array]]
 
 
-@dataclass(frozen=True)
-class Smooth:
-    """Biases (rows, k) that together are one smooth error, with its description; `is_drift` in
-    time.
+def smooth_errors(design: Design, state: State) -> Iterator[tuple[str, Array, bool]]:
+    """Return all smooth errors to search, at a state: a description, displacements (readings, d, k)
+    of all readings, and whether they are those of a drift.
     """
-
-    words: str
-    columns: Array
-    is_drift: bool
-
-
-def smooth_errors(design: Design, state: State) -> Iterator[Smooth]:
-    """Return all smooth errors to search, at a state."""
-    linearised = LinearisedDesign(design, state, None)
     # Not at the readings themselves: if they are at few locations on a scale, functions of their
     # noise would explain it.
     drawn = replace(state, balls=design.balls.places)
@@ -54,7 +41,7 @@ def smooth_errors(design: Design, state: State) -> Iterator[Smooth]:
     scales = locations(design, drawn, readings) - state.probes[readings.probe]
     for build in (_on_scales, _along_axes, _of_probes, _in_space, _in_time):
         for words, displacement in build(design, state, scales):
-            yield Smooth(words, rows_of(linearised, displacement), build is _in_time)
+            yield words, displacement, build is _in_time
 
 
 def _on_scales(design: Design, state: State, x: Array) -> Displacements:
@@ -156,17 +143,3 @@ def _in_all_directions(values: Array, d: int) -> Array:
     for axis in range(d):
         displacements[:, axis, axis] = values
     return displacements.reshape(len(values), d, -1)
-
-
-def rows_of(linearised: LinearisedDesign, displacement: Array) -> Array:
-    """Return biases (rows, k) of all observations by displacements (readings, d, k) of all
-    readings.
-    """
-    k = displacement.shape[2]
-    biases = np.zeros((row_count(linearised.design), k))
-    white = linearised.weight[:, :, None] * displacement[linearised.chosen]
-    biases[linearised.places["reading"]] = white.reshape(linearised.weight.size, k)
-    biases[linearised.places["length"]] = linearised.white.whitened(
-        linearised.along_lengths(displacement)
-    )
-    return biases
