@@ -14,7 +14,7 @@ from ballplate.simulator.machines.protocol import Array
 from ballplate.simulator.maps.fit_verdict import LackOfFit
 
 
-class Finding(Protocol):
+class NamedCause(Protocol):
     """A cause: one of an observation if it `is_gross`, in `words`."""
 
     @property
@@ -32,7 +32,7 @@ class Suspicion(Protocol):
     """
 
     @property
-    def findings(self) -> Sequence[Finding]: ...
+    def findings(self) -> Sequence[NamedCause]: ...
 
     @property
     def gross_errors(self) -> int: ...

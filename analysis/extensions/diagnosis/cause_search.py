@@ -17,7 +17,7 @@ from ballplate.simulator.machines import Array, Integers
 
 from .bias_patterns import patterns
 from .events import ASSUMED, SLIP, Cause, all_directions, cause, event_groups
-from .hypotheses import CHAIN, Hypothesis, hypotheses
+from .hypotheses import CHAIN, PossibleCause, hypotheses
 from .remainders import HIDDEN, Columns, Explained, Leftover, leftover
 from .scatter import Scatter, log_chances, ratio, scatters, with_scatter
 from .tails import log_chance
@@ -63,7 +63,7 @@ WEIGHINGS = 4
 
 
 @dataclass(frozen=True)
-class Found:
+class FoundCause:
     """A cause: `columns` of the patterns, or a `hypothesis`, with its biases (n, k).
 
     `log_p` and its `limit` are logarithms of p-values, `sigma` the root of the mean square of what
@@ -75,9 +75,9 @@ class Found:
     log_p: float
     limit: float
     columns: Integers = field(default_factory=lambda: np.zeros(0, np.int64))
-    hypothesis: Hypothesis | None = None
+    hypothesis: PossibleCause | None = None
     others: tuple[Integers, ...] = ()
-    of_others: tuple[Hypothesis, ...] = ()
+    of_others: tuple[PossibleCause, ...] = ()
     first: int = -1
     last: int = -1
     sigma: float = math.nan
@@ -110,9 +110,9 @@ class Search:
         """
         self.at, self.design, self.state, self.x = at, at.design, at.state, x
         self.estimated, self.is_last = sigma_is_estimated, removed is not None
-        self.found: list[Found] = []
-        self.model: Found | None = None
-        self.scatter: tuple[Scatter, float, Found] | None = None
+        self.found: list[FoundCause] = []
+        self.model: FoundCause | None = None
+        self.scatter: tuple[Scatter, float, FoundCause] | None = None
         start = leftover(at, x, at.degrees_of_freedom)
         self._begin(start if removed is None else start.without(removed))
 
@@ -214,15 +214,15 @@ class Search:
             else:
                 return self
 
-    def _best_candidate(self, event: Found, chances: Array, named: Array) -> Found:
+    def _best_candidate(self, event: FoundCause, chances: Array, named: Array) -> FoundCause:
         """Return the event, or a hypothesis of few parameters that is more probable."""
         k = int(np.argmin(np.where(named, chances, 0.0))) if named.any() else -1
         if k < 0 or not chances[k] < min(self.other_limit, event.log_p - 0.5 * LOG_ODDS_LIMIT):
             return event
         each = self.hypotheses[k]
-        return Found(each.biases, float(chances[k]), self.other_limit, hypothesis=each)
+        return FoundCause(each.biases, float(chances[k]), self.other_limit, hypothesis=each)
 
-    def _best_event(self) -> Found:
+    def _best_event(self) -> FoundCause:
         """Return the event with the smallest p-value beyond its limit; of equal ones, the first."""
         best, columns = (0.0, self.limit), np.zeros(0, np.int64)
         total, freedom = self.left.sum_of_squares, self.left.freedom
@@ -236,9 +236,9 @@ class Search:
             found = self.log_p(explained.square[k], explained.dimensions[k], self.left)
             if found - limits[k] < best[0] - best[1] - 1e-9 * abs(found):
                 best, columns = (found, float(limits[k])), group[k]
-        return Found(self._dense(columns), *best, columns)
+        return FoundCause(self._dense(columns), *best, columns)
 
-    def _wide(self, candidate: Found, bases: list[Array], chances: Array) -> Array:
+    def _wide(self, candidate: FoundCause, bases: list[Array], chances: Array) -> Array:
         """Return logarithms of the p-values (h,) of wide hypotheses as alternatives to a candidate.
 
         One that contains the candidate is an alternative only if it explains more.
@@ -252,42 +252,50 @@ class Search:
                 chances[k] = min(chances[k], candidate.log_p) if explains_more else 0.0
         return chances
 
-    def _take(self, candidate: Found, bases: list[Array], chances: Array, named: Array) -> None:
+    def _take(
+        self, candidate: FoundCause, bases: list[Array], chances: Array, named: Array
+    ) -> None:
         """Enter a cause with those not told apart from it, and remove it."""
         if candidate.hypothesis is None:
             columns = self._with_other_directions(self._together(candidate.columns))
             candidate = replace(candidate, columns=columns, biases=self._dense(columns))
         basis = basis_of(self.left, candidate.biases)
-        # Wide hypotheses, not those that contain the cause, without which it is not significant.
         others = [
-            self.hypotheses[k]
-            for k in np.flatnonzero((chances < self.other_limit) & ~named).tolist()
-            if not _is_within(basis, bases[k]) and self._given(bases[k], basis) >= candidate.limit
-        ]
-        within = basis if candidate.hypothesis is None else basis[:, :0]
-        others += [
             each
-            for each, one in zip(self.hypotheses, bases, strict=True)
-            if 0 < one.shape[1] <= within.shape[1] and _is_within(one, within)
+            for each, one, log_p, is_named in zip(
+                self.hypotheses, bases, chances.tolist(), named.tolist(), strict=True
+            )
+            if each is not candidate.hypothesis
+            and self._is_alternative(candidate, basis, one, log_p, is_named)
         ]
-        if candidate.hypothesis is not None:
-            near = chances < candidate.log_p + 0.5 * APART
-            others += [
-                each
-                for each, one, is_near in zip(self.hypotheses, bases, near, strict=True)
-                if is_near and one.shape[1] <= basis.shape[1] and each is not candidate.hypothesis
-            ]
         unique = {each.words: each for each in others}
         candidate = replace(candidate, of_others=tuple(unique.values()))
         self._remove(self._not_told_apart(candidate, basis))
 
-    def _remove(self, found: Found) -> None:
+    def _is_alternative(
+        self, candidate: FoundCause, basis: Array, other: Array, log_p: float, is_named: bool
+    ) -> bool:
+        """Return whether a hypothesis with a basis (n, q) is not told apart from a cause: it is
+        merely part of it, explains nearly as much, or all that makes the cause significant.
+        """
+        if 0 < other.shape[1] <= basis.shape[1]:
+            is_near = log_p < candidate.log_p + 0.5 * APART
+            if is_near or (candidate.hypothesis is None and _is_within(other, basis)):
+                return True
+        if is_named or log_p >= self.other_limit:
+            return False
+        # One that contains the cause is wider, and not clearly less probable.
+        if _is_within(basis, other):
+            return log_p < candidate.log_p + LOG_ODDS_LIMIT
+        return self._given(other, basis) >= candidate.limit
+
+    def _remove(self, found: FoundCause) -> None:
         self.left = self.left.without(found.biases)
         self.columns.update(self.left)
         sigma = math.sqrt(self.left.sum_of_squares / max(self.left.freedom, 1))
         self.found.append(replace(found, sigma=sigma))
 
-    def _not_told_apart(self, found: Found, basis: Array) -> Found:
+    def _not_told_apart(self, found: FoundCause, basis: Array) -> FoundCause:
         """Return a cause with the events of no more dimensions that explain nearly as much, and
         with the range of a slip.
         """
@@ -351,20 +359,20 @@ class Search:
         self._begin(remainder)
         sigma = math.sqrt(remainder.sum_of_squares / remainder.freedom)
         none = np.zeros((len(remainder.residual), 0))
-        self.scatter = scatter, times, Found(none, log_p, limit, sigma=sigma)
+        self.scatter = scatter, times, FoundCause(none, log_p, limit, sigma=sigma)
         self.found = []
         by_words = {each.words: each.biases for each in self.hypotheses}
         for each in earlier:
             words = each.hypothesis.words if each.hypothesis else ""
             self._remove(replace(each, biases=by_words.get(words, self._dense(each.columns))))
 
-    def _unexplained(self, hypothesis: Hypothesis | None, log_p: float) -> Search:
+    def _unexplained(self, hypothesis: PossibleCause | None, log_p: float) -> Search:
         """Return this search, which ends with residuals that no cause explains but, if known, terms
         of the model.
         """
         self.found = []
         none = np.zeros((len(self.left.residual), 0))
-        self.model = Found(none, log_p, self.other_limit, hypothesis=hypothesis)
+        self.model = FoundCause(none, log_p, self.other_limit, hypothesis=hypothesis)
         return self
 
     def _end_with_wide(self, bases: list[Array], chances: Array) -> Search:
@@ -385,7 +393,7 @@ class Search:
             if is_chain:
                 k, *chains = self._best_chains(some) or [k]
                 others = chains + [j for j in others if self.hypotheses[j].assumed != CHAIN]
-            found = Found(
+            found = FoundCause(
                 self.hypotheses[k].biases[:, :0],
                 float(chances[k]),
                 self.other_limit,
@@ -401,7 +409,7 @@ class Search:
                 return rest
         return self._unexplained(self.hypotheses[best], float(chances[best]))
 
-    def _without(self, hypothesis: Hypothesis) -> Search | None:
+    def _without(self, hypothesis: PossibleCause) -> Search | None:
         """Return the finished search of what a wide hypothesis leaves; None without a fit."""
         at, removed = self.at, hypothesis.biases
         if hypothesis.design is not None:

@@ -39,7 +39,7 @@ CHAIN, MODEL = "chain of axes", "error model"
 
 
 @dataclass(frozen=True)
-class Hypothesis:
+class PossibleCause:
     """A cause, in `words`, against what is `assumed`, and its `cure`: `biases` (n, k) by a unit of
     each of its parameters.
 
@@ -56,7 +56,7 @@ class Hypothesis:
     design: Design | None = None
 
 
-def hypotheses(design: Design, state: State) -> Iterator[Hypothesis]:
+def hypotheses(design: Design, state: State) -> Iterator[PossibleCause]:
     """Return all causes of several directions, at a state."""
     linearised = LinearisedDesign(design, state, None)
     for build in (_scales, _sag, _drift, _displacements, _chains):
@@ -66,10 +66,10 @@ def hypotheses(design: Design, state: State) -> Iterator[Hypothesis]:
         assumed, cure = MODEL, "compare error models (ballplate models)"
         if is_drift:
             assumed, cure = "drift", "read in an order that separates a drift, or state one"
-        yield Hypothesis(assumed, words, cure, linearised.biases(displacement))
+        yield PossibleCause(assumed, words, cure, linearised.biases(displacement))
 
 
-def _scales(design: Design, state: State) -> Iterator[Hypothesis]:
+def _scales(design: Design, state: State) -> Iterator[PossibleCause]:
     """Scales of the machine along each axis, in one position."""
     readings, positions = design.readings, design.positions
     turned = positions.rotations[readings.position]
@@ -83,10 +83,10 @@ def _scales(design: Design, state: State) -> Iterator[Hypothesis]:
         if letters:
             biases = (here[:, :, None] * np.eye(design.dimension))[:, :, axes]
             cure = "check the temperatures there"
-            yield Hypothesis("temperature of scales", words, cure, biases, letters, "1")
+            yield PossibleCause("temperature of scales", words, cure, biases, letters, "1")
 
 
-def _sag(design: Design, state: State) -> Iterator[Hypothesis]:
+def _sag(design: Design, state: State) -> Iterator[PossibleCause]:
     known = {one.parameter.name for one in design.influences if isinstance(one, Sag)}
     parts, readings = design.parts(Path()), design.readings
     at = disturbed_readings(state, readings, expected_readings(design, state, readings))
@@ -100,10 +100,10 @@ def _sag(design: Design, state: State) -> Iterator[Hypothesis]:
         if influence.parameter.name not in known and np.isfinite(influence.shape).all():
             cure = "support the plate at other points, or state its sag"
             biases = influence.shifts(at)[1]
-            yield Hypothesis("sag", f"sag of {name}", cure, biases, ("sag",))
+            yield PossibleCause("sag", f"sag of {name}", cure, biases, ("sag",))
 
 
-def _drift(design: Design, state: State) -> Iterator[Hypothesis]:
+def _drift(design: Design, state: State) -> Iterator[PossibleCause]:
     """A drift of the scales; drifts of the readings are smooth errors."""
     hours = even_clock(len(design.positions.names)).hours(design.readings)
     if np.ptp(hours) > 0.0 and not any(isinstance(one, Drift) for one in design.influences):
@@ -111,10 +111,10 @@ def _drift(design: Design, state: State) -> Iterator[Hypothesis]:
         biases = (x * (hours / np.ptp(hours))[:, None])[:, :, None]
         words = "drift of the scales from the first reading to the last"
         cure = "read in an order that separates a drift, or state one under influences"
-        yield Hypothesis("drift", words, cure, biases, ("scale",), "1")
+        yield PossibleCause("drift", words, cure, biases, ("scale",), "1")
 
 
-def _displacements(design: Design, state: State) -> Iterator[Hypothesis]:
+def _displacements(design: Design, state: State) -> Iterator[PossibleCause]:
     """Displacements of each probe in each position, as of a head that indexes badly."""
     position, probe = design.readings.position, design.readings.probe
     pairs, group = np.unique(position * len(design.probes.names) + probe, return_inverse=True)
@@ -125,10 +125,10 @@ def _displacements(design: Design, state: State) -> Iterator[Hypothesis]:
         biases = (by_group * np.eye(d)[:, None, :]).reshape(len(position), d, -1)
         words = "displacements of each probe in each position"
         cure = "check how tips return after re-indexing or a change, or state reproducibility"
-        yield Hypothesis("reproducibility", words, cure, biases)
+        yield PossibleCause("reproducibility", words, cure, biases)
 
 
-def _chains(design: Design, state: State) -> Iterator[Hypothesis]:
+def _chains(design: Design, state: State) -> Iterator[PossibleCause]:
     """Other arrangements of the axes, by what they change of errors to first order."""
     model, zeros = design.model, np.zeros(len(design.model.parameters))
     spatial = model.spatial if isinstance(model, PlaneModel) else model
@@ -148,4 +148,4 @@ def _chains(design: Design, state: State) -> Iterator[Hypothesis]:
         biases = np.asarray(changes[:, :, np.abs(changes).max(axis=(0, 1)) > 0.0])
         words = f"the arrangement of the axes is {' or '.join(of_it)}"
         cure = "correct arrangement under error_model"
-        yield Hypothesis(CHAIN, words, cure, biases, design=replace(design, model=other))
+        yield PossibleCause(CHAIN, words, cure, biases, design=replace(design, model=other))

@@ -22,8 +22,9 @@ from ballplate.simulator.design import Design, Priors
 from ballplate.simulator.estimation import Linearisation, Solution, estimate, linearised_fit
 from ballplate.simulator.machines import Array
 
-from .cause_search import FAMILY, LOG_ODDS_LIMIT, Found, Search, searched
-from .hypotheses import Hypothesis
+from .cause_search import FAMILY, LOG_ODDS_LIMIT, FoundCause, Search, searched
+from .hypotheses import PossibleCause
+from .tails import log_chance
 
 # Significance level of a sum of squares that needs refits.
 TOO_LARGE = 1e-3
@@ -49,7 +50,7 @@ def searched_with_refits(at: Linearisation, x: Array, sigma_is_estimated: bool) 
     first = _with_exact_values(at, x, sigma_is_estimated)
     if first is None or (first.model is None and (_is_small(at) or len(first.found) < 2)):
         return first
-    return _with_offsets(at, x, sigma_is_estimated) or first
+    return _with_offsets(at, x, sigma_is_estimated, first.model) or first
 
 
 def _is_small(at: Linearisation) -> bool:
@@ -78,7 +79,7 @@ def _with_exact_values(at: Linearisation, x: Array, estimated: bool) -> Search |
     return second
 
 
-def is_of_exact(search: Search, found: Found, design: Design) -> bool:
+def is_of_exact(search: Search, found: FoundCause, design: Design) -> bool:
     """Return whether a cause is among the values that the design states as exact."""
     if not len(found.columns):
         return False
@@ -95,36 +96,44 @@ def is_of_exact(search: Search, found: Found, design: Design) -> bool:
     )
 
 
-def _with_offsets(at: Linearisation, x: Array, estimated: bool) -> Search | None:
-    """Return the search of what the best error in an offset leaves; None if none explains S^2."""
+def _with_offsets(
+    at: Linearisation, x: Array, estimated: bool, model: FoundCause | None
+) -> Search | None:
+    """Return the search of what the best error in an offset leaves; None if none explains S^2, or
+    terms of the `model` explain it better.
+    """
     before, freedom = at.factor.sum_of_squares, at.degrees_of_freedom
     fits = _fits(at.design, _discrete(at.design), x)
     least = min((fit[0] for fit in fits), default=math.inf)
     if least > NEARLY_ALL * before:
         fits += _fits(at.design, _free(at.design), x)
-    fits.sort(key=lambda fit: fit[0])
     if not fits:
         return None
-    least = fits[0][0]
+    least, first, solution = min(fits, key=lambda fit: fit[0])
     clear = 2.0 * LOG_ODDS_LIMIT * (max(least / freedom, 1.0) if estimated else 1.0)
     if before - least < clear:
         return None
-    _, first, solution = fits[0]
+    log_p = float(log_chance(before - least, before, at.design.dimension, freedom, False))
+    if model is not None and model.log_p < log_p:
+        return None
     assert first.design is not None
     rest = searched(linearised_fit(first.design, solution), x, estimated)
     if rest is not None:
         if (rest.model or rest.found) and least > NEARLY_ALL * before:
             return None
         none = np.zeros((len(rest.start.residual), 0))
-        others = tuple(other for square, other, _ in fits[1:] if square <= least + clear)
-        found = Found(none, -math.inf, math.log(FAMILY), hypothesis=first, of_others=others)
+        others = [other for square, other, _ in fits if square <= least + clear]
+        if model is not None and model.hypothesis and model.log_p < log_p + LOG_ODDS_LIMIT:
+            others.append(model.hypothesis)
+        of_others = tuple(other for other in others if other is not first)
+        found = FoundCause(none, log_p, math.log(FAMILY), hypothesis=first, of_others=of_others)
         rest.found.insert(0, replace(found, sigma=math.sqrt(least / freedom)))
     return rest
 
 
 def _fits(
-    design: Design, errors: Iterator[Hypothesis], x: Array
-) -> list[tuple[float, Hypothesis, Solution]]:
+    design: Design, errors: Iterator[PossibleCause], x: Array
+) -> list[tuple[float, PossibleCause, Solution]]:
     """Return S^2, error and estimate of each fit without an error that converges."""
     fits = []
     for error in errors:
@@ -135,15 +144,15 @@ def _fits(
     return fits
 
 
-def _discrete(design: Design) -> Iterator[Hypothesis]:
+def _discrete(design: Design) -> Iterator[PossibleCause]:
     """Return signs that are wrong, and exchanges of probes."""
     cure = "correct the offsets under probes, or the names of probes in the readings"
     for mistake in discrete_mistakes(design):
         other = with_offsets(design, mistake.change)
-        yield Hypothesis("tips", mistake.words(design), cure, np.zeros((0, 0)), design=other)
+        yield PossibleCause("tips", mistake.words(design), cure, np.zeros((0, 0)), design=other)
 
 
-def _free(design: Design) -> Iterator[Hypothesis]:
+def _free(design: Design) -> Iterator[PossibleCause]:
     """Return each probe with an offset in error by any amount."""
     priors = design.of(Priors)
     for probe in np.unique(design.readings.probe).tolist():
@@ -155,4 +164,4 @@ def _free(design: Design) -> Iterator[Hypothesis]:
         )
         words = f"offset of probe {design.probes.names[probe]}"
         cure = "qualify the probe again"
-        yield Hypothesis("tips", words, cure, np.zeros((0, 0)), design=other)
+        yield PossibleCause("tips", words, cure, np.zeros((0, 0)), design=other)

@@ -13,7 +13,7 @@ from ballplate.simulator.inputs import Mark, listed
 from ballplate.simulator.machines import Array, Integers
 
 from .bias_patterns import Patterns, position_order
-from .cause_search import Found, Search
+from .cause_search import FoundCause, Search
 from .events import ASSUMED, cause
 from .findings import Finding
 from .hypotheses import MODEL
@@ -104,7 +104,7 @@ def words_of(biases: Patterns, columns: Integers) -> str:
     return words.rpartition(", ")[0] if kind in ("ball", "moved") else words
 
 
-def _cure(search: Search, found: Found, marks: Sequence[Mark]) -> str:
+def _cure(search: Search, found: FoundCause, marks: Sequence[Mark]) -> str:
     biases = search.patterns
     kind = cause(biases, found.columns).kind
     for observation in biases.design.observations:
@@ -120,7 +120,7 @@ def _cure(search: Search, found: Found, marks: Sequence[Mark]) -> str:
 
 
 def _sizes(
-    search: Search, found: Found, values: Array, uncertainties: Array
+    search: Search, found: FoundCause, values: Array, uncertainties: Array
 ) -> Iterator[ParameterEstimate]:
     """Return the size of a cause along each direction: what is stated or read less the truth."""
     biases = search.patterns
@@ -139,7 +139,7 @@ def _sizes(
             yield ParameterEstimate(letter, value, u, unit, "cause")
 
 
-def _moment(biases: Patterns, found: Found, marks: Sequence[Mark]) -> str:
+def _moment(biases: Patterns, found: FoundCause, marks: Sequence[Mark]) -> str:
     """Return the moment of a slip, between two readings or lines."""
     design, position = biases.design, biases.subject[found.columns[0]]
     rows = np.flatnonzero(design.readings.position == position)
@@ -150,7 +150,7 @@ def _moment(biases: Patterns, found: Found, marks: Sequence[Mark]) -> str:
     return f"between {reading_name(design, before)} and {reading_name(design, found.last)}"
 
 
-def _touched(biases: Patterns, found: Found) -> list[int]:
+def _touched(biases: Patterns, found: FoundCause) -> list[int]:
     """Return the readings of a cause."""
     k = int(found.columns[0])
     kind, subject, readings = biases.kind[k], int(biases.subject[k]), biases.design.readings
