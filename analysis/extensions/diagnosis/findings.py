@@ -49,12 +49,13 @@ class Finding:
         one.
         """
         ratios = [abs(size.value) / size.standard_uncertainty for size in self.sizes]
-        return listed(
-            f"{size.name} {number(1e6 * size.value, 3)} ± "
-            f"{number(1e6 * size.standard_uncertainty, 2)} {SHOWN[size.unit]}".strip()
+        parts = [
+            f"{size.name} {number(1e6 * size.value, 3)} ±"
+            f" {number(1e6 * size.standard_uncertainty, 2)} {SHOWN[size.unit]}".strip()
             for size, ratio in zip(self.sizes, ratios, strict=True)
             if ratio >= min(CLEAR, max(ratios))
-        )
+        ]
+        return listed(parts) if parts else ""
 
     @property
     def words(self) -> str:

@@ -20,6 +20,8 @@ from ballplate.extensions.laboratory.wrong_offsets import (
 from ballplate.results import has_exact_values
 from ballplate.simulator.design import Design, Priors
 from ballplate.simulator.estimation import Linearisation, Solution, estimate, linearised_fit
+from ballplate.simulator.geometry import AXIS_NAMES
+from ballplate.simulator.inputs import format_length
 from ballplate.simulator.machines import Array
 
 from .cause_search import FAMILY, LOG_ODDS_LIMIT, FoundCause, Search, searched
@@ -42,15 +44,21 @@ def searched_with_refits(at: Linearisation, x: Array, sigma_is_estimated: bool) 
     """Return the finished search of a fit's residuals, including errors in offsets and in values
     stated as exact; None without residuals.
 
-    If no cause explains the residuals to first order, or only several causes explain a large S^2,
-    the estimate is repeated without each error in an offset. One is named if it explains S^2
-    and the remainder has explained causes, together with those that the readings do not distinguish
-    from it.
+    If only terms of the model, displacements or several causes explain a large S^2, the estimate is
+    repeated without each error in an offset, and if a single offset explains it, without each wrong
+    sign and exchange of probes. One is named if it explains S^2 and the remainder has explained
+    causes, together with those that the readings do not distinguish from it.
     """
     first = _with_exact_values(at, x, sigma_is_estimated)
-    if first is None or (first.model is None and (_is_small(at) or len(first.found) < 2)):
+    if first is None or (first.model is None and _is_small(at)):
         return first
-    return _with_offsets(at, x, sigma_is_estimated, first.model) or first
+    wide = (found for found in first.found if found.hypothesis and not found.hypothesis.parameters)
+    rival = first.model or next(wide, None)
+    is_single = rival is None and len(first.found) < 2
+    kinds = {str(kind) for found in first.found for kind in first.patterns.kind[found.columns]}
+    if is_single and kinds != {"probe"}:
+        return first
+    return _with_offsets(at, x, sigma_is_estimated, rival, is_single) or first
 
 
 def _is_small(at: Linearisation) -> bool:
@@ -97,15 +105,15 @@ def is_of_exact(search: Search, found: FoundCause, design: Design) -> bool:
 
 
 def _with_offsets(
-    at: Linearisation, x: Array, estimated: bool, model: FoundCause | None
+    at: Linearisation, x: Array, estimated: bool, rival: FoundCause | None, is_discrete: bool
 ) -> Search | None:
-    """Return the search of what the best error in an offset leaves; None if none explains S^2, or
-    terms of the `model` explain it better.
+    """Return the search of what the best error in an offset leaves, a sign or an exchange if it
+    `is_discrete`; None if none explains S^2, or the `rival` explains it better.
     """
     before, freedom = at.factor.sum_of_squares, at.degrees_of_freedom
     fits = _fits(at.design, _discrete(at.design), x)
     least = min((fit[0] for fit in fits), default=math.inf)
-    if least > NEARLY_ALL * before:
+    if least > NEARLY_ALL * before and not is_discrete:
         fits += _fits(at.design, _free(at.design), x)
     if not fits:
         return None
@@ -114,7 +122,7 @@ def _with_offsets(
     if before - least < clear:
         return None
     log_p = float(log_chance(before - least, before, at.design.dimension, freedom, False))
-    if model is not None and model.log_p < log_p:
+    if rival is not None and rival.log_p < log_p:
         return None
     assert first.design is not None
     rest = searched(linearised_fit(first.design, solution), x, estimated)
@@ -123,8 +131,8 @@ def _with_offsets(
             return None
         none = np.zeros((len(rest.start.residual), 0))
         others = [other for square, other, _ in fits if square <= least + clear]
-        if model is not None and model.hypothesis and model.log_p < log_p + LOG_ODDS_LIMIT:
-            others.append(model.hypothesis)
+        if rival is not None and rival.hypothesis and rival.log_p < log_p + LOG_ODDS_LIMIT:
+            others.append(rival.hypothesis)
         of_others = tuple(other for other in others if other is not first)
         found = FoundCause(none, log_p, math.log(FAMILY), hypothesis=first, of_others=of_others)
         rest.found.insert(0, replace(found, sigma=math.sqrt(least / freedom)))
@@ -140,6 +148,12 @@ def _fits(
         assert error.design is not None
         solution = estimate(error.design, x)
         if solution.status == "converged":
+            changes = solution.state.probes - error.design.probes.offsets
+            probe, axis = np.unravel_index(np.abs(changes).argmax(), changes.shape)
+            size = float(changes[probe, axis])
+            if size:
+                by = f"by {format_length(float(f'{size:.3g}'))} along {AXIS_NAMES[axis]}"
+                error = replace(error, words=f"{error.words}, {by}")
             fits.append((solution.factor.sum_of_squares, error, solution))
     return fits
 
@@ -162,6 +176,6 @@ def _free(design: Design) -> Iterator[PossibleCause]:
         other = replace(design, probes=probes).observed(
             priors.select(np.flatnonzero(priors.probe != probe))
         )
-        words = f"offset of probe {design.probes.names[probe]}"
+        words = f"the offset of probe {design.probes.names[probe]} is another one"
         cure = "qualify the probe again"
         yield PossibleCause("tips", words, cure, np.zeros((0, 0)), design=other)
