@@ -68,7 +68,7 @@ class FoundCause:
 
     `log_p` and its `limit` are logarithms of p-values, `sigma` the root of the mean square of what
     remains. `others` and `of_others` are causes not told apart from it. A slip came between the
-    readings `first` and `last`.
+    readings `first` and `last`. `of_exact`: a value stated as exact.
     """
 
     biases: Array
@@ -81,6 +81,7 @@ class FoundCause:
     first: int = -1
     last: int = -1
     sigma: float = math.nan
+    of_exact: bool = False
 
     @property
     def p_value(self) -> float:
@@ -208,7 +209,7 @@ class Search:
             ):
                 self._weigh(self.scatters[int(noise.argmin())], of_noise)
             elif of_wide < self.other_limit:
-                return self._end_with_wide(bases, wide)
+                return self._end_with_wide(candidate, bases, wide)
             elif significant or of_noise < self.other_limit:
                 return self._unexplained(None, min(candidate.log_p, of_noise))
             else:
@@ -375,7 +376,7 @@ class Search:
         self.model = FoundCause(none, log_p, self.other_limit, hypothesis=hypothesis)
         return self
 
-    def _end_with_wide(self, bases: list[Array], chances: Array) -> Search:
+    def _end_with_wide(self, candidate: FoundCause, bases: list[Array], chances: Array) -> Search:
         """Return the search that ends with a wide hypothesis: that of what another chain or
         displacements leave, if that is nothing wide, or this one, with terms of the model.
         """
@@ -393,11 +394,15 @@ class Search:
             if is_chain:
                 k, *chains = self._best_chains(some) or [k]
                 others = chains + [j for j in others if self.hypotheses[j].assumed != CHAIN]
+            # The best event, if it is significant and not clearly less probable.
+            most = min(candidate.limit, float(chances[k]) + LOG_ODDS_LIMIT)
+            is_near = len(candidate.columns) and candidate.log_p < most
             found = FoundCause(
                 self.hypotheses[k].biases[:, :0],
                 float(chances[k]),
                 self.other_limit,
                 hypothesis=self.hypotheses[k],
+                others=(candidate.columns,) if is_near else (),
                 of_others=tuple(self.hypotheses[j] for j in others),
             )
             rest = self._without(self.hypotheses[k])

@@ -82,12 +82,15 @@ def _with_exact_values(at: Linearisation, x: Array, estimated: bool) -> Search |
     if solution.status != "converged":
         return first
     second = searched(linearised_fit(loose, solution), x, estimated)
-    if second is None or not any(is_of_exact(second, found, design) for found in second.found):
+    if second is None:
         return first
-    return second
+    second.found = [
+        replace(found, of_exact=_is_of_exact(second, found, design)) for found in second.found
+    ]
+    return second if any(found.of_exact for found in second.found) else first
 
 
-def is_of_exact(search: Search, found: FoundCause, design: Design) -> bool:
+def _is_of_exact(search: Search, found: FoundCause, design: Design) -> bool:
     """Return whether a cause is among the values that the design states as exact."""
     if not len(found.columns):
         return False

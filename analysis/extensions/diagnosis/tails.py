@@ -44,14 +44,3 @@ def log_chance(
             )
         logarithm = np.where(chance > SMALLEST, np.log(np.maximum(chance, SMALLEST)), leading)
     return np.where((q <= 0) | (freedom - q < 1) & (not given), 0.0, np.minimum(logarithm, 0.0))
-
-
-def normal_equivalent(log_p: float) -> float:
-    """Return the absolute value that a normal variable exceeds with probability exp(`log_p`).
-
-    >>> round(normal_equivalent(np.log(0.05)), 4)
-    1.96
-    """
-    from scipy.special import ndtri_exp
-
-    return float(-ndtri_exp(log_p - np.log(2.0)))

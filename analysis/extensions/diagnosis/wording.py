@@ -41,6 +41,8 @@ def findings(search: Search, marks: Sequence[Mark]) -> Iterator[Finding]:
             is_gross = kind not in ASSUMED
             lines = _touched(search.patterns, found)
             words, cure = words_of(search.patterns, found.columns), _cure(search, found, marks)
+            if found.of_exact:
+                words = f"{words}, stated as exact"
             if kind == "slip":
                 words = f"{words} {_moment(search.patterns, found, marks)}"
         else:

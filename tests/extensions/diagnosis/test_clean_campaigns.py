@@ -12,9 +12,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 from ballplate.extensions.diagnosis.bias_patterns import patterns
-from ballplate.extensions.diagnosis.cause_search import Search, diagnosis
+from ballplate.extensions.diagnosis.cause_search import Search
+from ballplate.extensions.diagnosis.refits import searched_with_refits
 from ballplate.extensions.diagnosis.tails import log_chance
-from ballplate.extensions.diagnosis.wording import diagnosis_words
 from ballplate.simulator.design.arrays import nominal_state
 from ballplate.simulator.design.observations.readings import expected_readings
 from ballplate.simulator.estimation.gauss_newton import estimate, linearised_fit
@@ -94,8 +94,10 @@ def test_what_a_design_hides_is_not_looked_for_in_its_noise(tmp_path: Path) -> N
     are_hidden = shares_left(taken, events) < 1e-9
     assert 0 < are_hidden.sum() < 0.1 * len(are_hidden)
     at, x = next(fits(given, 1))
-    search = Search(at, x, at.degrees_of_freedom, True)
-    assert search.smooth and not {one.words for one in search.smooth} & set(hidden)
+    search = Search(at, x, True)
+    shown = [one.shape[1] > 0 for one in search.bases]
+    words = {one.words for one, is_shown in zip(search.hypotheses, shown, strict=True) if is_shown}
+    assert words and not words & set(hidden)
     assert not search.columns.information[are_hidden].any()
 
 
@@ -112,10 +114,10 @@ def test_no_test_of_smooth_errors_is_significant_too_often(tmp_path: Path) -> No
     given, count = of_positions(*DESIGNS[0], tmp_path), 15
     significant: Counter[str] = Counter()
     for at, x in fits(given, count):
-        search = Search(at, x, at.degrees_of_freedom, True)
+        search = Search(at, x, True)
         left = search.left
-        for one in search.smooth:
-            square, dimensions = ((one.columns.T @ left.residual) ** 2).sum(), one.columns.shape[1]
+        for one, basis in zip(search.hypotheses, search.bases, strict=True):
+            square, dimensions = ((basis.T @ left.residual) ** 2).sum(), basis.shape[1]
             log_p = log_chance(square, left.sum_of_squares, dimensions, left.freedom, False)
             significant[one.words] += int(log_p < np.log(0.1))
     assert significant
@@ -130,10 +132,8 @@ def test_faultless_campaigns_are_hardly_ever_suspected(tmp_path: Path) -> None:
     for design in DESIGNS:
         count = 0
         for at, x in fits(of_positions(*design, tmp_path), each):
-            found = diagnosis(at, x, at.degrees_of_freedom, True)
-            count += bool(found)
-            for words in diagnosis_words(found):
-                print("   ", words)
+            found = searched_with_refits(at, x, True)
+            count += bool(found and (found.found or found.scatter or found.model))
         total += count
         print(f"{', '.join(design[1])}, {design[2]}: {rate(count, each)}", flush=True)
         assert binom.sf(count - 1, each, 0.01) > 1e-3, design

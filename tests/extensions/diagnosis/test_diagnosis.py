@@ -10,10 +10,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from ballplate.extensions.diagnosis.cause_search import diagnosis
+from ballplate.extensions.diagnosis.cause_search import Search, searched
 from ballplate.extensions.diagnosis.hat import whitened_residuals
-from ballplate.extensions.diagnosis.suspects import Diagnosis, Suspect
-from ballplate.extensions.diagnosis.wording import diagnosis_lines, unexplained_words
+from ballplate.extensions.diagnosis.hypotheses import MODEL
+from ballplate.extensions.diagnosis.wording import findings
 from ballplate.simulator.design.arrays import Design
 from ballplate.simulator.design.observations.distances import CalibratedDistances
 from ballplate.simulator.estimation.gauss_newton import Solution, estimate, linearised_fit
@@ -42,10 +42,11 @@ def certified(name: str) -> tuple[ObservedReadings, bool]:
     return read_readings(CERTIFIED / f"{name}.csv", lay_out(given)), given.sigma == "estimated"
 
 
-def diagnosed(design: Design, x: Real, estimated: bool) -> tuple[Solution, Diagnosis]:
+def diagnosed(design: Design, x: Real, estimated: bool) -> tuple[Solution, Search]:
     solution = estimate(design, x)
-    freedom = design.observation_count - design.parameter_count
-    return solution, diagnosis(linearised_fit(design, solution), x, freedom, estimated)
+    search = searched(linearised_fit(design, solution), x, estimated)
+    assert search is not None
+    return solution, search
 
 
 def with_one_wrong(x: Real, reading: int, axis: int) -> Real:
@@ -54,23 +55,18 @@ def with_one_wrong(x: Real, reading: int, axis: int) -> Real:
     return wrong
 
 
-def is_finite(one: Suspect) -> bool:
-    return bool(
-        np.isfinite(one.values).all()
-        and ((one.standard_uncertainties > 1e-9) & (abs(one.values) < 1.0)).all()
-    )
-
-
 @pytest.mark.parametrize("every", [5, pytest.param(1, marks=pytest.mark.long)])
 @pytest.mark.parametrize("name", ["ball-bar", "two-dimensions", "bryan-gauge"])
 def test_sizes_are_finite_whatever_reading_is_wrong(name: str, every: int) -> None:
     observed, estimated = certified(name)
     found = []
     for reading, axis in islice(np.ndindex(observed.x.shape), 0, None, every):
-        one = diagnosed(observed.design, with_one_wrong(observed.x, reading, axis), estimated)[1]
-        assert all(is_finite(suspect) for suspect in one.suspects), (reading, axis)
-        assert "nan" not in " ".join(diagnosis_lines(one))
-        found += one.suspects
+        search = diagnosed(observed.design, with_one_wrong(observed.x, reading, axis), estimated)[1]
+        for values, u in search.sizes():
+            assert np.isfinite(values).all() and (abs(values) < 1.0).all(), (reading, axis)
+            assert np.isfinite(u).all()
+        assert "nan" not in " ".join(one.words for one in findings(search, ()))
+        found += search.found
     assert len(found) > 10 // every
 
 
@@ -82,23 +78,19 @@ def test_sizes_are_those_of_least_squares_with_the_mistakes_as_parameters(
     observed, estimated = certified("ball-bar")
     x = with_one_wrong(observed.x, reading, axis)
     solution, found = diagnosed(observed.design, x, estimated)
-    assert found.suspects
+    assert found.found
     taken = jacobian(observed.design, solution.state, x)
     residual = whitened_residuals(observed.design, solution.state, x)
-    columns = np.concatenate([one.columns for one in found.suspects])
-    for one in found.suspects:
-        matrix = one.patterns.matrix[:, columns].toarray()
-        size = np.sqrt((matrix**2).sum(axis=0))
-        both = np.column_stack([taken, matrix / size])
-        inverse = np.linalg.pinv(both, rcond=1e-7)[taken.shape[1] :] / size[:, None]
-        mine = np.isin(columns, one.columns)
-        np.testing.assert_allclose(one.values, (inverse @ residual)[mine], rtol=1e-4, atol=1e-9)
-        np.testing.assert_allclose(
-            one.standard_uncertainties,
-            np.sqrt((inverse**2).sum(axis=1))[mine],
-            rtol=1e-4,
-            atol=1e-12,
-        )
+    matrix = np.concatenate([one.biases for one in found.found], axis=1)
+    size = np.sqrt((matrix**2).sum(axis=0))
+    both = np.column_stack([taken, matrix / size])
+    inverse = np.linalg.pinv(both, rcond=1e-7)[taken.shape[1] :] / size[:, None]
+    sizes = list(found.sizes())
+    values, u = (np.concatenate([each[k] for each in sizes]) for k in (0, 1))
+    np.testing.assert_allclose(values, inverse @ residual, rtol=1e-4, atol=1e-9)
+    sigma = np.sqrt(found.left.sum_of_squares / found.left.freedom) if estimated else 1.0
+    expected = sigma * np.sqrt((inverse**2).sum(axis=1))
+    np.testing.assert_allclose(u, expected, rtol=1e-4, atol=1e-12)
 
 
 def drawn(
@@ -141,17 +133,15 @@ def certified_wrongly(design: Design, ball: int, share: float) -> tuple[Design, 
 def test_wrong_distances_of_one_ball_are_one_mistake(ball: int, tmp_path: Path) -> None:
     right, x = drawn(tmp_path, 1.0)
     design, mine = certified_wrongly(right, ball, 5e-6)
-    (one,) = diagnosed(design, x, True)[1].suspects
-    assert (one.patterns.kind[one.columns] == "distance").all()
-    assert sorted(one.patterns.subject[one.columns].tolist()) == mine and len(mine) == 2
-    true = (
-        5e-6
-        / (1.0 + 5e-6)
-        * design.of(CalibratedDistances).value[one.patterns.subject[one.columns]]
-    )
-    assert (abs(one.values - true) < 4.0 * one.standard_uncertainties).all()
-    words = f"certified distances of ball {design.ball_label(ball)}: to "
-    assert words in diagnosis_lines(Diagnosis((one,)))[0]
+    search = diagnosed(design, x, True)[1]
+    (one,), ((values, u),) = search.found, search.sizes()
+    subject = search.patterns.subject[one.columns]
+    assert (search.patterns.kind[one.columns] == "distance").all()
+    assert sorted(subject.tolist()) == mine and len(mine) == 2
+    true = 5e-6 / (1.0 + 5e-6) * design.of(CalibratedDistances).value[subject]
+    assert (abs(values - true) < 4.0 * u).all()
+    (said,) = findings(search, ())
+    assert said.cause == f"all certified distances of ball {design.ball_label(ball)}"
 
 
 @pytest.mark.parametrize("wrong", range(4))
@@ -161,9 +151,10 @@ def test_one_wrong_distance_is_not_laid_to_all_of_a_ball(wrong: int, tmp_path: P
         value = right.of(CalibratedDistances).value.copy()
         value[wrong] += 10e-6
         design = right.observed(replace(right.of(CalibratedDistances), value=value))
-        (one,) = diagnosed(design, x, True)[1].suspects
-        assert one.patterns.kind[one.pattern] == "distance" and len(one.columns) == 1
-        assert one.patterns.subject[one.pattern] == wrong
+        search = diagnosed(design, x, True)[1]
+        ((column,),) = (one.columns for one in search.found)
+        assert search.patterns.kind[column] == "distance"
+        assert search.patterns.subject[column] == wrong
 
 
 @pytest.mark.parametrize("ball", [0, 2, 6, 8])
@@ -172,9 +163,9 @@ def test_wrong_distances_of_the_opposite_ball_are_named_where_only_these_tell_th
 ) -> None:
     """Two sides too long, or the other two too short by the same ratio, and the scale another."""
     right, x = drawn(tmp_path, 1.0, text=PLATE.replace("[right, left]", "[right]"))
-    (line,) = diagnosis_lines(diagnosed(certified_wrongly(right, ball, 5e-6)[0], x, True)[1])
+    (said,) = findings(diagnosed(certified_wrongly(right, ball, 5e-6)[0], x, True)[1], ())
     for either in (ball, 8 - ball):
-        assert f"distances of ball {right.ball_label(either)}" in line, line
+        assert f"distances of ball {right.ball_label(either)}" in said.verdict
 
 
 def is_explained(design: Design, solution: Solution) -> bool:
@@ -184,22 +175,10 @@ def is_explained(design: Design, solution: Solution) -> bool:
 
 
 @pytest.mark.parametrize("estimated", [True, False])
-def test_scatter_is_told_beside_the_model_in_the_size_of_all_residuals(
-    estimated: bool, tmp_path: Path
-) -> None:
-    design, x = drawn(tmp_path, 1.0, waves=8.0, loud=60.0)
-    solution, found = diagnosed(design, x, estimated)
-    assert (
-        found.scatter
-        and found.scatter.of.position == LOUD
-        and found.unexplained
-        and not found.suspects
-    )
-    freedom = design.observation_count - design.parameter_count
-    size = float(np.sqrt(solution.factor.sum_of_squares / freedom))
-    assert size > 5.0 and found.unexplained.times == pytest.approx(size, rel=1e-6)
-    assert unexplained_words(found.unexplained).endswith("or larger uncertainties")
-    assert len(diagnosis_lines(found)) == 2
+def test_scatter_is_told_beside_the_model(estimated: bool, tmp_path: Path) -> None:
+    found = diagnosed(*drawn(tmp_path, 1.0, waves=8.0, loud=60.0), estimated)[1]
+    assert found.scatter and found.scatter[0].position == LOUD and found.model and not found.found
+    assert [one.kind for one in findings(found, ())] == ["scatter", MODEL]
 
 
 def test_what_the_stated_uncertainties_explain_is_laid_to_the_model_only_where_sigma_is_estimated(
@@ -210,16 +189,8 @@ def test_what_the_stated_uncertainties_explain_is_laid_to_the_model_only_where_s
         for estimated in (True, False):
             solution, found = diagnosed(design, x, estimated)
             assert is_explained(design, solution) == (share < 1.0)
-            assert bool(found.unexplained) == bool(found) == (estimated in told), (share, estimated)
-            if found.unexplained:
-                advice = "larger uncertainties" in unexplained_words(found.unexplained)
-                assert advice == (found.unexplained.times > 1.0) == (share == 1.0)
-                richer = "try a larger error model" in unexplained_words(found.unexplained)
-                assert richer != is_explained(design, solution)
-                calm = "and so not too large" in unexplained_words(found.unexplained)
-                assert calm == is_explained(design, solution)
-                level = "at most 1 % of sound campaigns" in unexplained_words(found.unexplained)
-                assert level == calm
+            assert bool(found.model) == (estimated in told), (share, estimated)
+            assert not found.found
 
 
 def test_scatter_below_what_is_stated_is_told_only_where_sigma_is_estimated(tmp_path: Path) -> None:
@@ -228,14 +199,19 @@ def test_scatter_below_what_is_stated_is_told_only_where_sigma_is_estimated(tmp_
         for estimated in (True, False):
             solution, found = diagnosed(design, x, estimated)
             assert is_explained(design, solution) == (loud == 8.0)
-            assert bool(found.scatter) == bool(found) == (estimated in told), (loud, estimated)
-    assert not diagnosed(*drawn(tmp_path, 0.001, loud=8.0), True)[1]
+            assert bool(found.scatter) == (estimated in told), (loud, estimated)
+            assert not (found.found or found.model)
+    harmless = diagnosed(*drawn(tmp_path, 0.001, loud=8.0), True)[1]
+    assert not (harmless.found or harmless.scatter or harmless.model)
 
 
 @pytest.mark.parametrize("estimated", [True, False])
 def test_a_mistake_is_named_however_little_else_is_left(estimated: bool, tmp_path: Path) -> None:
     design, x = drawn(tmp_path, 0.01, waves=4.0)
     x[40, 1] += 20e-6
-    (one,) = diagnosed(design, x, estimated)[1].suspects
-    assert one.patterns.kind[one.pattern] == "reading" and one.patterns.subject[one.pattern] == 40
-    assert one.value == pytest.approx(20e-6, rel=0.05)
+    search = diagnosed(design, x, estimated)[1]
+    (one,), ((values, _),) = search.found, search.sizes()
+    k = int(np.abs(values).argmax())
+    assert search.patterns.kind[one.columns[k]] == "reading"
+    assert search.patterns.subject[one.columns[k]] == 40
+    assert values[k] == pytest.approx(20e-6, rel=0.05)

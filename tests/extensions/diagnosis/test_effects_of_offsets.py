@@ -22,7 +22,6 @@ from ballplate.simulator.estimation.linearisation import linearise
 from ballplate.simulator.experiment.layout import lay_out
 from numpy.typing import NDArray
 
-from tests.extensions.diagnosis import wording
 from tests.extensions.diagnosis.designs import MIXED, PLATE, experiment
 from tests.reference.designs import altered
 
@@ -181,7 +180,7 @@ def test_harmless_is_said_of_no_offset_that_a_task_may_feel(
     assert main(["run", "--reliability", str(path)]) == 0
     out = capsys.readouterr().out
     assert "harmless" not in out and "tasks, µm" in out
-    assert wording.OFFSET_OF_PROBE_DOWN_IT_CHANGES in out
+    assert "offset y of probe down; it changes distances between points of tasks' probes" in out
     # With one probe in all tasks no length knows the offset.
     path.write_text(
         text.replace("[down, right]", "[down, down]")
@@ -191,7 +190,7 @@ def test_harmless_is_said_of_no_offset_that_a_task_may_feel(
     )
     assert main(["run", "--reliability", str(path)]) == 0
     out = capsys.readouterr().out
-    assert wording.OFFSET_OF_PROBE_DOWN in out
+    assert "harmless: offset x of probe down" in out
     assert "no distance changes, between balls or corrected points of probe down\n" in out
 
 

@@ -11,8 +11,6 @@ import numpy as np
 import pytest
 import yaml
 
-from tests.extensions.diagnosis import wording
-
 QUICKSTART = Path("designs/quickstart.yaml")
 SIDE, DIAGONAL = 750.0, float(np.hypot(750.0, 750.0))
 FIVE = {
@@ -47,7 +45,7 @@ def experiment(folder: Path, *items: dict[str, Any]) -> bp.Experiment:
 
 
 def suspected(fit: bp.Fit) -> list[dict[str, Any]]:
-    return list(fit.to_dict().get("suspected", []))
+    return list(fit.to_dict()["diagnosis"]["contradicted"])
 
 
 @pytest.mark.parametrize(
@@ -70,10 +68,8 @@ def test_an_exact_value_that_is_wrong_is_named_as_one_that_is_let_go_shows_it(
     fit = bp.fit(experiment(tmp_path, stated({**right, pair: wrong})), readings)
     assert fit.too_large
     (one,) = suspected(fit)
-    assert one["kind"] == "distance" and " to ".join(pair) in one["name"]
-    more = "long" if wrong > right[pair] else "short"
-    assert wording.IS_STATED_AS_EXACT_AND_WOULD in one["words"]
-    assert f"too {more}" in one["words"] and "check the certificate" in one["words"]
+    assert one["kind"] == "distance" and " to ".join(pair) in one["cause"]
+    assert "stated as exact" in one["words"] and "check the certificate" in one["words"]
     # Without the value, the readings tell the distance.
     others = {key: value for key, value in right.items() if key != pair}
     free = bp.fit(experiment(tmp_path, stated(others)), readings)
@@ -81,7 +77,8 @@ def test_an_exact_value_that_is_wrong_is_named_as_one_that_is_let_go_shows_it(
     told = float(np.linalg.norm(balls[pair[0]] - balls[pair[1]]))
     # To first order: what the plate is turned and bent by has a square that is left out.
     error = wrong / 1e3 - told
-    assert abs(one["value"] - error) < one["standard_uncertainty"] + error**2 / (SIDE / 1e3)
+    (size,) = one["sizes"]
+    assert abs(size["value"] - error) < size["standard_uncertainty"] + error**2 / (SIDE / 1e3)
 
 
 def test_a_reading_that_is_wrong_beside_exact_values_is_named_and_they_are_not(
@@ -108,7 +105,7 @@ def test_what_nothing_explains_may_be_exact_values_where_there_are_any(
     noise = 1e-3 * np.random.default_rng(5).standard_normal((len(readings), 3))
     readings[["x_mm", "y_mm", "z_mm"]] += noise
     fit = bp.fit(given, readings)
-    assert fit.too_large and not fit.diagnosis.suspects
+    assert fit.too_large and not fit.diagnosis.names_causes
     told = "stated as exact"
     assert any(told in one for one in fit.cautions) == is_exact
     failed = replace(fit, solution=replace(fit.solution, status="diverged"))

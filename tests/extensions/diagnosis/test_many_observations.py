@@ -19,8 +19,6 @@ from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.inputs.messages import ExperimentError
 from ballplate.simulator.readings.reading_files import read_readings
 
-from tests.extensions.diagnosis import wording
-
 QUICKSTART = Path("designs/quickstart.yaml")
 CERTIFIED = Path("designs/certified")
 
@@ -68,7 +66,7 @@ def test_fit_of_too_many(monkeypatch: pytest.MonkeyPatch) -> None:
     found = fit(experiment, observed)
     assert (
         f"at most {rows - 1} are possible" in found.cautions[0]
-        and wording.FIT_THE_MEANS_OF_REPEATED in found.cautions[0]
+        and "fit the means of repeated" in found.cautions[0]
     )
     assert found.estimates == tested.estimates and not found.diagnosis
 

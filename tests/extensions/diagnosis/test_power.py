@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from ballplate.extensions.diagnosis.bias_patterns import Patterns, patterns
-from ballplate.extensions.diagnosis.cause_search import diagnosis
+from ballplate.extensions.diagnosis.cause_search import searched
 from ballplate.extensions.diagnosis.hat import hat_rows, row_count
 from ballplate.extensions.diagnosis.power import (
     alarm_limit,
@@ -324,12 +324,9 @@ def alarms(folder: Path, text: str, fits: int) -> dict[bool, int]:
     for r in range(fits):
         observed, solution = world.fitted(r)
         for estimated in found:
-            told = diagnosis(
-                linearised_fit(observed.design, solution),
-                observed.x,
-                freedom_of(observed.design),
-                estimated,
-            )
+            fitted = linearised_fit(observed.design, solution)
+            search = searched(fitted, observed.x, estimated)
+            told = search and (search.found or search.scatter or search.model)
             found[estimated] += bool(told)
     return found
 

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from ballplate.extensions.diagnosis.cause_search import Search
+from ballplate.extensions.diagnosis.cause_search import FoundCause, Search
 from ballplate.extensions.diagnosis.hat import whitened_residuals
 from ballplate.extensions.diagnosis.remainders import leftover
 from ballplate.extensions.diagnosis.scatter import (
@@ -86,9 +86,7 @@ def test_what_causes_explain_is_what_they_take_away_as_parameters(
     text: str, tmp_path: Path
 ) -> None:
     design, state, x = fitted(text, tmp_path)
-    search = Search(
-        linearise(design, state, x), x, design.observation_count - design.parameter_count, True
-    )
+    search = Search(linearise(design, state, x), x, True)
     matrix = search.patterns.matrix.toarray()
     residual, taken = (
         whitened_residuals(design, state, x),
@@ -113,7 +111,7 @@ def test_what_causes_explain_is_what_they_take_away_as_parameters(
                 widths.add(len(group[place]))
         # A cause that has been taken out explains nothing more, and others less.
         columns = search.groups[-2][len(search.groups[-2]) // 2]
-        search._remove(columns)
+        search._remove(FoundCause(matrix[:, columns], 0.0, 0.0, columns))
         taken = np.column_stack([taken, matrix[:, columns]])
         assert search.left.sum_of_squares == pytest.approx(left_by(taken, residual), rel=1e-6), step
     assert widths == ({1, 2, 3, 6} if text is MIXED else {1, 2, 3})
@@ -121,9 +119,7 @@ def test_what_causes_explain_is_what_they_take_away_as_parameters(
 
 def test_smooth_errors_explain_what_they_take_away_as_parameters(tmp_path: Path) -> None:
     design, state, x = fitted(PLANE, tmp_path)
-    search = Search(
-        linearise(design, state, x), x, design.observation_count - design.parameter_count, True
-    )
+    search = Search(linearise(design, state, x), x, True)
     residual, taken = (
         whitened_residuals(design, state, x),
         jacobian(design, state, x),
@@ -136,13 +132,14 @@ def test_smooth_errors_explain_what_they_take_away_as_parameters(tmp_path: Path)
         for row, place in enumerate(places):
             columns[2 * row + component, place] = 1.0
         words = f"an error in {'xy'[component]} that depends on {'xy'[axis]}"
-        (one,) = (one for one in search.smooth if one.words == words)
-        np.testing.assert_allclose(taken.T @ one.columns, 0.0, atol=1e-6)
-        explained = float(((one.columns.T @ search.left.residual) ** 2).sum())
+        every = zip(search.hypotheses, search.bases, strict=True)
+        (basis,) = (basis for one, basis in every if one.words == words)
+        np.testing.assert_allclose(taken.T @ basis, 0.0, atol=1e-6)
+        explained = float(((basis.T @ search.left.residual) ** 2).sum())
         assert explained == pytest.approx(
             before - left_by(np.column_stack([taken, columns]), residual), rel=1e-4
         )
-        seen.add(one.columns.shape[1])
+        seen.add(basis.shape[1])
     assert min(seen) > 2
 
 

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from ballplate.extensions.diagnosis.cause_search import diagnosis
+from ballplate.extensions.diagnosis.cause_search import searched
 from ballplate.extensions.diagnosis.names import name
 from ballplate.extensions.diagnosis.redundancy import reliability_of
 from ballplate.simulator.design.arrays import Design, nominal_state
@@ -120,16 +120,13 @@ def test_a_wrong_reading_of_a_shared_ball_is_named(tmp_path: Path) -> None:
     wrong = int(np.setdiff1d(np.arange(len(x)), design.plate_readings)[1])
     x[wrong, 0] += 3e-5
     solution = gauss_newton(design, x, start)
-    freedom = design.observation_count - design.parameter_count
-    (first,) = diagnosis(
-        linearised_fit(design, solution), x, freedom, sigma_is_estimated=False
-    ).suspects
-    given, k = first.patterns, first.pattern
+    search = searched(linearised_fit(design, solution), x, sigma_is_estimated=False)
+    assert search is not None
+    (found,), ((values, u),) = search.found, search.sizes()
+    given, k = search.patterns, int(found.columns[0])
     assert (given.kind[k], int(given.subject[k])) == ("end", wrong)
-    along_x = next(i for i, column in enumerate(first.columns) if given.axis[column] == 0)
-    assert first.values[along_x] == pytest.approx(
-        3e-5, abs=4 * first.standard_uncertainties[along_x]
-    )
+    along_x = next(i for i, column in enumerate(found.columns) if given.axis[column] == 0)
+    assert values[along_x] == pytest.approx(3e-5, abs=4 * u[along_x])
 
 
 def test_tables_hold_the_readings_of_standards(tmp_path: Path) -> None:

@@ -7,8 +7,8 @@ from __future__ import annotations
 import mpmath
 import numpy as np
 import pytest
-from ballplate.extensions.diagnosis.tails import log_chance, normal_equivalent
-from scipy.stats import chi2, f, norm
+from ballplate.extensions.diagnosis.tails import log_chance
+from scipy.stats import chi2, f
 
 
 @pytest.mark.parametrize("dimensions", [1.0, 3.0, 6.0, 50.0])
@@ -48,8 +48,3 @@ def test_nothing_can_be_said_without_dimensions_or_freedom() -> None:
         0.0,
         0.0,
     ]
-
-
-def test_normal_equivalent_is_two_sided() -> None:
-    for value in (1.0, 5.0, 30.0):
-        assert normal_equivalent(float(norm.logsf(value)) + np.log(2.0)) == pytest.approx(value)
