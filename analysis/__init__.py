@@ -59,7 +59,6 @@ if TYPE_CHECKING:
     from ballplate.planning.criteria import Criterion
     from ballplate.presentation.files import write_file
     from ballplate.presentation.result import Result
-    from ballplate.presentation.table import Table
     from ballplate.results.fits import Fit
     from ballplate.results.prediction import Prediction
     from ballplate.simulator.computing.processes import in_processes
@@ -122,7 +121,6 @@ __all__ = [
     "QuantityKind",
     "Result",
     "StoreError",
-    "Table",
     "Target",
     "Trust",
     "assumptions",

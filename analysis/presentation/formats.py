@@ -7,40 +7,24 @@ from collections.abc import Sequence
 from html import escape
 from typing import TYPE_CHECKING
 
-from .table import Row, Table
-
 if TYPE_CHECKING:
     import pandas
 
 
-def _frame(table: Table) -> pandas.DataFrame:
-    """Return the cells of a table as text, with titles of blocks in the first column."""
-    import pandas
-
-    titles = [table.block] if table.block else []
-    rows = [
-        [block.title for _ in titles] + _texts(row) for block in table.blocks for row in block.rows
-    ]
-    return pandas.DataFrame(rows, columns=[*titles, *table.headings, *table.spanned], dtype=str)
-
-
-def _sides(table: Table) -> list[str]:
-    """Return the alignment of the columns of `_frame`."""
-    stubs = bool(table.block) + len(table.headings)
-    return ["left"] * stubs + ["right"] * len(table.columns)
-
-
-def as_markdown(title: str, tables: Sequence[Table]) -> str:
-    """Return tables in the Markdown of GitHub and Pandoc.
+def as_markdown(
+    title: str, caption: str, frame: pandas.DataFrame, stubs: int, notes: Sequence[str]
+) -> str:
+    """Return a table of texts, whose first columns `stubs` head its rows, in the Markdown of GitHub
+    and Pandoc.
 
     :raises ImportError: tabulate is missing.
     """
-    parts = [f"# {_markdown(title)}"]
-    for table in tables:
-        frame = _frame(table).map(_markdown).rename(columns=_markdown)
-        rows = frame.to_markdown(index=False, disable_numparse=True, colalign=_sides(table))
-        parts += [f"## {_markdown(table.caption)}", rows, *map(_markdown, table.notes)]
-    return "\n\n".join(parts) + "\n"
+    parts = [f"# {_markdown(title)}", f"## {_markdown(caption)}"]
+    if not frame.empty:
+        texts = frame.map(_markdown).rename(columns=_markdown)
+        sides = ["left"] * stubs + ["right"] * (len(frame.columns) - stubs)
+        parts.append(texts.to_markdown(index=False, disable_numparse=True, colalign=sides))
+    return "\n\n".join([*parts, *map(_markdown, notes)]) + "\n"
 
 
 def _markdown(text: str) -> str:
@@ -52,33 +36,28 @@ def _markdown(text: str) -> str:
     return re.sub(r"([\\`*_{}\[\]<>|#$~])", r"\\\1", text)
 
 
-def as_html(title: str, tables: Sequence[Table]) -> str:
-    """Return tables as HTML elements, below a title."""
-    parts = [f"<p><strong>{escape(title)}</strong></p>"] if title else []
-    for table in tables:
-        rows = _frame(table).to_html(index=False, border=0)
-        notes = (f"<p>{escape(note)}</p>" for note in table.notes)
-        parts += [f"<p>{escape(table.caption)}</p>", rows, *notes]
-    return "\n".join(parts) + "\n"
+def as_html(
+    title: str, caption: str, frame: pandas.DataFrame, stubs: int, notes: Sequence[str]
+) -> str:
+    """Return a table of texts as HTML elements, below a title."""
+    rows = [] if frame.empty else [frame.to_html(index=False, border=0)]
+    above = [f"<p><strong>{escape(title)}</strong></p>", f"<p>{escape(caption)}</p>"]
+    return "\n".join([*above, *rows, *(f"<p>{escape(note)}</p>" for note in notes)]) + "\n"
 
 
-def as_latex(title: str, tables: Sequence[Table]) -> str:
-    r"""Return a tabular for each table, for the package booktabs; title, captions and notes are
+def as_latex(
+    title: str, caption: str, frame: pandas.DataFrame, stubs: int, notes: Sequence[str]
+) -> str:
+    r"""Return a table of texts as a tabular for the package booktabs; title, caption and notes are
     comments.
 
     :raises ImportError: jinja2 is missing.
     """
-    parts = [_comment(title)]
-    for table in tables:
-        sides = "".join(side[0] for side in _sides(table))
-        rows = _frame(table).to_latex(index=False, escape=True, column_format=sides)
-        parts += [_comment(table.caption), rows.rstrip(), *map(_comment, table.notes)]
-    return "\n".join(parts) + "\n"
+    sides = "l" * stubs + "r" * (len(frame.columns) - stubs)
+    rows = frame.to_latex(index=False, escape=True, column_format=sides).rstrip()
+    shown = [] if frame.empty else [rows]
+    return "\n".join([_comment(title), _comment(caption), *shown, *map(_comment, notes)]) + "\n"
 
 
 def _comment(text: str) -> str:
     return f"% {' '.join(text.split())}"
-
-
-def _texts(row: Row) -> list[str]:
-    return [*row.headings, *(entry.text for entry in row.entries)]

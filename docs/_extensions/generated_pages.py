@@ -12,6 +12,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+from ballplate.cli import GROUPS
 from ballplate.cli import parser as command_line
 from ballplate.extensions.sweeps.sweep_schema import schema as sweep_schema
 from ballplate.simulator.experiment.json_schema import schema
@@ -164,11 +165,9 @@ def _form(part: Schema, whole: Schema) -> str:
         return _list_form(part, whole)
     if kind == "object":
         below = part.get("additionalProperties")
-        return (
-            f"name → {_form(below, whole)}"
-            if isinstance(below, dict) and below
-            else "name → any value"
-        )
+        names = ", ".join(part.get("propertyNames", {}).get("enum", ["name"]))
+        is_any = not isinstance(below, dict) or not below
+        return f"{names} → {'any value' if is_any else _form(below, whole)}"
     if kind == "string":
         return QUANTITIES.get(part.get("pattern", ""), "text")
     if kind == ["string", "integer"]:
@@ -205,14 +204,28 @@ def _anchor(name: str, whole: Schema) -> str:
     return f"{prefix}-{name.lower()}"
 
 
+def _subparsers(top: argparse.ArgumentParser) -> Any:
+    (found,) = (action for action in top._actions if isinstance(action, argparse._SubParsersAction))
+    return found
+
+
+def command_table() -> str:
+    """The commands in the groups of the help, as Markdown."""
+    listed = _subparsers(command_line())._choices_actions
+    lines = ["| to | command | does |", "|---|---|---|"]
+    for group, title in GROUPS.items():
+        for action in (action for action in listed if action.group == group):
+            name = f"[`{action.dest}`](#ballplate-{action.dest})"
+            lines.append(f"| {title} | {name} | {action.help} |")
+            title = ""
+    return "\n".join(lines)
+
+
 def commands() -> str:
     """All commands with their options, as Markdown."""
     top = command_line()
-    (subparsers,) = (
-        action for action in top._actions if isinstance(action, argparse._SubParsersAction)
-    )
     lines = [*_usage(top), "", top.epilog or ""]
-    for name, parser in subparsers.choices.items():
+    for name, parser in _subparsers(top).choices.items():
         lines += ["", f"## ballplate {name}", "", *_usage(parser), "", parser.description or ""]
         lines += ["", f"```{{program}} ballplate {name}", "```"]
         for action in parser._actions:
@@ -247,6 +260,7 @@ PARTS = {
     "<!-- machine format -->": machine_format,
     "<!-- map format -->": map_format,
     "<!-- units -->": units,
+    "<!-- command table -->": command_table,
     "<!-- commands -->": commands,
 }
 

@@ -21,7 +21,7 @@ from ..inputs.validation import validated
 from ..inputs.yamltree import Mapping, Scalar, read_tree, to_python
 from ..machines.arrangement import AXES
 from ..machines.arrangement_settings import arrangement_of
-from ..machines.curves import NAMES, Points, SmoothedPoints
+from ..machines.curves import NAMES, Points
 from ..machines.description import (
     AxisTemperature,
     MachineDescription,
@@ -135,9 +135,7 @@ def _bare(settings: DescribedMachineSettings, problems: Problems) -> MachineDesc
         axis: AxisTemperature(
             excess.expansion, excess.deviation, excess.standard_uncertainty or 0.0
         )
-        for axis, excess in (
-            {} if settings.temperature is None else settings.temperature.stated
-        ).items()
+        for axis, excess in (settings.temperature or {}).items()
     }
     machine = MachineDescription(
         title=settings.title,
@@ -232,7 +230,7 @@ def _smoothed(
     knots = tuple(sorted(settings.knots or ()))
     if settings.every is not None:
         knots = at_every(x, settings.every, float(x[0]), float(x[-1]))
-    smoothed = SmoothedPoints(points.positions, points.values, settings.order, knots)
+    smoothed = Points(points.positions, points.values, settings.order, knots)
     try:
         if len(x) < settings.order + len(knots):
             text = f"{len(x)} points do not determine {settings.order + len(knots)} coefficients"
@@ -306,11 +304,14 @@ def _read_tables(root: Mapping, source: Path, problems: Problems, trust: Trust) 
 
 
 def _line(
-    settings: Any, machine: MachineDescription, axis: int, steps: Steps, problems: Problems
+    values: dict[str, float] | None,
+    machine: MachineDescription,
+    axis: int,
+    steps: Steps,
+    problems: Problems,
 ) -> Three | None:
-    if settings is None:
+    if values is None:
         return None
-    values = settings.stated
     if AXES[axis] in values:
         problems.add(
             (*steps, AXES[axis]), f"the line runs along {AXES[axis]}; leave it out", of_key=True

@@ -6,7 +6,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import product
-from typing import Any, Literal
+from typing import Any, Literal, get_args
 
 import numpy as np
 
@@ -29,7 +29,7 @@ from ..inputs.yamltree import to_python, written
 from .bounds import OUTSIDE, TOLERANCE, Bounds, edge_of, entered, limits_of, occupied, shared
 from .model import Position, ReadingGroup
 from .placements import check_turns
-from .pool_sections import GroupSettings, PlacesByAxisSettings, RangeSettings
+from .pool_sections import GroupSettings, PlacesByAxis, RangeSettings
 
 # Candidates of a pool, those dropped included.
 MOST_CANDIDATES = 20_000
@@ -252,7 +252,7 @@ def _levels(settings: GroupSettings, steps: Steps, references: References) -> tu
 
 
 def _places(
-    lengths: PlacesByAxisSettings, planes: Sequence[Axis], steps: Steps, references: References
+    lengths: PlacesByAxis, planes: Sequence[Axis], steps: Steps, references: References
 ) -> dict[str, tuple[tuple[Place, Place], ...]]:
     axes = sorted({axis for plane in planes for axis in IN_PLANE_AXES[plane]})
     places_by_axis = _by_axis(lengths, axes, steps, references)
@@ -276,14 +276,14 @@ def _places(
 
 
 def _by_axis(
-    lengths: PlacesByAxisSettings,
+    lengths: PlacesByAxis,
     axes: Sequence[str],
     steps: Steps,
     references: References,
 ) -> dict[str, tuple[Place, ...]]:
     by_axis = {}
-    for axis in AXIS_INDEX:
-        value = getattr(lengths, axis)
+    for axis in get_args(Axis):
+        value = lengths.get(axis)
         if value is not None and axis not in axes:
             references.problems.add(
                 (*steps, axis),

@@ -65,14 +65,7 @@ class RangeSettings(Settings):
 
 
 Places = Forms[Place, Several[Place], RangeSettings]
-
-
-class PlacesByAxisSettings(Settings):
-    """Lengths, or parts of the free room, along each axis: one, a list, or a range."""
-
-    x: Places | None = Field(None, description="along x")
-    y: Places | None = Field(None, description="along y")
-    z: Places | None = Field(None, description="along z")
+PlacesByAxis = dict[Axis, Places]
 
 
 ProbeSets = Annotated[
@@ -109,14 +102,14 @@ class GroupSettings(Settings):
             " 1 m, count: 5}; omitted in 2-D"
         ),
     )
-    corners: PlacesByAxisSettings | None = Field(
+    corners: PlacesByAxis | None = Field(
         None,
         description=(
             "lower corners of the turned bounding rectangle along each axis, as lists or ranges"
             " of lengths or of parts of the free room"
         ),
     )
-    centres: PlacesByAxisSettings | None = Field(
+    centres: PlacesByAxis | None = Field(
         None, description="centres of the bounding rectangle along each axis, instead of corners"
     )
     quarter_turns: Forms[QuarterTurns, Several[QuarterTurns], QuarterTurns] = Field(
@@ -225,15 +218,8 @@ class AtMostSettings(Settings):
     count: Annotated[int, Field(ge=0, le=100_000)] = Field(description="how many of them at most")
 
 
-Ends = tuple[Length, Length]
-
-
-class RegionSettings(Settings):
-    """A region by its ends along the axes; axes that are left out are not limited."""
-
-    x: Ends | None = Field(None, description="lower and upper end along x")
-    y: Ends | None = Field(None, description="lower and upper end along y")
-    z: Ends | None = Field(None, description="lower and upper end along z")
+# Lower and upper ends; axes that are left out are not limited.
+Region = dict[Axis, tuple[Length, Length]]
 
 
 class LimitsSettings(Settings):
@@ -245,11 +231,11 @@ class LimitsSettings(Settings):
     at_most: tuple[AtMostSettings, ...] = Field(
         (), description="{of: {plane: x}, count: 2} and the like"
     )
-    reach: dict[Name, RegionSettings] = Field(
+    reach: dict[Name, Region] = Field(
         default_factory=dict,
         description="name of a probe → region in which it can read balls, {x: [200 mm, 1 m]}",
     )
-    forbidden: tuple[RegionSettings, ...] = Field(
+    forbidden: tuple[Region, ...] = Field(
         (),
         description=(
             "boxes, {x: [0 mm, 200 mm], y: [0 mm, 200 mm]}, that no artefact may enter: the box"

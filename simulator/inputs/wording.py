@@ -145,7 +145,7 @@ def _explain(error: ErrorDetails, location: _Location, root: Node, schema: Schem
             return Explanation(steps[:-1], _wrong_length(root, steps[:-1], schema))
         note = _description(schema, root, steps)
         return Explanation(steps, f'missing; add "{steps[-1]}"{note}')
-    if kind == "extra_forbidden":
+    if kind == "extra_forbidden" or (kind == "literal_error" and error["loc"][-1:] == ("[key]",)):
         return _unknown_key(steps, root, schema)
     if isinstance(node, Scalar) and node.value is None:
         return Explanation(steps, "empty; give a value, or leave it out")
@@ -193,7 +193,9 @@ def _explain(error: ErrorDetails, location: _Location, root: Node, schema: Schem
 
 def _unknown_key(steps: Steps, root: Node, schema: Schema) -> Explanation:
     keys = [
-        key for part in _schemas_at(schema, root, steps[:-1]) for key in part.get("properties", {})
+        key
+        for part in _schemas_at(schema, root, steps[:-1])
+        for key in part.get("properties", part.get("propertyNames", {}).get("enum", ()))
     ]
     used = written_keys(root, *steps[:-1])
     free = [key for key in dict.fromkeys(keys) if key not in used]

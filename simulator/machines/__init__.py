@@ -9,7 +9,7 @@ from ballplate.simulator.inputs.faces import lazily
 # Public names of this package: extensions import these alone, and its modules are private.
 if TYPE_CHECKING:
     from .arrangement import ARRANGEMENTS, AXES, Arrangement
-    from .curves import Points, SmoothedPoints
+    from .curves import Points
     from .custom import module_source
     from .description import (
         Combination,
@@ -45,7 +45,6 @@ if TYPE_CHECKING:
         VolumetricModel,
         meaning,
         squareness_field,
-        symbol,
         thermal_field,
     )
 

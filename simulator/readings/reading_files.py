@@ -77,17 +77,13 @@ def read_readings(
     :raises MissingExtensionError: the settings need that extension.
     """
     d, settings = design.dimension, settings or no_settings()
-    stated_coordinates = settings.coordinates
     sources = [source] if isinstance(source, Path | GivenText) else list(source)
     messages: list[Message] = []
     beside_units = {name: unit for kind in design.influences for name, unit in kind.columns.items()}
     units = dict.fromkeys([f"u_{axis}" for axis in AXES[:d]], LENGTH_UNITS) | beside_units
     empty = AXES[:d] if design.positions.across is not None else ()
 
-    def is_possible(x: Array) -> bool:
-        return stated_coordinates == "part" or not design.machine.volume.far_outside(x).any()
-
-    table = source_rows(sources, design, settings, messages, is_possible, units, empty)
+    table = source_rows(sources, design, settings, messages, units, empty)
     # Reports state some settings themselves.
     settings = table.settings
     rows = table.rows
@@ -142,18 +138,14 @@ def read_readings(
         raise refused(
             sources[0], f"no reading of the balls {names}; read each at least once", line=1
         )
-    table_notes, doubt = (*table.notes, *swapped), tuple[str, ...]()
+    table_notes = (*table.notes, *swapped)
     checks = optional_service("ReadingChecks")
     if checks is not None:
-        uncertainties = uncertainty.max(axis=1) if has_uncertainty else None
-        doubt += checks.doubts_about_table(
-            design, readings, coordinates, uncertainties, settings, rows[0].mark
-        )
         table_notes += checks.said_of(settings)
     observed = combine_standards(design, readings, x, missing, unplanned, marks)
-    observed = replace(observed, table_notes=table_notes, offset_doubts=doubt)
+    observed = replace(observed, table_notes=table_notes)
     if checks is not None:
-        checks.refuse_gross_errors(observed.design, observed.x, observed.marks, settings)
+        checks.refuse_gross_errors(observed.design, observed.x, observed.marks)
     _refuse_repeated(rows, readings, design)
     return observed
 

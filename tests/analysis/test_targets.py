@@ -16,12 +16,6 @@ from ballplate.extensions.maps.length_map import length_map
 from ballplate.presentation.formatting import percent
 from ballplate.rank.verdicts import Verdict, weak_limit
 from ballplate.results.checked_designs import check, predict
-from ballplate.simulator.design.arrays import nominal_state
-from ballplate.simulator.design.parameters import shared_layout
-from ballplate.simulator.estimation.corrections import correction_rows
-from ballplate.simulator.estimation.covariance import spectrum
-from ballplate.simulator.estimation.elimination import eliminate
-from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.experiment.model import Experiment
 
@@ -204,57 +198,6 @@ def test_reach_fails_on_request(tmp_path: Path) -> None:
     for factor, status in ((1.0, 0), (2.0, 1)):
         file = str(written(tmp_path, with_target(f"{1.5e6 * largest:.6f} um", factor)))
         assert main(["reach", file, "--by", "repeats", "--fail"]) == status
-
-
-def test_a_weak_direction_tells_at_how_many_points_and_what_all_do(tmp_path: Path) -> None:
-    experiment = experiment_of(tmp_path, with_target("0.02 um"))
-    found = check(experiment)
-    assert found.verdict.weak and found.lengths is not None
-    design = lay_out(experiment)
-    layout, state = shared_layout(design), nominal_state(design)
-    root = spectrum(eliminate(design, layout, state)).principal_root
-    rows = correction_rows(
-        design,
-        layout,
-        state,
-        design.evaluation.points,
-        np.full(len(design.evaluation.points), design.evaluation.probe),
-    )
-    told = []
-    for column in range(root.shape[1]):
-        change = rows @ root[:, column]
-        # Less the rigid motion that fits best, by a dense least-squares fit.
-        turns = np.stack([np.cross(axis, design.evaluation.points) for axis in np.eye(3)], axis=-1)
-        motions = np.concatenate(
-            [np.tile(np.eye(3), (len(design.evaluation.points), 1, 1)), turns], axis=2
-        ).reshape(-1, 6)
-        left = change.ravel() - motions @ np.linalg.lstsq(motions, change.ravel(), rcond=None)[0]
-        at_points = np.sqrt(2 * (left.reshape(-1, 3) ** 2).mean(axis=1))
-        size = float(np.sqrt((at_points**2).mean()))
-        if size > 2e-8:
-            told.append((size, int((at_points > 2e-8).sum())))
-    found_there = [(one.standard_deviation, one.beyond) for one in found.verdict.weak]
-    assert sorted(found_there) == [(pytest.approx(size), count) for size, count in sorted(told)]
-    lines = found.lines()
-    direction = next(line for line in lines if line.startswith("weakly determined 1"))
-    assert (
-        f"root mean square over 30 points; more than 0.02 µm at {found.verdict.weak[0].beyond}"
-        " points" in direction
-    )
-    assert f"all directions together: U6 {1e6 * found.lengths.average:.4f}"[:38] in "\n".join(lines)
-
-
-def test_a_certificate_that_may_be_any_ends_where_no_file_may_state_it(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    """What is refused beyond is no certificate that misses the goal."""
-    text = with_target("5 um").replace(
-        "standard_uncertainty: 0.2 um   #", "standard_uncertainty: 0.1 um + L/1000000 #"
-    )
-    assert main(["reach", str(written(tmp_path, text)), "--by", "certificate", "--json"]) == 0
-    answer = json.loads(capsys.readouterr().out)["answers"]["certificate"]
-    assert answer["status"] == "any" and answer["next"] is None
-    assert answer["needed"].endswith(" um + L/10100") and "is not possible" in answer["remarks"][0]
 
 
 def test_no_weak_direction_and_yet_a_target_that_is_missed(tmp_path: Path) -> None:

@@ -964,7 +964,7 @@ def test_standard_output_by_its_name(files: Path) -> None:
     command = [sys.executable, "-m", "ballplate", *arguments]
     found = subprocess.run(command, stdout=subprocess.PIPE, encoding="utf-8")
     assert found.returncode in (0, 1)
-    assert found.stdout.startswith("group,of,lengths,")
+    assert found.stdout.startswith("name,kind,redundancy,")
     assert wording.A_PLATE_IN_TWO in found.stdout.splitlines()
 
 

@@ -211,7 +211,6 @@ SOME = (
     "plan by two",
     "sweep by one",
     "report",
-    "lengths",
     "reproduce",
 )
 

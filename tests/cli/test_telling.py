@@ -99,7 +99,9 @@ def test_no_bar_when_quiet(
 ) -> None:
     with monkeypatch.context() as patched:
         patched.setattr(type(sys.stderr), "isatty", lambda self: True)
-        assert " observations" in "".join(told(capsys, "run", "--reliability", QUICKSTART)[2])
+        shown = "".join(told(capsys, "run", "--reliability", QUICKSTART)[2])
+        # Three co-ordinates of 25 balls in ten positions, and four distances.
+        assert re.search("observations: .* 754/754", shown)
         assert told(capsys, "run", "--reliability", QUICKSTART, "-q")[2] == []
 
 

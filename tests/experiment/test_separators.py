@@ -203,7 +203,7 @@ def test_tables_that_commands_are_given(folder: Path, form: str) -> None:
     assert content_of_others(folder, FORMS[form]) == content_of_others(folder, str)
 
 
-@pytest.mark.parametrize("number", ["1500.5", "0.8", "-1.5,1500", "p2,20.5", "500.25"])
+@pytest.mark.parametrize("number", ["1500.5", "-1.5,1500", "p2,20.5", "500.25"])
 def test_every_one_of_these_too(folder: Path, number: str) -> None:
     before = content_of_others(folder, str)
     assert content_of_others(folder, lambda text: text.replace(number, f"{number}1")) != before

@@ -102,7 +102,7 @@ PLACE_WITHOUT_UNIT = (
     'e.yaml:10:49: positions[0].level: "0.3" has no unit; write for example "0.3 mm" or "0.3 um"'
 )
 TWO_LENGTHS_OR_TWO_PARTS = (
-    "pool.candidates[0].levels.x: has a length at one end and a part of the free room at the other;"
+    "pool.candidates[1].levels: has a length at one end and a part of the free room at the other;"
     " give two lengths or two parts"
 )
 NO_ROOM = (

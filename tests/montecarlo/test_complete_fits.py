@@ -83,7 +83,7 @@ def hole_plates(points: int = 10) -> Reference:
     return reference(*true_experiment(bp.experiment(sections)))
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_every_data_set_ends_where_a_fit_does() -> None:
     """Ones left to a separate estimate counted as converged if others made a further pass: spread
     / U of 1.6, where fits had 1.0.
@@ -119,7 +119,7 @@ def test_what_is_left_to_a_separate_estimate_has_not_converged() -> None:
 
 @pytest.mark.parametrize(
     "design",
-    [small(), small(kept=True), with_length_standard(False), with_unknown_probes(True)],
+    [small(), small(kept=True), with_length_standard(False), with_unknown_probes()],
     ids=["distances", "neighbours", "length", "probes and length"],
 )
 def test_an_estimate_by_itself_is_that_of_the_passes(

@@ -173,24 +173,3 @@ def test_readings_of_an_interrupted_position_never_make_a_plan_worse(tmp_path: P
 def test_two_hundred_pools_at_random(tmp_path: Path) -> None:
     fine = [check_choice(random_pool(tmp_path, seed), tmp_path) for seed in range(12, 212)]
     assert sum(fine) >= 160
-
-
-@pytest.mark.long
-def test_readings_never_make_a_plan_worse_in_a_hundred_pools(tmp_path: Path) -> None:
-    assert sum(check_more_data(random_pool(tmp_path, seed)) for seed in range(32, 332, 3)) >= 40
-
-
-@pytest.mark.long
-def test_curves_of_pools_at_random_keep_above_their_bounds(tmp_path: Path) -> None:
-    points = 0
-    for seed in range(40):
-        pool = random_pool(tmp_path, seed)
-        try:
-            found = pool.planned(pool.taken, curve=True)
-        except ExperimentError:
-            continue
-        for point in found.curve:
-            if not np.isnan(point.bound):
-                assert point.bound <= point.value * (1 + 1e-9)
-                points += 1
-    assert points > 50

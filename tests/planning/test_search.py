@@ -91,11 +91,6 @@ def limits(draw: Callable[[st.SearchStrategy], object]) -> Constraints:  # type:
     return replace(base, budget=budget, at_most=tuple(at_most), must=must)  # type: ignore[arg-type]
 
 
-def test_there_are_enough_selections() -> None:
-    assert len(every()) == 8191
-    assert np.isfinite(values("U6")).sum() > 2000
-
-
 def near_the_best_and_above_the_bound(name: CriterionName, limited: Constraints) -> None:
     problem = replace(problem_of(name), constraints=limited)
     allowed = np.array([limited.allows(chosen) for chosen in every()])
@@ -159,10 +154,9 @@ def test_the_bound_is_tight_where_everything_may_be_chosen(name: CriterionName) 
     assert found.value <= values(name).min()
 
 
-@pytest.mark.parametrize("name", CRITERIA)
+# The condition has a bound of its own, and no tangent.
+@pytest.mark.parametrize("name", [name for name in CRITERIA if name != "condition"])
 def test_derivatives_are_those_of_finite_differences(name: CriterionName) -> None:
-    if name == "condition":
-        return
     problem = problem_of(name)
     information = problem.information.of(range(SIZE))
     own = slice(None) if problem.criterion.about_balls else problem.information.shared

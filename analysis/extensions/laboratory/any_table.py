@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-import numpy as np
 from ballplate.simulator.experiment import Coordinate, ReadingsSettings
 from ballplate.simulator.inputs import (
     LENGTH_UNITS,
@@ -30,12 +29,10 @@ from ballplate.simulator.inputs import (
     shorten,
     text_of_cell,
 )
-from ballplate.simulator.machines import Array
 
 from .above_headings import said_above
 from .clock_times import ClockError, ReadTime, clock_time
 from .column_units import units_of_columns
-from .doubtful_commas import commas_of_both_kinds, doubtful_decimals
 from .heading_words import NOTHING, quoted
 from .headings import TEXTS, Group, HeadedColumn, HeadingError, Vocabulary
 from .merged_cells import question
@@ -78,12 +75,10 @@ def read_any_table(
     encoding: str,
     words: Vocabulary,
     settings: ReadingsSettings,
-    is_possible: Callable[[Array], bool],
 ) -> TableRows:
     """Return rows of a table whose form is detected, or stated in the experiment.
 
-    `is_possible` is true if co-ordinates (m, d) in metres can be readings of the machine. Names
-    are those of the table; the probe is empty if not stated.
+    Names are those of the table; the probe is empty if not stated.
 
     :raises ExperimentError: the table is ambiguous, lacks columns or units, or has invalid
         entries.
@@ -103,16 +98,10 @@ def read_any_table(
         raise refused(source, f"more than {MOST_ROWS} rows; leave some out")
     try:
         form = chosen_form(forms_of(lines, words, settings))
-        if settings.decimal is None and commas_of_both_kinds(form):
-            raise NoFormError(
-                form.header,
-                "commas separate the columns, and perhaps decimals too: all co-ordinates are whole"
-                " numbers; write which under readings: decimal, or export with semicolons",
-            )
     except NoFormError as error:
         text = error.text or missing_columns(error.cells, words, words.axes)
         raise refused(source, text, line=error.line) from None
-    return _Reader(source, encoding, words, settings, form).read(is_possible)
+    return _Reader(source, encoding, words, settings, form).read()
 
 
 class AskedError(ExperimentError):
@@ -132,7 +121,7 @@ class _Reader:
     def error(self, text: str, line: int = 0) -> ExperimentError:
         return refused(self.source, text, line=line or max(self.form.header, 1))
 
-    def read(self, is_possible: Callable[[Array], bool]) -> TableRows:
+    def read(self) -> TableRows:
         form = self.form
         above, units = self._asked()
         texts, texts_above = self._texts(above)
@@ -142,7 +131,6 @@ class _Reader:
         # In the order that they were read in, also where several stand side by side.
         rows_found.sort(key=lambda row: row[0].mark.line)
         rows, diameters = [row for row, _ in rows_found], tuple(d for _, d in rows_found)
-        self._refuse_doubtful(rows, is_possible)
         notes = (self._told(units, texts_above),)
         times = tuple(
             (Mark(str(self.source), line, 1), cells[column.place], clock_time(cells[column.place]))
@@ -278,30 +266,6 @@ class _Reader:
         if messages:
             raise ExperimentError(messages)
         return rows
-
-    def _refuse_doubtful(
-        self, rows: Sequence[FileRow], is_possible: Callable[[Array], bool]
-    ) -> None:
-        """Refuse decimals that could be thousands, unless the readings were outside the machine.
-
-        :raises ExperimentError: they could.
-        """
-        # Where commas separate columns, a point is no sign of thousands.
-        form = self.form
-        is_clear = form.separator == "comma" and form.decimal == "point"
-        if self.settings.decimal is not None or is_clear:
-            return
-        cell = doubtful_decimals(form)
-        x = np.array([row.lengths[: len(self.words.axes)] for row in rows])
-        if cell and is_possible(1e3 * x):
-            plain, digits_only = cell.replace(",", "."), cell.replace(".", "").replace(",", "")
-            other = "point" if form.decimal == "comma" else "comma"
-            text = (
-                f'"{cell}" could be {plain} or {digits_only}, as could all numbers here; give'
-                f" --decimal {form.decimal} if it is {plain}, --decimal {other} if it is"
-                f" {digits_only}, or readings: {{decimal: {form.decimal}}}"
-            )
-            raise AskedError(self.error(text).messages)
 
     def _told(self, units: Mapping[int, str], notes_above: Sequence[str]) -> str:
         """Return a sentence on how the table was read."""

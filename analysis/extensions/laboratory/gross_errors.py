@@ -62,6 +62,10 @@ class WrongReading:
     partner: int = -1
     undecided: bool = False
 
+    @property
+    def is_unexplained(self) -> bool:
+        return max(self.other_ball, self.other_probe, self.partner) < 0
+
 
 @dataclass(frozen=True)
 class WrongPosition:

@@ -54,7 +54,6 @@ def any_source_rows(
     design: Design,
     settings: ReadingsSettings,
     messages: list[Message],
-    is_possible: Callable[[Array], bool],
     units: Units,
     empty: Collection[str] = (),
 ) -> SourceRows:
@@ -79,9 +78,7 @@ def any_source_rows(
 
     d = design.dimension
     tables = [
-        any_table_rows(
-            table_read, names, settings, messages, is_possible, d, units, empty, of_report
-        )
+        any_table_rows(table_read, names, settings, messages, d, units, empty, of_report)
         for table_read in tables_read
     ]
     if messages:
@@ -137,7 +134,6 @@ def any_table_rows(
     names: Mapping[str, Sequence[str]],
     settings: ReadingsSettings,
     messages: list[Message],
-    is_possible: Callable[[Array], bool],
     dimension: int,
     units: Units,
     empty: Collection[str] = (),
@@ -166,7 +162,7 @@ def any_table_rows(
         axes, tuple(names["probe"]), tuple(names["position"]), settings.columns, units, empty
     )
     try:
-        return read_any_table(text, encoding, words, settings, is_possible)
+        return read_any_table(text, encoding, words, settings)
     except ExperimentError as error:
         if (report := of_report(source, text)) is not None:
             return report

@@ -6,8 +6,6 @@ opposite in sign to the error of indication. The offset of the probe is not part
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from ballplate.simulator.computing import single_threaded
 from ballplate.simulator.machines import Array, Integers
@@ -22,22 +20,11 @@ from .volumetric_errors import LengthErrors, VolumetricErrors, length_errors
 Probed = Integers | int
 
 
-@dataclass(frozen=True, eq=False)
-class ErrorRows:
-    """Derivatives (..., b) of functions by the contents of a map; `drawn`, those on a machine
-    without errors, determine undetermined results, None without any.
+def _rows_of_errors(fitted: FittedMap, points: Array, probes: Probed) -> tuple[Array, Array | None]:
+    """Derivatives (m, d, b) of errors at points (m, d) with probes of indices (m,), or of one, by
+    the contents of a map, and those on a machine without errors, which determine undetermined
+    results, None without any.
     """
-
-    rows: Array
-    drawn: Array | None
-
-    def uncertainties(self, fitted: FittedMap) -> Array:
-        """Standard uncertainties (...), NaN where undetermined."""
-        return fitted.standard_uncertainties(self.rows, self.drawn)
-
-
-def _rows_of_errors(fitted: FittedMap, points: Array, probes: Probed) -> ErrorRows:
-    """Derivatives (m, d, b) of errors at points (m, d) with probes of indices (m,), or of one."""
     columns = fitted.offset_columns[probe_indices(fitted, len(points), probes)]
     indices, axis = np.nonzero(columns >= 0)
     _, rows = corrected(fitted, points, probes)
@@ -45,7 +32,7 @@ def _rows_of_errors(fitted: FittedMap, points: Array, probes: Probed) -> ErrorRo
     for array in (rows,) if drawn is None else (rows, drawn):
         # The offset itself is no error of the machine; what the rotations make of it is.
         array[indices, axis, columns[indices, axis]] -= 1.0
-    return ErrorRows(rows, drawn)
+    return rows, drawn
 
 
 @single_threaded
@@ -55,7 +42,7 @@ def fitted_errors(fitted: FittedMap, points: Array, probes: Probed) -> Volumetri
     for start in range(0, len(points), POINTS_AT_ONCE):
         some = slice(start, start + POINTS_AT_ONCE)
         rows = _rows_of_errors(fitted, points[some], _part(probes, some))
-        uncertainties[some] = rows.uncertainties(fitted)
+        uncertainties[some] = fitted.standard_uncertainties(*rows)
     offsets = fitted.probes.offsets[probe_indices(fitted, len(points), probes)]
     errors = fitted.model.error(points, fitted.values, offsets) - offsets
     errors[np.isnan(uncertainties)] = np.nan
@@ -68,14 +55,14 @@ def fitted_lengths(fitted: FittedMap, places: MapPlaces, probe: int) -> LengthEr
     first, last = places.starts, places.ends
     starts, ends = (corrected(fitted, points, probe)[0] for points in (first, last))
     moved = ends - last - (starts - first)
-    uncertainties = _length_rows(fitted, places, probe).uncertainties(fitted)
+    uncertainties = fitted.standard_uncertainties(*_length_rows(fitted, places, probe))
     errors = np.where(np.isnan(uncertainties), np.nan, length_errors(first, last, moved))
     nominal = np.linalg.norm(last - first, axis=1)
     return LengthErrors(first, last, nominal, errors, uncertainties)
 
 
-def _length_rows(fitted: FittedMap, places: MapPlaces, probe: int) -> ErrorRows:
-    """Derivatives (k, b) of lengths."""
+def _length_rows(fitted: FittedMap, places: MapPlaces, probe: int) -> tuple[Array, Array | None]:
+    """Derivatives (k, b) of lengths, as of errors."""
     first, last = places.starts, places.ends
     direction = (last - first) / np.linalg.norm(last - first, axis=1)[:, None]
 
@@ -85,8 +72,8 @@ def _length_rows(fitted: FittedMap, places: MapPlaces, probe: int) -> ErrorRows:
     rows = along(corrected(fitted, first, probe)[1], corrected(fitted, last, probe)[1])
     at_first, at_last = drawn_rows(fitted, first, probe), drawn_rows(fitted, last, probe)
     if at_first is None or at_last is None:
-        return ErrorRows(rows, None)
-    return ErrorRows(rows, along(at_first, at_last))
+        return rows, None
+    return rows, along(at_first, at_last)
 
 
 def _part(probes: Probed, some: slice) -> Probed:
@@ -107,9 +94,9 @@ def drawn_errors(
     errors = np.zeros((draws.count, *points.shape))
     for start in range(0, len(points), POINTS_AT_ONCE):
         some = slice(start, start + POINTS_AT_ONCE)
-        error_rows = _rows_of_errors(fitted, points[some], _part(probes, some))
-        errors[:, some] = np.tensordot(deviations, error_rows.rows, axes=(1, 2))
+        rows, _ = _rows_of_errors(fitted, points[some], _part(probes, some))
+        errors[:, some] = np.tensordot(deviations, rows, axes=(1, 2))
     errors += fitted_errors(fitted, points, probes).errors
     lengths = fitted_lengths(fitted, places, probe).errors
-    rows = _length_rows(fitted, places, probe).rows
+    rows, _ = _length_rows(fitted, places, probe)
     return Realisations(draws, errors, lengths + deviations @ rows.T)

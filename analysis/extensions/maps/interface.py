@@ -32,10 +32,9 @@ if TYPE_CHECKING:
 
     from .correction import Correction
     from .error_curves_result import ErrorCurves
-    from .fitted_errors_result import FittedErrorMap
+    from .error_map import ErrorMap
     from .map_difference import MapDifference
     from .map_places import Line
-    from .volumetric_results import MachineErrors
 
 
 def diff(
@@ -67,7 +66,6 @@ def diff(
     """
     from ballplate.simulator.inputs import Target, parse_length_function, stated_day
 
-    from .comparison import ComparisonSettings
     from .sources import map_difference
 
     ensure_whole(2, 5, grid=grid)
@@ -82,10 +80,12 @@ def diff(
     sides = [fit_map_or_path(name, side) for name, side in (("first", first), ("second", second))]
     return map_difference(
         (sides[0], sides[1]),
-        ComparisonSettings(coverage_factor, grid, probe),
-        shared is not None,
-        None if target is None else target.standard,
-        (days[0], days[1]),
+        coverage_factor=coverage_factor,
+        grid=grid,
+        probe=probe,
+        shared=shared is not None,
+        stated=None if target is None else target.standard,
+        dates=(days[0], days[1]),
     )
 
 
@@ -100,9 +100,10 @@ def map(
     draw: int | None = None,
     seed: int = 1,
     budget: bool = False,
-) -> MachineErrors | FittedErrorMap:
-    """Return volumetric errors of a machine file or of a map, with expanded uncertainties: on a
-    grid over the volume, in a plane, along a line, or at points.
+) -> ErrorMap:
+    """Return volumetric errors of a machine file, with standard deviations of its random part, or
+    of a map, with expanded uncertainties: on a grid over the volume, in a plane, along a line, or
+    at points.
 
     `line` is a text as in `ballplate map --line`, co-ordinates in metres of the two fixed axes, or
     two points; `plane` the co-ordinate of the axis across it. `points` is their number along a
@@ -112,14 +113,14 @@ def map(
 
     >>> import ballplate as bp
     >>> bp.map("designs/park/machines/npl-like.yaml", line="y = 300 mm, z = 200 mm", points=3)
-    <ErrorsOnLine of npl-like: 3 points, resultant 16.17 µm at most>
+    <ErrorMap of npl-like: 3 points, resultant 16.17 µm at most>
     >>> fitted = bp.fit(bp.quickstart(), bp.simulate(bp.quickstart())).to_map()
     >>> bp.map(fitted, points=[[0.5, 0.5, 0.5]]).errors.uncertainties.round(8)
     array([[2.2e-07, 1.9e-07, 1.7e-07]])
     """
     import numpy as np
 
-    from .map_files_of_machines import map_errors
+    from .error_map import map_errors
     from .map_places import PlacesAsked, parse_places, parse_plane
     from .realisations import MOST_DRAWS, Draws
     from .volumetric_errors import MOST_POINTS
@@ -177,7 +178,7 @@ def curves(
     from ballplate.simulator.experiment import is_map_file
 
     from .error_curves_result import error_curves, machine_curves
-    from .map_files_of_machines import map_of_source
+    from .error_sources import map_of_source
 
     ensure_whole(2, 10_000, points=points)
     names = (errors,) if isinstance(errors, str) else tuple(errors)

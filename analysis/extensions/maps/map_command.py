@@ -138,7 +138,7 @@ def _plane(text: str) -> dict[str, float]:
 
 def run(options: Namespace) -> int:
     """Print, and draw, the errors."""
-    from .map_files_of_machines import map_errors
+    from .error_map import map_errors
     from .map_places import PlacesAsked
     from .realisations import Draws
 

@@ -11,9 +11,10 @@ from pydantic import Field
 
 from ...geometry.ball_layouts import BallLayout, BallNames, Name, frozen
 from ...geometry.motions import AXIS_NAMES
+from ...geometry.positions import Axis
 from ...inputs.messages import Steps
 from ...inputs.quantities import LengthUncertainty
-from ...inputs.settings import Forms, Settings, Text, hint, listing
+from ...inputs.settings import Forms, Text, hint, listing
 from ...machines.protocol import Array, Integers
 from ..arrays import Design
 from ..lookup import References
@@ -118,14 +119,6 @@ class CoordinateCalibration(Calibration):
 CalibratedBalls = Forms[Literal["all", "corners"], BallNames, BallNames]
 
 
-class SomeAxisLengthsSettings(Settings):
-    """A standard uncertainty for some axes."""
-
-    x: LengthUncertainty | None = Field(None, description="along x; omitted: x is not calibrated")
-    y: LengthUncertainty | None = Field(None, description="along y; omitted: y is not calibrated")
-    z: LengthUncertainty | None = Field(None, description="along z; omitted: z is not calibrated")
-
-
 class CoordinatesSettings(CommonPartSettings):
     """Calibrated co-ordinates of balls in their artefact's frame."""
 
@@ -135,15 +128,15 @@ class CoordinatesSettings(CommonPartSettings):
     )
     balls: CalibratedBalls = Field("all", description="all (default), corners, or a list of balls")
     standard_uncertainty: (
-        Forms[LengthUncertainty, LengthUncertainty, SomeAxisLengthsSettings] | None
+        Forms[LengthUncertainty, LengthUncertainty, dict[Axis, LengthUncertainty]] | None
     ) = Field(
         None,
         description=(
-            "of every co-ordinate, or per axis of the artefact: {x: …, y: …}; 0 um if they are"
-            " exact; left out if values or covariance state it"
+            "of every co-ordinate, or per calibrated axis of the artefact: {x: …, y: …}; 0 um if"
+            " they are exact; left out if values or covariance state it"
         ),
     )
-    axes: tuple[Literal["x", "y", "z"], ...] | None = Field(
+    axes: tuple[Axis, ...] | None = Field(
         None,
         min_length=1,
         description=(
@@ -178,7 +171,7 @@ def read_coordinates(
     if isinstance(uncertainty, float):
         of_axes = np.full(len(axes), uncertainty)
     elif uncertainty is not None:
-        of_axes = np.array(list(uncertainty.stated.values()))
+        of_axes = np.array([uncertainty[axis] for axis in axes])
     names = [(layout.names[ball], axis) for ball in balls for axis in axes]
     of_item = None if of_axes is None else np.tile(of_axes, len(balls))
     uncertainties = uncertainties_of(
@@ -216,7 +209,7 @@ def read_coordinates(
     )
 
 
-def _axes(settings: CoordinatesSettings, steps: Steps, references: References) -> list[str] | None:
+def _axes(settings: CoordinatesSettings, steps: Steps, references: References) -> list[Axis] | None:
     """Return the calibrated axes, or report faults."""
     dimension, uncertainty = references.dimension, settings.standard_uncertainty
     place = (*steps, "standard_uncertainty")
@@ -229,7 +222,7 @@ def _axes(settings: CoordinatesSettings, steps: Steps, references: References) -
         text = "has no meaning in two dimensions; remove it"
         in_plane = references.require(dimension != 2 or "z" not in axes, place, text)
         return sorted(axes) if is_once and in_plane else None
-    axes = list(uncertainty.stated)
+    axes = sorted(uncertainty)
     if settings.axes is not None:
         text = (
             "belong to the uncertainties of a file; standard_uncertainty names the axes; remove it"

@@ -41,7 +41,7 @@ def times(experiment: bp.Experiment, *tables: pd.DataFrame) -> np.ndarray:
     settings = experiment.readings
     units = {"time": DURATION_UNITS}
     wrong: list[Message] = []
-    rows = source_rows(sources, design, settings, wrong, lambda x: True, units).rows
+    rows = source_rows(sources, design, settings, wrong, units).rows
     assert not wrong
     seconds = np.array([row.lengths[-1] for row in rows])
     return np.asarray(seconds - seconds.mean())

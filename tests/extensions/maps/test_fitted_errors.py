@@ -137,7 +137,9 @@ def test_a_line_a_plane_and_points_are_places_of_the_same_map(fitted: FittedMap)
     inside = np.flatnonzero(np.isclose(plane.errors.points, [0.45, 0.3, 0.2]).all(axis=1))
     assert plane.errors.errors[inside[0]] == pytest.approx(line.errors.errors[1], abs=1e-20)
     csv = list(given.point_lines())
-    assert csv[0].startswith("point,x_mm") and csv[2].startswith('"middle, low",450,300,200,')
+    assert csv[0].startswith("point,probe,x_mm") and csv[2].startswith(
+        '"middle, low",down,450,300,200,'
+    )
     assert [row["point"] for row in given.rows()] == table["name"].tolist()
 
 
@@ -152,10 +154,17 @@ def test_undetermined_offsets_are_no_errors_of_the_machine() -> None:
     found = bp.map(fitted, points=[[0.9, 0.8, 0.7]])
     ends = np.concatenate([found.lengths.starts, found.lengths.ends])
     pairs = [(k, 4 + k) for k in range(4)]
-    # Errors of some 10 µm per metre turn the direction along which a length counts.
-    for k, one in enumerate(bp.correct(fitted, ends, "right", pairs).lengths):
+    corrected = bp.correct(fitted, ends, "right", pairs)
+    covariance = corrected.covariance().reshape(8, 3, 8, 3)
+    for k, (start, end) in enumerate(pairs):
+        one = corrected.lengths[k]
         assert found.lengths.errors[k] == pytest.approx(one.value - one.read, abs=1e-14)
-        assert found.lengths.uncertainties[k] == pytest.approx(one.standard_uncertainty, rel=1e-4)
+        # Along the line between the scale readings, which the errors turn by some 10 µrad.
+        way = (ends[end] - ends[start]) / found.lengths.nominal[k]
+        moving = np.zeros((8, 3))
+        moving[start], moving[end] = -way, way
+        u = np.sqrt(np.einsum("ai,aibj,bj->", moving, covariance, moving))
+        assert found.lengths.uncertainties[k] == pytest.approx(u, rel=1e-9)
     n = len(fitted.values)
     p = fitted.probes.offsets[fitted.probes.names.index("right")]
     assert len(fitted.scale) == n + 3 and fitted.probe == "right"
@@ -275,7 +284,7 @@ def test_every_model_has_errors_and_curves(kind: str, tmp_path: Path) -> None:
     draw = np.random.default_rng(5).random((6, fitted.dimension))
     points = volume.lower + volume.size * draw
     found, given = bp.map(fitted, points=points, draw=2), fit.correct(points)
-    offset = fitted.probes.offsets[found.probe]
+    offset = fitted.probes.offsets[fitted.probes.names.index(fitted.probe)]
     u = given.standard_uncertainties
     if not fitted.probes.free.any():
         assert found.errors.uncertainties == pytest.approx(u, rel=1e-6, nan_ok=True)

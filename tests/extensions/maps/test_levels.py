@@ -16,7 +16,7 @@ from ballplate.extensions.maps.campaign_tests import (
     single_chances,
 )
 from ballplate.extensions.maps.compared_maps import MappedValues, motions
-from ballplate.extensions.maps.comparison import ComparisonSettings, compared
+from ballplate.extensions.maps.comparison import compared
 from ballplate.extensions.maps.normalised_errors import ValueDifference
 from ballplate.extensions.maps.shared_certificates import with_shared_certificates
 from ballplate.simulator.experiment.model import Experiment
@@ -113,10 +113,7 @@ def test_what_a_shared_certificate_fixes_is_not_counted() -> None:
     """The machine's scale is free, so that the plate's size rests on the certificate alone."""
     maps = [simulated_map(small(), 100 + k, 7) for k in range(2)]
     shared = with_shared_certificates(maps[0], maps[1])[:2]
-    apart, together = (
-        compared(one, other, ComparisonSettings(grid=2)).plates[0].test
-        for one, other in (maps, shared)
-    )
+    apart, together = (compared(one, other, grid=2).plates[0].test for one, other in (maps, shared))
     assert apart is not None and (apart.dimensions, apart.fixed) == (6, 0)
     assert together is not None and (together.dimensions, together.fixed) == (5, 1)
     assert together.held < 1e-12
@@ -186,6 +183,6 @@ def test_simulated_campaigns_are_as_linear_ones(is_shared: bool) -> None:
         ]
         if is_shared:
             maps = list(with_shared_certificates(maps[0], maps[1])[:2])
-        comparison = compared(maps[0], maps[1], ComparisonSettings(grid=2))
+        comparison = compared(maps[0], maps[1], grid=2)
         found.append([comparison.test.p, comparison.plates[0].test.p])  # type: ignore[union-attr]
     assert np.abs(np.mean(found, axis=0) - 0.5).max() < 3.5 / np.sqrt(12 * len(found))

@@ -3,9 +3,7 @@
 AS_ALIKE_AS_THESE = "as alike as these"
 A_MACHINE_FILE_STATES_ITS_OWN = "a machine file states its own probe"
 BOTH_REST_ON_SOME = "both rest on some of the same readings"
-CARRIES_CARRIES_THE_PROBE = (
-    "FB1: x carries z carries the probe, y carries the workpiece; errors are the tip's position"
-)
+CARRIES_CARRIES_THE_PROBE = "FB1: x carries z carries the probe, y carries the workpiece"
 DEGREES_OF_FREEDOM_IS_ITSELF_UNCERTAIN = "degrees of freedom is itself uncertain by"
 DOES_NOT_HOLD_WHAT_CERTIFICATES_DO = "does not hold what certificates do"
 GIVE_A_FIT_WHAT = "give a fit, what its to_map"
@@ -27,5 +25,5 @@ THE_SAME_IN_BOTH_CAMPAIGNS = "the same in both campaigns in x low:"
 THIS_DESCRIBES_A = "this describes a machine; use it with ballplate map"
 THIS_IS_AN_EXPERIMENT = "this is an experiment or a sweep; name a machine file"
 THIS_IS_A_MAP = "this is the error map of a fit"
-TILT_OF_THE_COLUMN = "tilt of the column by the arm, over the whole axis"
+TILT_OF_THE_COLUMN = "tilt of the column by the arm"
 UNDETERMINED_WHAT_THESE_CHANGE = "undetermined; what these change is not stated"

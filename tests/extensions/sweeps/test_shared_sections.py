@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import gc
 import re
 from pathlib import Path
 
@@ -11,7 +10,6 @@ import pandas
 import pytest
 from ballplate.extensions.sweeps.fingerprint import fingerprint
 from ballplate.extensions.sweeps.load import experiment_of, load_sweep
-from ballplate.simulator.experiment import structure
 from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.inputs.messages import ExperimentError
 
@@ -46,16 +44,6 @@ def test_a_wrong_cell_is_wrong_each_time(tmp_path: Path) -> None:
         told.append(str(error.value))
         experiment_of(sweep, 0)
     assert told[0] == told[1] and wording.ABOVE_THE_MEASURING_VOLUME in told[0]
-
-
-def test_what_is_shared_goes_with_the_file(tmp_path: Path) -> None:
-    gc.collect()
-    before = len(structure._VALID)
-    found = load_sweep(small_sweep(tmp_path, 3)), load(tmp_path / "quickstart.yaml")
-    assert len(structure._VALID) > before
-    del found
-    gc.collect()
-    assert len(structure._VALID) == before
 
 
 def test_an_experiment_stays_when_a_file_that_it_names_has_changed(tmp_path: Path) -> None:

@@ -83,7 +83,7 @@ def test_a_text_has_answer_averages_and_failures(
         ),
         (
             "latex",
-            r"size & a\_b\textbar{}c \& 5 \% & status & observations & rank deficiency &",
+            r"size & a\_b|c \& 5 \% & status & observations & rank deficiency &",
             r"450 mm & y\$ & done & 100 & 0 & 6 & 2.469 & 0.9 & 0.201 & 75.67 & 0.987 & 95.1 &",
         ),
     ],
@@ -91,7 +91,7 @@ def test_a_text_has_answer_averages_and_failures(
 def test_tables_for_papers_have_maxima_and_monte_carlo(
     form: str, heads: str, row: str, small: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    lines = output(small, form, capsys).splitlines()
+    lines = [" ".join(line.split()) for line in output(small, form, capsys).splitlines()]
     (head,) = [line for line in lines if line.startswith(heads)]
     assert "U4 maximum" in head and "U4 spread / U" in head and "U4 covered" in head
     assert any(line.startswith(row) for line in lines), lines
