@@ -8,7 +8,7 @@ from __future__ import annotations
 from ballplate.estimators import distances as estimators
 from ballplate.extensions.maps import correction
 from ballplate.extensions.maps import volumetric_errors as volumetric
-from ballplate.extensions.reliability import remainders
+from ballplate.extensions.diagnosis import remainders
 from ballplate.extensions.requirements import root_search
 from ballplate.extensions.splines import curve_options, error_curve, read_points
 from ballplate.extensions.sweeps import axes, bundle, load, sweep_settings

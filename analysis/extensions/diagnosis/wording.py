@@ -69,10 +69,11 @@ def findings(search: Search, marks: Sequence[Mark]) -> Iterator[Finding]:
         yield Finding("scatter", words, cure, found.p_value, found.sigma)
     if search.model:
         best = search.model.hypothesis
-        words = "the error model, a drift or the noise: no single cause explains the residuals"
-        if best:
-            words += f" but {best.words}"
+        words = "no single cause explains the residuals"
         cure = "compare error models (ballplate models), or state larger uncertainties"
+        if best:
+            lacks = f"the error model lacks {best.words}"
+            words, cure = lacks if best.assumed == MODEL else best.words, best.cure
         p_value, sigma = search.model.p_value, search.model.sigma
         yield Finding(MODEL, words, cure, p_value, sigma, is_model=True, may_be_model=True)
 
