@@ -202,7 +202,7 @@ class Fit(FitResult):
             **given(
                 error_functions=[curve.to_dict() for curve in curves],
                 residuals=self._residual_groups(),
-                diagnosis=self.diagnosis and self.diagnosis.to_dict(),
+                diagnosis=None if self.diagnosis is None else self.diagnosis.to_dict(),
             ),
             "estimates": {
                 name: picked(item, "value", "standard_uncertainty", "unit")

@@ -199,7 +199,7 @@ class LinearisedDesign:
         """
         biases = np.zeros((row_count(self.design), displacement.shape[2]))
         white = self.weight[:, :, None] * displacement[self.chosen]
-        biases[self.places["reading"]] = white.reshape(self.weight.size, -1)
+        biases[self.places["reading"]] = white.reshape(self.weight.size, displacement.shape[2])
         biases[self.places["length"]] = self.white.whitened(self.along_lengths(displacement))
         return biases
 

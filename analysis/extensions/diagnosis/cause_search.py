@@ -259,6 +259,7 @@ class Search:
         """Enter a cause with those not told apart from it, and remove it."""
         if candidate.hypothesis is None:
             columns = self._with_other_directions(self._together(candidate.columns))
+            columns = self._separate(columns)
             candidate = replace(candidate, columns=columns, biases=self._dense(columns))
         basis = basis_of(self.left, candidate.biases)
         others = [
@@ -347,6 +348,22 @@ class Search:
         if is_wider and self._given(self._dense(columns), self._dense(every)) < DIRECTIONS:
             return every
         return columns
+
+    def _separate(self, columns: Integers) -> Integers:
+        """Return the directions of a cause that show separately, the most visible one first."""
+        dense = self._dense(columns)
+        size = np.linalg.norm(dense, axis=0)
+        size[size == 0.0] = 1.0
+        remainder, is_chosen = self.left.of(dense / size), np.zeros(len(columns), bool)
+        while not is_chosen.all():
+            share = np.where(is_chosen, 0.0, (remainder**2).sum(axis=0))
+            most = int(np.flatnonzero(share >= share.max() * (1.0 - 1e-6))[0])
+            if share[most] <= HIDDEN:
+                break
+            is_chosen[most] = True
+            unit = remainder[:, most] / np.sqrt(share[most])
+            remainder = remainder - unit[:, None] * (unit @ remainder)
+        return columns[is_chosen]
 
     def _weigh(self, scatter: Scatter, log_p: float) -> None:
         """Estimate the noise of some readings, and restart with their weights."""

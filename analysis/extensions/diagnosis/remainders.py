@@ -138,8 +138,7 @@ class Columns:
     """Products of the columns of a sparse matrix (n, k) with residuals and with the root of the hat
     matrix.
 
-    `groups` are arrays (g, q) of columns that are tested together, in at most the dimensions that
-    remain of them in the nominal design, `drawn`.
+    `groups` are arrays (g, q) of columns that are tested together.
     """
 
     information: Array
@@ -149,17 +148,7 @@ class Columns:
         matrix: csc_array,
         groups: Sequence[Integers],
         remainder: Leftover,
-        drawn: Columns | None = None,
     ) -> None:
-        self.most = [
-            np.full(len(index), index.shape[1])
-            if drawn is None
-            else drawn.explained(number).dimensions
-            for number, index in enumerate(groups)
-        ]
-        self.is_determined = np.ones(matrix.shape[1], bool)
-        if drawn is not None:
-            self.is_determined = drawn.information > 0.0
         self.rows = matrix.T.tocsr()
         self.square = np.asarray(self.rows.power(2).sum(axis=1)).ravel()
         self.size = np.sqrt(np.maximum(self.square, np.finfo(float).tiny))
@@ -179,7 +168,7 @@ class Columns:
         self.product = np.asarray(self.rows @ remainder.residual)
         self.further = np.asarray(self.rows @ remainder.common[:, self._width :])
         information = self._information - (self.further**2).sum(axis=1)
-        shows = self.is_determined & (information > HIDDEN * self.square)
+        shows = information > HIDDEN * self.square
         self.information = np.where(shows, information, 0.0)
 
     def tests(self) -> int:
@@ -226,7 +215,6 @@ class Columns:
         further = self.further[index] / self.size[index][:, :, None]
         values, vectors = eigh(gram - further @ further.transpose(0, 2, 1))
         along = np.einsum("gij,gi->gj", vectors, self.product[index] / self.size[index])
-        q = index.shape[1]
-        is_visible = (values > HIDDEN) & (np.arange(q) >= q - self.most[number][:, None])
+        is_visible = values > HIDDEN
         square = np.where(is_visible, along**2 / np.where(is_visible, values, 1.0), 0.0).sum(axis=1)
         return Explained(square, is_visible.sum(axis=1).astype(float))

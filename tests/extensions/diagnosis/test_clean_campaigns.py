@@ -11,12 +11,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from ballplate.extensions.diagnosis.bias_patterns import patterns
 from ballplate.extensions.diagnosis.cause_search import Search
 from ballplate.extensions.diagnosis.refits import searched_with_refits
 from ballplate.extensions.diagnosis.tails import log_chance
-from ballplate.simulator.design.arrays import nominal_state
-from ballplate.simulator.design.observations.readings import expected_readings
 from ballplate.simulator.estimation.gauss_newton import estimate, linearised_fit
 from ballplate.simulator.estimation.linearisation import Linearisation
 from ballplate.simulator.experiment.layout import lay_out
@@ -29,7 +26,6 @@ from numpy.typing import NDArray
 from scipy.stats import beta, binom
 
 from tests.extensions.diagnosis.designs import PLATE, experiment
-from tests.extensions.diagnosis.test_search import jacobian
 
 QUICKSTART, CAMPAIGN = Path("designs/quickstart.yaml"), Path("designs/planning/campaign.yaml")
 
@@ -73,40 +69,6 @@ def fits(given: Experiment, count: int) -> Iterator[tuple[Linearisation, Real]]:
         solution = estimate(observed.design, observed.x)
         assert solution.status == "converged"
         yield linearised_fit(observed.design, solution), observed.x
-
-
-def test_what_a_design_hides_is_not_looked_for_in_its_noise(tmp_path: Path) -> None:
-    """Any error along an axis that depends on the place on it, and some slips, are taken up by the
-    machine's errors, the plate and the poses here; dense least squares show it.
-    """
-    given = of_positions(*DESIGNS[0], tmp_path)
-    design = lay_out(given)
-    state = nominal_state(design)
-    x = expected_readings(design, state, design.readings)
-    taken, hidden = jacobian(design, state, x), []
-    for axis, letter in enumerate("xyz"):
-        place = np.unique(np.round(x[:, axis], 4), return_inverse=True)[1]
-        bias = np.zeros((len(taken), place.max() + 1))
-        bias[axis : x.size : 3] = np.eye(place.max() + 1)[place]
-        assert (shares_left(taken, bias) < 1e-9).all()
-        hidden.append(f"an error in {letter} that depends on {letter}")
-    events = patterns(design, state, None, every_start=True).matrix.toarray()
-    are_hidden = shares_left(taken, events) < 1e-9
-    assert 0 < are_hidden.sum() < 0.1 * len(are_hidden)
-    at, x = next(fits(given, 1))
-    search = Search(at, x, True)
-    shown = [one.shape[1] > 0 for one in search.bases]
-    words = {one.words for one, is_shown in zip(search.hypotheses, shown, strict=True) if is_shown}
-    assert words and not words & set(hidden)
-    assert not search.columns.information[are_hidden].any()
-
-
-def shares_left(taken: Real, biases: Real) -> Real:
-    """What columns (n, k) leave of the square of biases (n, b)."""
-    left, values, _ = np.linalg.svd(taken, full_matrices=False)
-    left = left[:, values > 1e-7 * values[0]]
-    rest = biases - left @ (left.T @ biases)
-    return np.asarray((rest**2).sum(axis=0) / (biases**2).sum(axis=0))
 
 
 def test_no_test_of_smooth_errors_is_significant_too_often(tmp_path: Path) -> None:
