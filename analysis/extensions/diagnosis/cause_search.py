@@ -198,7 +198,9 @@ class Search:
             wide = self._wide(candidate, bases, np.where(named, 0.0, chances))
             noise = log_chances(self.scatters, self.left, self.estimated)
             of_wide, of_noise = float(wide.min(initial=0.0)), float(noise.min(initial=0.0))
-            is_clear = candidate.log_p < min(of_wide, of_noise) - LOG_ODDS_LIMIT
+            # An assumption that fails is named, with terms of the model, if it is no less probable.
+            odds = 0.0 if candidate.limit == self.other_limit else LOG_ODDS_LIMIT
+            is_clear = candidate.log_p < min(of_wide - odds, of_noise - LOG_ODDS_LIMIT)
             significant = candidate.log_p < candidate.limit
             if significant and is_clear and len(self.found) < MOST and self.left.freedom >= 3:
                 self._take(candidate, bases, chances, named)
@@ -286,9 +288,11 @@ class Search:
                 return True
         if is_named or log_p >= self.other_limit:
             return False
-        # One that contains the cause is wider, and not clearly less probable.
+        if log_p < candidate.log_p + LOG_ODDS_LIMIT:
+            return True
+        # One that contains the cause is wider, and clearly less probable.
         if _is_within(basis, other):
-            return log_p < candidate.log_p + LOG_ODDS_LIMIT
+            return False
         return self._given(other, basis) >= candidate.limit
 
     def _remove(self, found: FoundCause) -> None:
@@ -301,16 +305,24 @@ class Search:
         """Return a cause with the events of no more dimensions that explain nearly as much, and
         with the range of a slip.
         """
-        square = float(((basis.T @ self.left.residual) ** 2).sum())
-        freedom = self.left.freedom - basis.shape[1]
-        variance = (self.left.sum_of_squares - square) / max(freedom, 1) if self.estimated else 1.0
+        every = found.biases
+        if len(found.columns):
+            every = self._dense(all_directions(self.patterns, found.columns))
+        limits = []
+        for each in (basis, basis_of(self.left, every)):
+            square = float(((each.T @ self.left.residual) ** 2).sum())
+            rest = (self.left.sum_of_squares - square) / max(self.left.freedom - each.shape[1], 1)
+            variance = rest if self.estimated else 1.0
+            limits.append((square - APART * variance, each.shape[1]))
         own = cause(self.patterns, found.columns) if len(found.columns) else None
         slip = own if own and own.kind == "slip" else None
         starts, others = [slip.start] if slip else [], dict[Cause, Integers]()
         for number, group in enumerate(self.groups):
             explained: Explained = self.columns.explained(number)
-            near = (explained.square >= square - APART * variance) & (explained.dimensions > 0)
-            near &= explained.dimensions <= basis.shape[1]
+            near = np.zeros(len(group), bool)
+            for least, dimensions in limits:
+                near |= (explained.square >= least) & (explained.dimensions <= dimensions)
+            near &= explained.dimensions > 0
             for row in group[near]:
                 other = cause(self.patterns, row)
                 if slip and other.kind == "slip" and other.subjects == slip.subjects:
