@@ -36,7 +36,6 @@ def test_results_are_those_of_the_commands(
     assert bp.reliability(QUICKSTART).to_dict() == printed(
         capsys, "run", "--reliability", QUICKSTART
     )
-    assert bp.reach(QUICKSTART).to_dict() == printed(capsys, "reach", QUICKSTART)
 
 
 def test_a_changed_experiment_is_one_with_the_text_changed(tmp_path: Path) -> None:

@@ -66,7 +66,7 @@ def commands_of_all() -> tuple[str, ...]:
 
 def _tell_of_extensions() -> None:
     """Say which extensions that are registered are not used."""
-    for complaint in registered().complaints:
+    for complaint in registered()[1]:
         print(f"warning: {complaint}", file=sys.stderr)
 
 

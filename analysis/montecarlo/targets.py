@@ -31,6 +31,10 @@ from ..uncertainty.quantities import QUANTITIES, functions_of
 # Distances followed through all replicates; more are sampled.
 MOST_PAIRS = 1000
 
+# Displacements of points at the reference, their true co-ordinates (n, d), and their change (b, d,
+# n).
+Displaced = tuple[Displacements, Array, Callable[[Deviations], Array]]
+
 # Fraction of the largest uncertainty in a unit below which a value is unchanged but for rounding.
 UNCHANGED = 1e-8
 
@@ -87,17 +91,6 @@ def targets(shared: Reference) -> tuple[MonteCarloQuantity, ...]:
     )
 
 
-@dataclass(frozen=True)
-class Displaced:
-    """Points at the reference, with their displacements, their true co-ordinates `truly` (n, d),
-    and their change (b, d, n).
-    """
-
-    moved: Displacements
-    truly: Array
-    change: Callable[[Deviations], Array]
-
-
 def _displaced(shared: Reference, at: Linearisation) -> Callable[[Places], Displaced]:
     """Return a function from places to `Displaced`, with a cache of points."""
     cache = {}
@@ -105,14 +98,12 @@ def _displaced(shared: Reference, at: Linearisation) -> Callable[[Places], Displ
     def displaced(places: Places) -> Displaced:
         if isinstance(places, BallPlaces):
             truly = places.at(at.design, shared.truth.state)
-            return Displaced(
-                displacements(at, places), truly, lambda change: change.balls[:, :, places.index]
-            )
+            return displacements(at, places), truly, lambda change: change.balls[:, :, places.index]
         key = places.points.tobytes() + places.probes.tobytes()
         if key not in cache:
             true = replace(at.design, model=shared.truth.model)
             truly = places.at(true, shared.truth.state)
-            cache[key] = Displaced(displacements(at, places), truly, _change(shared, places))
+            cache[key] = displacements(at, places), truly, _change(shared, places)
         return cache[key]
 
     return displaced
@@ -196,21 +187,21 @@ def _shared(layout: SharedLayout, deviations: Deviations) -> Array:
 
 
 def _coordinates(symbol: str, displaced: Displaced) -> MonteCarloQuantity:
-    base, moved = (displaced.moved.places - displaced.truly).ravel(), displaced.change
+    points, truly, moved = displaced
+    base = (points.places - truly).ravel()
 
     def change(replicates: Deviations) -> Array:
         return moved(replicates).swapaxes(1, 2).reshape(-1, len(base))
 
     return MonteCarloQuantity(
-        symbol, base, displaced.moved.uncertainties.ravel(), ("m",) * len(base), change
+        symbol, base, points.uncertainties.ravel(), ("m",) * len(base), change
     )
 
 
-def _distances(
-    symbol: str, functions: Distances, displaced_points: Displaced
-) -> MonteCarloQuantity:
+def _distances(symbol: str, functions: Distances, displaced: Displaced) -> MonteCarloQuantity:
     """Return distances between all points, a sample of them, or given pairs."""
-    places, moved = displaced_points.moved.places, displaced_points.change
+    points, truly, moved = displaced
+    places = points.places
     if functions.pairs is None:
         *ends, sampled = sample_of_pairs(len(places), MOST_PAIRS)
     else:
@@ -218,15 +209,13 @@ def _distances(
     first, second = ends
     between = places[first] - places[second]
     length = np.linalg.norm(between, axis=1)
-    true_length = np.linalg.norm(
-        displaced_points.truly[first] - displaced_points.truly[second], axis=1
-    )
-    pairs = pairs_of(displaced_points.moved, np.stack(ends, axis=1))
+    true_length = np.linalg.norm(truly[first] - truly[second], axis=1)
+    pairs = pairs_of(points, np.stack(ends, axis=1))
     uncertainty = np.where(pairs.is_open, np.nan, pairs.uncertainties)
 
     def change(replicates: Deviations) -> Array:
-        displaced = moved(replicates)
-        difference = displaced[:, :, first] - displaced[:, :, second]
+        change = moved(replicates)
+        difference = change[:, :, first] - change[:, :, second]
         # The difference of squared lengths from that of co-ordinates keeps all digits.
         gained = (difference * (difference + 2.0 * between.T)).sum(axis=1)
         return gained / (np.sqrt(length**2 + gained) + length)

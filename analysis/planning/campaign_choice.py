@@ -19,7 +19,7 @@ from ballplate.planning.criteria import (
 )
 from ballplate.planning.information import pool_information
 from ballplate.planning.remaining_candidates import Offer, offer, open_directions
-from ballplate.planning.schedule import Completion, run_sheet
+from ballplate.planning.schedule import run_sheet
 from ballplate.planning.search import (
     GAIN,
     Found,
@@ -192,7 +192,7 @@ def _campaign(
     _refuse_lacking(experiment, problem, best, begun)
     completed = None
     if standing is not None and standing.rest in best.chosen:
-        completed = Completion(candidates[standing.rest], standing.whole)
+        completed = candidates[standing.rest], standing.whole
     chosen = offered.together(best.chosen)
     left_open = open_directions(offered, information, best.chosen)
     # What no candidate determines may be expected; what the choice alone leaves open is not.

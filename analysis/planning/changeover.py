@@ -35,15 +35,6 @@ class Visit:
     last: str
 
 
-@dataclass(frozen=True)
-class Order:
-    """A short order, its `seconds`, and an optional probe left from an earlier position."""
-
-    seconds: float
-    visits: tuple[Visit, ...]
-    before: str | None
-
-
 def kind_of(candidate: Candidate) -> Setup:
     """Return the change-over class of a candidate that is a position.
 
@@ -70,7 +61,7 @@ def changeover(kinds: Collection[Setup], changes: ChangeTimes, first: Setup | No
         kind: count if len(kind.probes) > 2 else 2 - count % 2
         for kind, count in Counter(kinds).items()
     }
-    return short_order(counted.items(), changes, first, is_paid=True).seconds
+    return short_order(counted.items(), changes, first, is_paid=True)[0]
 
 
 def short_order(
@@ -78,8 +69,9 @@ def short_order(
     changes: ChangeTimes,
     after: Setup | None = None,
     is_paid: bool = False,
-) -> Order:
-    """Return a short order of positions, of kinds with their numbers.
+) -> tuple[float, tuple[Visit, ...], str | None]:
+    """Return the seconds and visits of a short order of positions, of kinds with their numbers, and
+    an optional probe left from an earlier position.
 
     It begins after a position of the kind `after`, which may end with any of its probes. Unless
     going on from there `is_paid`, that only decides between orders that cost the same.
@@ -90,7 +82,7 @@ def short_order(
 @lru_cache(maxsize=100_000)
 def _order(
     kinds: frozenset[tuple[Setup, int]], changes: ChangeTimes, after: Setup | None, is_paid: bool
-) -> Order:
+) -> tuple[float, tuple[Visit, ...], str | None]:
     # The order of a set differs from run to run.
     todo = sorted(kinds, key=lambda item: (item[0].artefact, item[0].plane, sorted(item[0].probes)))
     before: list[Visit | None] = [None]
@@ -105,9 +97,9 @@ def _order(
             left = None if earlier is None else earlier.last
             orders.append((seconds + begun * is_paid, begun, visits, left))
     if not orders:
-        return Order(0.0, (), None)
+        return 0.0, (), None
     seconds, _, visits, left = min(orders, key=lambda order: order[:2])
-    return Order(seconds, tuple(visits), left)
+    return seconds, tuple(visits), left
 
 
 def _followed(start: Visit, todo: dict[Setup, int], changes: ChangeTimes) -> list[Visit]:

@@ -18,16 +18,6 @@ Sequenced = Sequence[tuple[Candidate, tuple[str, ...]]]
 
 
 @dataclass(frozen=True)
-class Completion:
-    """Missing readings of a position whose artefact is still set up, and the position with all its
-    readings.
-    """
-
-    rest: Candidate
-    whole: Candidate
-
-
-@dataclass(frozen=True)
 class Step:
     """A position of a run sheet: set-up and readings as text, probes in order.
 
@@ -143,17 +133,18 @@ def run_sheet(
     chosen: Sequence[Candidate],
     changes: ChangeTimes,
     done: Sequence[Candidate] = (),
-    completed: Completion | None = None,
+    completed: tuple[Candidate, Candidate] | None = None,
     interrupted: Collection[Candidate] = (),
 ) -> RunSheet:
     """Return the run sheet of chosen candidates in a short order, completed ones first in theirs.
 
     `done` candidates may be among the chosen ones; they take no more time, and the first remaining
-    position needs no change, like any first one. A `completed` position is that first one while
-    its artefact is set up; only its missing readings take time. Other `interrupted` positions are
-    unchanged.
+    position needs no change, like any first one. A `completed` position, by its missing readings
+    and with all of them, is that first one while its artefact is set up; only its missing readings
+    take time. Other `interrupted` positions are unchanged.
     """
-    again = set() if completed is None else {completed.whole.name}
+    rest, whole = completed or (None, None)
+    again = set() if whole is None else {whole.name}
     before = [
         candidate
         for candidate in done
@@ -166,11 +157,9 @@ def run_sheet(
         for candidate in chosen
         if isinstance(candidate.item, Position) and candidate.name not in earlier
     ]
-    first = None if completed is None else completed.rest
     steps = []
-    for step in steps_of(ordered(positions, changes, before, first), changes, len(before)):
-        if completed is not None and step.candidate is completed.rest:
-            whole = completed.whole
+    for step in steps_of(ordered(positions, changes, before, rest), changes, len(before)):
+        if whole is not None and step.candidate is rest:
             place = f"as it stands: {step.place}"
             balls = f"the rest, {step.readings} of {whole.readings} readings: {step.balls}"
             step = replace(step, place=place, balls=balls, whole=whole)
@@ -288,7 +277,7 @@ def ordered(
     by_kind: dict[Setup, list[Candidate]] = {}
     for candidate in positions:
         by_kind.setdefault(kind_of(candidate), []).append(candidate)
-    order = short_order(
+    _, order, before = short_order(
         [(kind, len(members)) for kind, members in by_kind.items()],
         changes,
         None if after is None else kind_of(after),
@@ -296,9 +285,9 @@ def ordered(
     )
     visits = [(candidate, position_of(candidate).probes) for candidate in done]
     if first is not None:
-        visits.append((first, _probes(first, None, order.before)))
+        visits.append((first, _probes(first, None, before)))
     remaining = {kind: iter(members) for kind, members in by_kind.items()}
-    for visit in order.visits:
+    for visit in order:
         candidate = next(remaining[visit.kind])
         visits.append((candidate, _probes(candidate, visit.first, visit.last)))
     return tuple(visits)

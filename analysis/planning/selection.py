@@ -23,7 +23,7 @@ from .constraints import HOUR, Budget, Spent
 from .criteria import DESCRIPTIONS, MAXIMUM, CriterionName
 from .experiment_file import experiment_text
 from .run_sheet_tables import sheet_data, sheet_lines
-from .schedule import Completion, RunSheet
+from .schedule import RunSheet
 from .set_ups import REST, base_name
 
 if TYPE_CHECKING:
@@ -92,7 +92,7 @@ class Campaign(Result):
     prediction: Prediction
     sheet: RunSheet
     curve: tuple[CurvePoint, ...] = ()
-    completed: Completion | None = None
+    completed: tuple[Candidate, Candidate] | None = None
     interrupted: tuple[Candidate, ...] = ()
     left_open: int = 0
     ignored: tuple[Candidate, ...] = ()
@@ -225,7 +225,7 @@ class Campaign(Result):
             "names": self.sheet.names,
             "done": _names(self.done),
             "interrupted": [picked(position, "name", "readings") for position in self.interrupted],
-            "completed": self.completed and self.completed.whole.name,
+            "completed": self.completed and self.completed[1].name,
             "left_open": self.left_open,
             "ignored": _names(self.ignored),
             "gains": list(map(_gain_data, self.gains)),
@@ -268,8 +268,8 @@ def _interrupted(campaign: Campaign) -> list[str]:
     for position in campaign.interrupted:
         count = number_of(position.readings, "reading")
         text = f"{campaign.title_of(position)} was interrupted after {count}"
-        if campaign.completed is not None and campaign.completed.whole.name == position.name:
-            text += f"; {campaign.completed.rest.readings} more complete it"
+        if campaign.completed is not None and campaign.completed[1].name == position.name:
+            text += f"; {campaign.completed[0].readings} more complete it"
         elif again := [
             name
             for name in names

@@ -18,9 +18,7 @@ if TYPE_CHECKING:
         ascii_units,
         chance_words,
         finite,
-        fixed,
         given,
-        micro,
         number,
         percent,
         picked,
@@ -34,8 +32,6 @@ if TYPE_CHECKING:
     from .result import FitResult, Result
     from .scenes import (
         MOST_BALLS,
-        RISE,
-        TURN,
         box,
         box_edges,
         hull,

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     )
     from .fits import Fit
     from .fitting import fit
-    from .map_of_fit import MappedFit, data_of, left_out_words
+    from .map_of_fit import data_of, left_out_words
     from .prediction import Prediction
     from .qualifications import Qualification, given_words, qualification_data, qualifications_of
     from .residuals import reading_residuals

@@ -10,7 +10,7 @@ from ballplate.extensions.diagnosis import remainders
 from ballplate.extensions.maps import correction
 from ballplate.extensions.maps import volumetric_errors as volumetric
 from ballplate.extensions.requirements import root_search
-from ballplate.extensions.splines import curve_options, error_curve, read_points
+from ballplate.extensions.splines import error_curve, read_points
 from ballplate.extensions.sweeps import axes, bundle, load, sweep_settings
 from ballplate.montecarlo import trial_runs
 from ballplate.planning import criteria, information
@@ -83,11 +83,7 @@ LIMITS = {
         "`reach`: evaluation points": (root_search.MOST_POINTS,),
         "`correct --covariance`: co-ordinates": (correction.MOST_CO_ORDINATES,),
         "`map`: points": (volumetric.MOST_POINTS,),
-        "`spline`: points, coefficients, order": (
-            read_points.MOST_POINTS,
-            error_curve.MOST_COEFFICIENTS,
-            curve_options.MOST_ORDER,
-        ),
+        "`spline`: points, coefficients": (read_points.MOST_POINTS, error_curve.MOST_COEFFICIENTS),
     },
 }
 

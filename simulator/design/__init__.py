@@ -37,7 +37,7 @@ if TYPE_CHECKING:
         InfluenceSettings,
     )
     from .influences.sag import Sag, SagSettings
-    from .influences.temperature import COLDEST, WARMEST, TemperaturesSettings
+    from .influences.temperature import TemperaturesSettings
     from .lookup import Indices, References
     from .objects import SLIGHTLY, Flags, Tasks, Volume
     from .observations.balls import BallObservations

@@ -25,7 +25,6 @@ if TYPE_CHECKING:
         Probe,
         ReadingGroup,
     )
-    from .model_files import absolute
     from .modules import python_models, runs_code
     from .name_rules import PLACE, check_rule
     from .named_files import (
@@ -48,7 +47,6 @@ if TYPE_CHECKING:
     )
     from .sections import Line, Seed
     from .spans import unspanned
-    from .star_tables import doubt_of_table
     from .variants import (
         is_same_place,
         node_at,

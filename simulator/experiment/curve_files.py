@@ -30,25 +30,17 @@ MOST_POINTS = 20_000
 SAME_TARGET = 1 / 200
 
 
-def read_curves(path: Path) -> dict[str, Points]:
-    """Read curves of one axis from a file whose first line names the columns, such as
-    position_mm,EXX_um,EAX_urad.
-
-    :raises ExperimentError: all faults of the file at once.
-    """
-    return read_numbered_curves(path)[0]
-
-
 def read_numbered_curves(
     path: Path, bandwidths: bool = False
 ) -> tuple[dict[str, Points], tuple[int, ...], str]:
-    """The same with the number of each point's line, and a note on means; with `bandwidths` columns
-    such as EXX_bandwidth_um are curves too.
+    """Read curves of one axis from a file whose first line names the columns, such as
+    position_mm,EXX_um,EAX_urad; return them with the number of each point's line, and a note on
+    means. With `bandwidths` columns such as EXX_bandwidth_um are curves too.
 
     Target positions that occur several times, as in runs there and back, have the mean of both
     directions, in position too: runs meet a target within `SAME_TARGET` of their smallest step.
 
-    :raises ExperimentError: as `read_curves`.
+    :raises ExperimentError: all faults of the file at once.
     """
     file, lines = str(path), table_lines(path)
     if len(lines) > MOST_POINTS + 1:

@@ -131,7 +131,7 @@ def _bare(settings: DescribedMachineSettings, problems: Problems) -> MachineDesc
         )
         problems.add(("droop",), text, of_key=True)
     bottom, top = (_three(end) for end in zip(*ends, strict=True))
-    temperature = {
+    temperature: dict[str, AxisTemperature] = {
         axis: AxisTemperature(
             excess.expansion, excess.deviation, excess.standard_uncertainty or 0.0
         )

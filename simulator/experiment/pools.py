@@ -5,6 +5,7 @@ choice.
 from __future__ import annotations
 
 import fnmatch
+from collections import Counter
 from collections.abc import Iterable
 from collections.abc import Mapping as AnyMapping
 from collections.abc import Sequence as AnySequence
@@ -13,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from ..design.lookup import ReadingCount, References
+from ..design.lookup import References
 from ..design.observations.calibration import Calibration
 from ..design.observations.radius import RadiusCalibration
 from ..geometry.positions import AXIS_INDEX
@@ -103,7 +104,7 @@ def resolve_candidates(
         result.complete = node is None
         return result
     # The candidates have a limit of their own.
-    references = replace(references, tally=ReadingCount())
+    references = replace(references, tally=Counter())
     # Candidates may be what a key that is misspelt or no list was meant to be.
     is_known = isinstance(node, Mapping) and set(node.items) <= set(PoolSettings.model_fields)
     is_list = isinstance(written(root, "pool", "candidates"), Sequence | None)

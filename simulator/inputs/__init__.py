@@ -78,15 +78,11 @@ if TYPE_CHECKING:
         MOST_COLUMNS,
         MOST_ROWS,
         FileRow,
-        TableLine,
-        decimal_sign,
         header_cells,
         header_names,
         header_texts,
-        read_number,
         read_table,
         table_lines,
-        wrong_count,
     )
     from .trust import OPENED, UNKNOWN, Trust
     from .unusable import UnusableError

@@ -19,7 +19,6 @@ if TYPE_CHECKING:
         reference_functions,
         true_volumetric,
     )
-    from .empirical import USUAL_OFFSET
     from .empirical_settings import EmpiricalSettings
     from .error_names import SQUARENESS_ERRORS, SquarenessError
     from .kinematic import KinematicModel, error_function
@@ -41,7 +40,6 @@ if TYPE_CHECKING:
         build_error_model,
     )
     from .volumetric import (
-        SQUARENESS,
         VolumetricModel,
         meaning,
         squareness_field,

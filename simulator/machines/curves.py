@@ -60,12 +60,11 @@ class Points:
         curve = Curve(tuple(t.tolist()), tuple(self.values[k] for k in first), interpolation)
         if not self.order:
             return curve
-        fitted = pieces(self.fitted)
         powers = length ** np.arange(self.order)
         return replace(
             curve,
-            breaks=tuple(((fitted.breaks - lower) / length).tolist()),
-            pieces=tuple(map(tuple, (fitted.coefficients * powers).tolist())),
+            breaks=tuple(((self.fitted.space.breaks - lower) / length).tolist()),
+            pieces=tuple(map(tuple, (pieces(self.fitted) * powers).tolist())),
         )
 
 

@@ -256,7 +256,7 @@ def test_many_fits_in_two_dimensions_scatter_as_the_covariance_says(tmp_path: Pa
     assert_scatter(
         design_of(tmp_path, text + points, "any angles"),
         ("machine", "rotation", "r4c4: x", "r2c3: y"),
-        300,
+        150,
     )
 
 

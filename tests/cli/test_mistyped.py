@@ -119,8 +119,3 @@ def test_files_in_each_others_place_are_told(
         # A table in the place of a map is refused as a file, with its line.
         assert main(arguments) == (3 if "diff" in arguments else 2), arguments
         assert words in capsys.readouterr().err
-
-
-def test_the_grammar_of_one_command_is_that_among_all() -> None:
-    for name, command in commands().items():
-        assert parser([name]).commands[name].format_help() == command.format_help()

@@ -4,7 +4,6 @@ results stay the same.
 
 from __future__ import annotations
 
-import argparse
 import re
 import shlex
 import sys
@@ -12,7 +11,7 @@ from importlib.metadata import version
 from pathlib import Path
 
 import pytest
-from ballplate.cli import main, parser
+from ballplate.cli import main
 
 QUICKSTART = "designs/quickstart.yaml"
 
@@ -22,16 +21,6 @@ def told(capsys: pytest.CaptureFixture[str], *arguments: object) -> tuple[int, s
     status = main([str(one) for one in arguments])
     out, err = capsys.readouterr()
     return status, out, err.splitlines()
-
-
-def test_every_command_takes_both() -> None:
-    (commands,) = (
-        action for action in parser()._actions if isinstance(action, argparse._SubParsersAction)
-    )
-    for command in commands.choices.values():
-        assert {"-q", "--quiet", "-v", "--verbose"} <= set(command._option_string_actions), (
-            command.prog
-        )
 
 
 @pytest.mark.parametrize("command", ["check", "run --reliability"])

@@ -27,15 +27,6 @@ def run(*arguments: str | Path) -> int:
     return main([str(argument) for argument in arguments])
 
 
-def test_trials_stand_beside_the_tables(capsys: pytest.CaptureFixture[str]) -> None:
-    assert run("run", QUICKSTART, "--trials", "100", "--workers", "1") == 0
-    out, err = capsys.readouterr()
-    assert wording.DISTANCES_BETWEEN_CORRECTED_POINTS in out
-    assert wording.MONTE_CARLO_DATA_SETS_OF_THE_TRUE in out
-    assert "S^2 is" in out and "Too optimistic" not in out
-    assert err == ""
-
-
 def test_trials_as_json(capsys: pytest.CaptureFixture[str]) -> None:
     assert run("run", QUICKSTART, "--trials", "100", "--seed", "4", "--workers", "1", "--json") == 0
     first = capsys.readouterr().out

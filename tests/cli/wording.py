@@ -50,7 +50,6 @@ DIRECTIONS_ARE_TOO_MANY = (
     "12:57: artefacts.many.directions: 5040 directions are too many; at most 5000 are possible"
 )
 DISTANCES_AGAINST_THE_TRUE_MACHINES = "distances against the true machine's"
-DISTANCES_BETWEEN_CORRECTED_POINTS = "U6  distances between corrected points"
 ESTIMATORS_OF_DISTANCES_ALONE_CANNOT_FOLLOW = (
     "artefacts: estimators of distances alone cannot follow a Bryan gauge's pivot; use --estimator"
 )
@@ -92,7 +91,6 @@ MONOMIALS_APPLIES_TO_ESTIMATOR_FULL = (
     "--monomials applies to --estimator full, distances, cresto or kruth only; leave it out"
 )
 MONTE_CARLO_DATA_SETS = "Monte Carlo: 10 data sets of the true machine"
-MONTE_CARLO_DATA_SETS_OF_THE_TRUE = "Monte Carlo: 100 data sets of the true machine, seed 1"
 NO_READING_OF_THE_BALLS = 'no reading of the balls "r1c2", "r1c3"'
 OF_THE_STATED_ONES = "of the stated ones"
 ONLY_A_BRYAN_GAUGE_HAS = (

@@ -348,17 +348,3 @@ def test_the_schema_knows_the_places_that_are_read(place: str, is_valid: bool) -
         assert not is_valid
     else:
         assert is_valid
-
-
-def test_the_quickstart_is_where_it_was() -> None:
-    """NPL's design in lengths."""
-    (experiment,) = load(Path("designs/quickstart.yaml"))
-    origins = {position.name: position.pose.origin.tolist() for position in experiment.positions}
-    corners = {name: (0.0, 0.25)["high" in name] for name in origins}
-    for position in experiment.positions:
-        layout = experiment.layouts["plate"].coordinates
-        balls = layout @ position.pose.rotation.T + position.pose.origin
-        plane, end = position.name.split()
-        lower = [corners[position.name]] * 3
-        lower["xyz".index(plane)] = 0.25 if end == "low" else 0.75
-        np.testing.assert_array_equal(balls.min(axis=0), lower)

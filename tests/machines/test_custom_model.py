@@ -110,13 +110,7 @@ def test_an_installed_entry_point(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
 @pytest.mark.parametrize(
     ("old", "new", "words"),
     [
-        (
-            "import numpy as np",
-            "import nonsense_nobody_has",
-            "cannot be imported: ModuleNotFoundError",
-        ),
         ("import numpy as np", "import numpy as", "cannot be imported: SyntaxError"),
-        ("import numpy as np", "from numpy import nothing_at_all", "ImportError: cannot import"),
         ("def build(", "def built(", 'has no "build"; did you mean "built"?'),
         (
             "    return Straight(",
@@ -139,7 +133,6 @@ def test_an_installed_entry_point(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
         ('"rad", name', '"urad", name', 'the unit of "squareness xy" is "urad"'),
         ("name, span)", "name, 0.0)", "the effect of"),
         ("a) + p", "a) + p * np.nan", "not finite numbers"),
-        ("return result", "return result[:, :2]", "operands could not be broadcast"),
         (
             "a) + p",
             "a)[:3] + p[:3]",

@@ -3,5 +3,4 @@
 DID_YOU_MEAN = 'did you mean "straight"?'
 FOR_AN_OBJECT_OF_A_MODULE = "for an object of a module write module:name"
 NO_ENTRY_POINT = 'no entry point "straigth"'
-OUT_OF_ORDER_OR_RANGE = "out of order or range"
 UNKNOWN_PARAMETER_DID_YOU_MEAN = 'unknown parameter "squarness xz"; did you mean "squareness xz"?'

@@ -76,12 +76,3 @@ def test_a_map_corrects_as_its_fit(kind: str, folder: Path) -> None:
         found, right = np.linalg.norm(root, axis=2), known.standard_uncertainties
         assert np.array_equal(np.isnan(found), np.isnan(right))
         assert np.nanmax(np.abs(found - right), initial=0.0) < 1e-9 * np.nanmax(right, initial=1e-9)
-
-
-def test_uncertainties_of_parameters_are_those_of_the_fit(folder: Path) -> None:
-    for kind in MODELS:
-        fit = fit_of(kind, folder)
-        fitted = fit.to_map()
-        known = {one.name: one.standard_uncertainty for one in fit.estimates}
-        right = [known[one.name] for one in fitted.parameters]
-        assert np.allclose(fitted.standard_uncertainties(), right, rtol=1e-9, equal_nan=True), kind

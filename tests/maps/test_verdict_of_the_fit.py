@@ -91,13 +91,6 @@ def test_what_is_beyond_the_limit_is_significant() -> None:
     assert not LackOfFit(1e9, 0).is_beyond_limit
 
 
-def test_no_setting_of_sigma_hides_it() -> None:
-    result = fit("beyond", sigma="given")
-    assert result.sigma == 1.0 and "beyond the limit" in result.complaint
-    lack = result.to_map().lack_of_fit
-    assert lack is not None and lack.is_beyond_limit
-
-
 def test_a_target_is_not_simply_met_beyond_the_limit() -> None:
     """With sigma as given U6 is that of the plan, however large the residuals."""
     caveat = "of which nothing can be relied on: lack of fit is beyond the limit"

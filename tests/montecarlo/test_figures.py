@@ -181,16 +181,16 @@ def test_a_replicate_that_does_not_converge_is_named(monkeypatch: pytest.MonkeyP
 def test_too_poor_a_model_is_too_optimistic() -> None:
     """NPL Report CISE 15/98, section 5.3: an empirical machine, a kinematic fit."""
     done = trials(shipped("npl/5.3.yaml", "kinematic fit"), 128)
-    assert done.outcome is not None and done.optimism is not None
+    assert done.outcome is not None and done.power is not None
     for symbol in ("U4", "U5", "U6"):
         one = done.outcome.comparisons[symbol]
         assert one.actual.value > 5 and abs(one.spread.value - 1.0) < 4 * one.spread.error + 0.05
         assert {"bias", "coverage"} <= set(one.flags)
     assert "U3" not in done.outcome.comparisons
-    assert done.optimism.power > 0.999
+    assert done.power > 0.999
     lines = "\n".join(trials_lines(done))
     assert wording.TOO_OPTIMISTIC_THE_FITTED_MODEL_CANNOT in lines
-    assert trials_data(done)["too_optimistic"]["misfit_noticed"] == done.optimism.power
+    assert trials_data(done)["too_optimistic"]["misfit_noticed"] == done.power
     # A misfit that does no harm.
     for ratio, harm in (
         (MonteCarloEstimate(1.03, 0.01), False),
@@ -214,10 +214,10 @@ def test_a_second_fit_with_the_true_functions(variant: str) -> None:
     done = trials(experiment, 16)
     assert done.outcome is not None
     if variant == "empirical fit":
-        assert done.optimism is not None and done.optimism.own_model is None
+        assert done.power is not None and done.own_model is None
         return
-    assert done.optimism is not None and done.optimism.own_model is not None
-    own = done.optimism.own_model
+    assert done.power is not None and done.own_model is not None
+    own = done.own_model
     # The rank that the true machine's functions add, by a singular value decomposition of both
     # models' derivatives.
     design, truth = true_experiment(experiment)

@@ -272,7 +272,7 @@ def test_a_model_that_is_not_linear_is_evaluated_itself() -> None:
     large = truth(design, size=2e-4)
     shared = reference(design, large)
     assert isinstance(shared.groups[0].model, Direct)
-    found = estimate_batch(shared, seed=5, batch=0)
+    found = estimate_batch(shared, 5, 0, 8)
     state, squares = alone(shared, 5, 3)
     assert found.converged.all()
     assert_agree(shared, found, state, squares, 3)

@@ -94,7 +94,7 @@ corner, angle_certificate = str(folder / "corner.yaml"), str(folder / "angle.csv
 said("simulate", corner, "-o", readings + "2", "--certificate", angle_certificate, "--seed", "2")
 angular = bp.reliability(bp.load(corner), sigma="given")
 print(json.dumps({
-    "run": bp.run(start, trials=2048).to_dict(),
+    "run": bp.run(start, trials=512).to_dict(),
     "few": bp.check(folder / "few.yaml").to_dict(),
     "plan": bp.plan(folder / "pool.yaml", "U6", hours=100.0).to_dict(),
     "reliability": biases.to_dict(),

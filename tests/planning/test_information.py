@@ -89,7 +89,7 @@ def test_equal_to_the_full_computation(tmp_path: Path, name: CriterionName) -> N
     assert experiment.pool is not None
     problem = problem_of(experiment, name)
     compared = 0
-    for chosen in selections(experiment, 30, 7, 3):
+    for chosen in selections(experiment, 20, 7, 3):
         full = predict(with_chosen(experiment, [experiment.pool.candidates[k] for k in chosen]))
         found = value(problem, chosen)
         assert np.isfinite(found) == (full.verdict.deficiency == 0)
@@ -98,7 +98,7 @@ def test_equal_to_the_full_computation(tmp_path: Path, name: CriterionName) -> N
             assert found == pytest.approx(in_full(full, name), rel=1e-9)
             # So are the figures that exchanges compare.
             assert Losses(problem).of(frozenset(chosen)) == pytest.approx(found, rel=1e-8)
-    assert compared > 10
+    assert compared > 6
 
 
 @pytest.mark.parametrize("name", ["U6", "U5"])
@@ -224,10 +224,6 @@ TIGHT = {
         "pairs: corner sides, standard_uncertainty: 0.5 um, price",
         "pairs: corner sides, standard_uncertainty: 1e-9 um, price",
     ),
-    "a certificate": (
-        "standard_uncertainty: 0.5 um}\ntarget",
-        "standard_uncertainty: 1e-9 um}\ntarget",
-    ),
 }
 
 
@@ -241,7 +237,7 @@ def test_equal_beside_what_is_known_all_but_exactly(tmp_path: Path, what: str) -
     problems = {name: problem_of(experiment, name) for name in names}
     assert all(problem.information.deficiency == 0 for problem in problems.values())
     compared = 0
-    for chosen in selections(experiment, 15, 7, 3):
+    for chosen in selections(experiment, 10, 7, 3):
         full = predict(with_chosen(experiment, [experiment.pool.candidates[k] for k in chosen]))
         for name, problem in problems.items():
             found = value(problem, chosen)
@@ -249,7 +245,7 @@ def test_equal_beside_what_is_known_all_but_exactly(tmp_path: Path, what: str) -
             if np.isfinite(found):
                 compared += 1
                 assert found == pytest.approx(in_full(full, name), rel=1e-8)
-    assert compared > 10
+    assert compared > 6
 
 
 def test_a_plate_that_nothing_places_leaves_its_own_distances_undetermined(tmp_path: Path) -> None:

@@ -112,14 +112,10 @@ RECIPES = (
     "'map --curves' map.yaml",
     "'map --curves' again.yaml --error EXX --error EC0Y --points 5 --format csv",
     "map machine.yaml --line '0 mm, 0 mm, 0 mm to 600 mm, 500 mm, 400 mm' --plot out.svg",
-    "spline curve.csv --evaluate '10 mm, 50 mm' -o out.csv --powers global",
-    (
-        "spline curve.csv --every 3 --start-value '0 um' --end-slope '1 um/mm' --at '60 mm' slope 0"
-        " --plot out.svg"
-    ),
-    "spline curve.csv --knots '50 mm, 100 mm' --order 3 --json --sigma estimated --period '240 mm'",
+    "spline curve.csv --every 3 --start-value '0 um' --end-slope '1 um/mm' --plot out.svg",
+    "spline curve.csv --knots '50 mm, 100 mm' --json -o out.csv --powers global",
     "spline table-1.csv --x arc_length --y finish_error --boundary '100 mm' --points 1-30 --json",
-    ("spline table-1.csv --y finish_error --straight 1 --uncertainty '1 um' --whiskers out.svg"),
+    "spline table-1.csv --y finish_error --straight 1 --whiskers out.svg",
     (
         "spline table-1.csv --y semi_finish_error --points 1-10 --corner '44.704 mm, -114.554 mm'"
         " --straight 1 --straight 2 --knots none --compensated out.csv"

@@ -19,9 +19,9 @@ def volume_drawing(design: Design, names: Mapping[str, str]) -> str:
     """Return the machine's volume with all positions, seen from the front and above; `names` are
     their labels.
     """
-    drawn = scene(design)
-    corners = drawn.box.edges.reshape(-1, 2)
-    every = np.concatenate([corners, *(place.outline for place in drawn.places)])
+    box, places = scene(design)
+    corners = box.edges.reshape(-1, 2)
+    every = np.concatenate([corners, *(place.outline for place in places)])
     lower, size = every.min(axis=0), np.ptp(every, axis=0)
     scale = min((VOLUME - 2 * MARGIN) / float(size[0]), 0.75 * VOLUME / (float(size[1]) or 1.0))
     width, height = scale * size + 2 * MARGIN
@@ -30,17 +30,17 @@ def volume_drawing(design: Design, names: Mapping[str, str]) -> str:
         return on_paper(points, lower, scale, MARGIN, height)
 
     parts = []
-    for edge, is_hidden in zip(drawn.box.edges, drawn.box.hidden, strict=True):
+    for edge, is_hidden in zip(box.edges, box.hidden, strict=True):
         dashes = ' stroke-dasharray="3 4"' if is_hidden else ""
         parts.append(f'<polyline points="{_path(to_page(edge))}" stroke="{GREY}"{dashes}/>')
-    for place in drawn.places:
+    for place in places:
         (x, y), outline = to_page(place.balls[:1])[0], _path(to_page(place.outline))
         parts.append(
             f'<polygon points="{outline}" fill="{GREY}" fill-opacity="0.14" stroke="{GREY}"/>'
             f'<circle cx="{x:.1f}" cy="{y:.1f}" r="4" fill="{INK}"/>'
         )
     middle = to_page(corners).mean(axis=0)
-    for name, ends, low, high in drawn.box.axes:
+    for name, ends, low, high in box.axes:
         start, end = to_page(ends)
         away = np.array([start[1] - end[1], end[0] - start[0]])
         away *= 15.0 / (float(np.linalg.norm(away)) or 1.0)
@@ -48,7 +48,7 @@ def volume_drawing(design: Design, names: Mapping[str, str]) -> str:
         for share, text in ((0.04, 1e3 * low), (0.5, f"{name}, mm"), (0.96, 1e3 * high)):
             label = text if isinstance(text, str) else f"{text:.5g}"
             parts.append(_text(start + share * (end - start) + away, label))
-    for place in drawn.places:
+    for place in places:
         # From the first ball, which has a dot, a label is on the far side of the middle.
         centre, first = to_page(place.outline).mean(axis=0), to_page(place.balls[:1])[0]
         parts.append(_text(centre + 0.3 * (centre - first), names[place.name]))

@@ -9,10 +9,10 @@ from decimal import Decimal
 
 from ballplate.simulator.inputs import CsvWriter, in_one_line
 
-from .certified_balls import CertifiedBalls
+from .certified_balls import PlateCertificate
 
 
-def coordinates_csv(certificate: CertifiedBalls, covariance: str) -> str:
+def coordinates_csv(certificate: PlateCertificate, covariance: str) -> str:
     """Co-ordinates with their standard uncertainties, below comments; `covariance` is the name of
     the table with these.
     """
@@ -39,7 +39,7 @@ def coordinates_csv(certificate: CertifiedBalls, covariance: str) -> str:
     return stream.getvalue()
 
 
-def covariance_csv(certificate: CertifiedBalls) -> str:
+def covariance_csv(certificate: PlateCertificate) -> str:
     """The covariance of all co-ordinates, in square micrometres."""
     names = coordinate_names(certificate)
     stream = io.StringIO()
@@ -50,7 +50,7 @@ def covariance_csv(certificate: CertifiedBalls) -> str:
     return stream.getvalue()
 
 
-def coordinate_names(certificate: CertifiedBalls) -> list[str]:
+def coordinate_names(certificate: PlateCertificate) -> list[str]:
     """Names of all co-ordinates, by ball and axis."""
     return [
         f"{name} {axis}" for name in certificate.names for axis in "xyz"[: certificate.dimension]

@@ -16,6 +16,7 @@ from collections.abc import Iterator
 from dataclasses import replace
 from itertools import chain
 from pathlib import Path
+from types import SimpleNamespace
 from typing import TextIO
 
 import numpy as np
@@ -27,7 +28,7 @@ from ballplate.simulator.design import (
     State,
     far_from_drawing,
 )
-from ballplate.simulator.experiment import Experiment, doubt_of_table
+from ballplate.simulator.experiment import Experiment
 from ballplate.simulator.inputs import (
     MOST_MESSAGES,
     PARSERS,
@@ -194,8 +195,7 @@ def ensure_certified(experiment: Experiment) -> None:
 
 
 def read_certificate(path: Path | GivenText, experiment: Experiment) -> Experiment:
-    """An experiment with the certificate values of a file instead of its own, and further `doubts`
-    where tables of stars are not those of its probes.
+    """An experiment with the certificate values of a file instead of its own.
 
     :raises ExperimentError: a wrong table; a value that the experiment does not have, or has
         already, or that is far from the drawing; values that are missing, or exact and
@@ -258,22 +258,7 @@ def read_certificate(path: Path | GivenText, experiment: Experiment) -> Experime
     wrong = [Message(str(path), 1, 1, "", text) for text in doubts if text]
     if wrong:
         raise ExperimentError(wrong)
-    return replace(
-        changed, doubts=(*experiment.doubts, *_doubts_of_stars(path, changed, experiment))
-    )
-
-
-def _doubts_of_stars(
-    path: Path | GivenText, changed_experiment: Experiment, experiment: Experiment
-) -> Iterator[str]:
-    """What is unlikely of stars whose values are those of a file, where it was not before."""
-    for k, (star, before) in enumerate(
-        zip(changed_experiment.stars, experiment.stars, strict=True)
-    ):
-        offsets = np.array([changed_experiment.probes[name].offset for name in star.probes])
-        text = doubt_of_table(star, offsets)
-        if text and text != doubt_of_table(before, offsets):
-            yield f"{path}: {format_path(('stars', k))}: {text}"
+    return changed
 
 
 def _unknown(row: FileRow, values_known: list[CertifiedValue]) -> str:
@@ -295,11 +280,11 @@ def is_calibration_table(source: GivenText) -> bool:
     return "item" not in names and (of_pairs or names >= {"ball", "x", "y"})
 
 
-class CertificateFiles:
-    """The functions that read and write values of certificates."""
-
-    ensure_certified = staticmethod(ensure_certified)
-    certified_values = staticmethod(certified_values)
-    with_drawn_values = staticmethod(with_drawn_values)
-    write = staticmethod(write_certificate)
-    read = staticmethod(read_certificate)
+# The functions that read and write values of certificates.
+CertificateFiles = SimpleNamespace(
+    ensure_certified=ensure_certified,
+    certified_values=certified_values,
+    with_drawn_values=with_drawn_values,
+    write=write_certificate,
+    read=read_certificate,
+)

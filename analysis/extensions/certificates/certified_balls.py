@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from importlib.metadata import version
+from pathlib import Path
 
 import numpy as np
 from ballplate.presentation import (
@@ -15,6 +16,7 @@ from ballplate.presentation import (
     number,
     picked,
     to_uncertainty,
+    write_file,
 )
 from ballplate.results import freedom_words
 from ballplate.simulator.inputs import listing
@@ -24,6 +26,8 @@ NO_ACCREDITATION = (
     "This states results of a fit to readings, as the program computed them. It is not a"
     " calibration certificate of an accredited laboratory."
 )
+
+ENDINGS = (".html", ".csv", ".xml")
 
 # What a certificate may be told about, and what stands there otherwise.
 ABOUT = {
@@ -52,7 +56,7 @@ class PlateDistance:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class CertifiedBalls(Result):
+class PlateCertificate(Result):
     """Balls of a plate in the plate's own axes: `coordinates` (n, d) in metres and their
     `covariance` (n d, n d), those of a ball side by side, in square metres.
 
@@ -216,3 +220,44 @@ class CertifiedBalls(Result):
             "unit": ["m"] * (count * d),
         }
         return columns, ()
+
+    def texts(self, path: str | Path) -> dict[Path, str]:
+        """The certificate as the ending of a name says: a page (.html), tables (.csv, with the
+        covariance in a second one beside it) or a digital calibration certificate (.xml); by the
+        names of files.
+
+        :raises ValueError: another ending, or a digital certificate without what it has to state.
+        """
+        from .certificate_csv import coordinates_csv, covariance_csv
+        from .certificate_page import certificate_page
+        from .digital_form import digital_certificate
+
+        path = Path(path)
+        match path.suffix.lower():
+            case ".html":
+                return {path: certificate_page(self)}
+            case ".csv":
+                beside = covariance_path(path)
+                return {path: coordinates_csv(self, beside.name), beside: covariance_csv(self)}
+            case ".xml":
+                return {path: digital_certificate(self)}
+        text = f'a certificate\'s name ends in {", ".join(ENDINGS)}, unlike "{path.name}"'
+        raise ValueError(text)
+
+    def save(self, path: str | Path) -> None:
+        """Write it, see `texts`.
+
+        :raises OSError: a file cannot be written.
+        :raises ValueError: the name has another ending, or a digital certificate lacks something.
+        """
+        for name, text in self.texts(path).items():
+            write_file(name, text.encode())
+
+
+def covariance_path(path: Path) -> Path:
+    """Where the covariance of a table of co-ordinates stands.
+
+    >>> covariance_path(Path("plate.csv")).name
+    'plate-covariance.csv'
+    """
+    return path.with_name(f"{path.stem}-covariance{path.suffix}")

@@ -14,7 +14,7 @@ from ballplate.simulator.computing import lstsq
 from ballplate.simulator.inputs import in_one_line
 
 from .certificate_csv import coordinate_names, scaled
-from .certified_balls import NO_ACCREDITATION, CertifiedBalls
+from .certified_balls import NO_ACCREDITATION, PlateCertificate
 
 VERSION = "3.1.2"
 HEAD = (
@@ -28,7 +28,7 @@ MILLIMETRE, SQUARE = "\\milli\\metre", "\\milli\\metre\\tothe{2}"
 FORBIDDEN = re.compile("[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
 
 
-def digital_certificate(certificate: CertifiedBalls) -> str:
+def digital_certificate(certificate: PlateCertificate) -> str:
     """The certificate in XML; co-ordinates with expanded uncertainties and their covariance.
 
     :raises ValueError: when, or in which country, the plate was measured is not stated; a coverage
@@ -56,7 +56,7 @@ def digital_certificate(certificate: CertifiedBalls) -> str:
     return "\n".join(part for part in parts if part)
 
 
-def _told(certificate: CertifiedBalls) -> list[str]:
+def _told(certificate: PlateCertificate) -> list[str]:
     comments = [f"{key}: {text}" for key, text in certificate.facts.items()]
     return [*comments, *certificate.notes]
 
@@ -97,7 +97,7 @@ def _dates(text: str) -> tuple[str, str]:
     return start_and_end[0].isoformat(), start_and_end[1].isoformat()
 
 
-def _administrative(certificate: CertifiedBalls) -> str:
+def _administrative(certificate: PlateCertificate) -> str:
     about = certificate.about
     first, last = _dates(about["date"])
     if not re.fullmatch("[A-Z]{2}", about["country"]):
@@ -140,7 +140,7 @@ def _administrative(certificate: CertifiedBalls) -> str:
     )
 
 
-def _temperature(certificate: CertifiedBalls) -> str:
+def _temperature(certificate: PlateCertificate) -> str:
     """The temperature that lengths are stated for; nothing where it is unknown."""
     if certificate.reference_temperature is None:
         return ""
@@ -157,7 +157,7 @@ def _labels(names: list[str]) -> str:
     return " ".join(re.sub(r"\s+", "_", _text(name)) for name in names)
 
 
-def _coordinates(certificate: CertifiedBalls) -> str:
+def _coordinates(certificate: PlateCertificate) -> str:
     covariance = certificate.covariance
     entries = [
         "<si:column>"
@@ -181,7 +181,7 @@ def _coordinates(certificate: CertifiedBalls) -> str:
     return _list(certificate, coordinate_names(certificate), values, u, region)
 
 
-def _ellipsoid_factor(certificate: CertifiedBalls) -> str:
+def _ellipsoid_factor(certificate: PlateCertificate) -> str:
     """The factor of an ellipsoid of 95 % of the co-ordinates that are uncertain, by chi square or
     by Hotelling's distribution (GUM supplement 2, 6.5).
     """
@@ -194,7 +194,7 @@ def _ellipsoid_factor(certificate: CertifiedBalls) -> str:
 
 
 def _list(
-    certificate: CertifiedBalls,
+    certificate: PlateCertificate,
     names: list[str],
     values: np.ndarray,
     u: np.ndarray,
@@ -213,7 +213,7 @@ def _list(
     )
 
 
-def _distances(certificate: CertifiedBalls) -> str:
+def _distances(certificate: PlateCertificate) -> str:
     finite_distances = [
         distance for distance in certificate.distances if np.isfinite(distance.standard_uncertainty)
     ]

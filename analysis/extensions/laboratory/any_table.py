@@ -31,7 +31,7 @@ from ballplate.simulator.inputs import (
 )
 
 from .above_headings import said_above
-from .clock_times import ClockError, ReadTime, clock_time
+from .clock_times import ReadTime, clock_time
 from .column_units import units_of_columns
 from .heading_words import NOTHING, quoted
 from .headings import TEXTS, Group, HeadedColumn, HeadingError, Vocabulary
@@ -58,14 +58,13 @@ class TableRows:
     """Rows of tables of readings: the names of position, ball and probe, lengths in metres (x, y,
     z and u), and further columns; NaN if not stated.
 
-    `told` describes how each table was read. `diameters` (rows,) in metres are NaN if not stated.
+    `told` describes how each table was read.
     `coordinates` is the type of a report's co-ordinates, None for a table. `times` are those of
     rows with clock times.
     """
 
     rows: tuple[FileRow, ...]
     told: tuple[str, ...] = ()
-    diameters: tuple[float, ...] = ()
     coordinates: Coordinate | None = None
     times: tuple[ReadTime, ...] = ()
 
@@ -125,21 +124,18 @@ class _Reader:
         form = self.form
         above, units = self._asked()
         texts, texts_above = self._texts(above)
-        rows_found = [
-            row for group in form.headings.groups for row in self._rows(group, texts, units)
-        ]
+        rows = [row for group in form.headings.groups for row in self._rows(group, texts, units)]
         # In the order that they were read in, also where several stand side by side.
-        rows_found.sort(key=lambda row: row[0].mark.line)
-        rows, diameters = [row for row, _ in rows_found], tuple(d for _, d in rows_found)
+        rows.sort(key=lambda row: row.mark.line)
         notes = (self._told(units, texts_above),)
         times = tuple(
-            (Mark(str(self.source), line, 1), cells[column.place], clock_time(cells[column.place]))
+            (Mark(str(self.source), line, 1), cells[column.place], *clock_time(cells[column.place]))
             for name, column in form.headings.roles.items()
             if name in self.words.further and column.unit is None
             for line, cells in form.rows
             if cells[column.place].casefold() not in NOTHING
         )
-        return TableRows(tuple(rows), notes, diameters, times=times)
+        return TableRows(tuple(rows), notes, times=times)
 
     def _asked(self) -> tuple[dict[str, str], dict[int, str]]:
         """Return texts above the headings, and units by index of the columns of lengths.
@@ -208,8 +204,8 @@ class _Reader:
 
     def _rows(
         self, group: Group, texts: Mapping[str, str], units: Mapping[int, str]
-    ) -> list[tuple[FileRow, float]]:
-        """Return rows of the readings of a group of columns, with diameters."""
+    ) -> list[FileRow]:
+        """Return rows of the readings of a group of columns."""
         roles, file = self.form.headings.roles, str(self.source)
         sign = DECIMALS[self.form.decimal]
         axes = [axis.place for axis in group.axes]
@@ -220,7 +216,7 @@ class _Reader:
                 factors[roles[name].place] = names_known[unit]
         constants = {**texts, **group.texts}
         places = self.form.headings.places
-        rows: list[tuple[FileRow, float]] = []
+        rows: list[FileRow] = []
         messages: list[Message] = []
 
         def number(cells: Sequence[str], i: int, mark: Mark) -> float:
@@ -229,16 +225,15 @@ class _Reader:
                 return math.nan
             try:
                 if factor is None:
-                    return clock_time(cells[i]).seconds
+                    return clock_time(cells[i])[1]
                 return metres_or_radians(cell, factor)
-            except (QuantityError, ClockError) as error:
+            except QuantityError as error:
                 messages.append(mark.message("", str(error)))
                 return math.nan
 
-        u, diameter = (roles[r].place if r in roles else None for r in ("u", "diameter"))
-        of_all = math.nan
-        if u is not None and (constant := roles["u"].constant) is not None:
-            u, of_all = None, parse_positive_length(constant)
+        u, of_all = roles.get("u"), math.nan
+        if u is not None and u.constant is not None:
+            u, of_all = None, parse_positive_length(u.constant)
         for line, cells in self.form.rows:
             if len(messages) >= MOST_MESSAGES:
                 break
@@ -254,15 +249,14 @@ class _Reader:
                 where = " ".join(cells[i] for i in nominal)
                 names = names[0], f"{names[0]}: {where}", names[2]
             x = [number(cells, i, mark) for i in axes]
-            x.append(of_all if u is None else number(cells, u, mark))
+            x.append(of_all if u is None else number(cells, u.place, mark))
             if "k" in roles and not math.isnan(x[-1]):
                 x[-1] /= _coverage_factor(roles["k"], cells, sign, mark, messages)
             x += [
                 math.nan if column is None else number(cells, column.place, mark)
                 for column in further
             ]
-            size = math.nan if diameter is None else number(cells, diameter, mark)
-            rows.append((FileRow(mark, names, tuple(x)), size))
+            rows.append(FileRow(mark, names, tuple(x)))
         if messages:
             raise ExperimentError(messages)
         return rows

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from types import SimpleNamespace
 
 from ballplate.simulator.design import Design
 from ballplate.simulator.inputs import Mark
@@ -31,11 +32,11 @@ def doubts_about_readings(design: Design, x: Array, marks: Sequence[Mark]) -> tu
     )
 
 
-class ReadingChecks:
-    """The functions by which readings are placed and judged."""
-
-    as_scale_readings = staticmethod(as_scale_readings)
-    with_names_swapped = staticmethod(with_names_swapped)
-    said_of = staticmethod(said_of)
-    refuse_gross_errors = staticmethod(refuse_gross_errors)
-    doubts_about_readings = staticmethod(doubts_about_readings)
+# The functions by which readings are placed and judged.
+ReadingChecks = SimpleNamespace(
+    as_scale_readings=as_scale_readings,
+    with_names_swapped=with_names_swapped,
+    said_of=said_of,
+    refuse_gross_errors=refuse_gross_errors,
+    doubts_about_readings=doubts_about_readings,
+)

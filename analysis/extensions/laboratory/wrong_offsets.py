@@ -14,7 +14,6 @@ import numpy as np
 from ballplate.simulator.computing import lstsq
 from ballplate.simulator.design import (
     Design,
-    Flags,
     Priors,
     measured,
     read_in_positions,
@@ -22,7 +21,7 @@ from ballplate.simulator.design import (
 )
 from ballplate.simulator.geometry import AXIS_NAMES
 from ballplate.simulator.inputs import listing
-from ballplate.simulator.machines import Array, Integers
+from ballplate.simulator.machines import Array
 
 from .consensus import consensus_motion
 from .gross_errors import AGAINST_DRAWING, ball_pitches
@@ -90,49 +89,13 @@ def discrete_mistakes(design: Design) -> Iterator[WrongOffsets]:
             yield WrongOffsets((first, second), change)
 
 
-@dataclass(frozen=True)
-class OffsetDifferences:
-    """How far places seen with each `probe` (g,) are off in each `position` (g,), by `places`
-    (g, d) where an axis `is_read` (g, d). Only positions of plates that were read with several
-    probes are among them.
-    """
-
-    position: Integers
-    probe: Integers
-    places: Array
-    is_read: Flags
-
-    def _centred(self, values: Array) -> Array:
-        """Values (g, ...) less their means in each position."""
-        values = values.copy()
-        for k in np.unique(self.position):
-            mine = self.position == k
-            values[mine] -= values[mine].mean(axis=0)
-        return values
-
-    def left(self, change: Array) -> Array:
-        """What a change (l, d) of the offsets leaves of the differences (g, d) in each position."""
-        return np.where(self.is_read, self._centred(self.places + change[self.probe]), 0.0)
-
-    def shifts(self, probes: int) -> Array:
-        """The least change (l, d) of the offsets that leaves least of the differences."""
-        shifts_found = np.zeros((probes, self.places.shape[1]))
-        by_probe = self._centred((self.probe[:, None] == np.arange(probes)).astype(float))
-        plain = self.left(shifts_found)
-        for axis, is_axis_read in enumerate(self.is_read.T):
-            shifts_found[:, axis] = -lstsq(
-                by_probe[is_axis_read], plain[is_axis_read, axis], rcond=1e-9
-            )[0]
-        return shifts_found
-
-
-def offset_differences(design: Design, x: Array) -> OffsetDifferences:
-    """How far the offsets of probes that read plates in one position disagree there, from scale
-    readings x (m, d).
+def offset_shifts(design: Design, x: Array) -> Array:
+    """Return the least change (l, d) of the offsets with which readings of plates by several probes
+    in one position agree best, from scale readings x (m, d).
     """
     pitch, readings = ball_pitches(design), design.readings
     is_read, places_seen = measured(design, readings), seen_places(design, readings, x)
-    rows = []
+    by_probe, apart, read = [], [], []
     for k, mine, nominal in read_in_positions(design, readings):
         probe = readings.probe[mine]
         several = np.unique(probe)
@@ -141,15 +104,15 @@ def offset_differences(design: Design, x: Array) -> OffsetDifferences:
         is_common = probe == int(np.argmax(np.bincount(probe)))
         reach = AGAINST_DRAWING * pitch[readings.ball[mine[is_common]]]
         rotation, _, _ = consensus_motion(nominal[is_common], places_seen[mine[is_common]], reach)
-        apart = places_seen[mine] - nominal @ rotation.T
-        for probe_index in several.tolist():
-            of_one = probe == probe_index
-            place = np.median(apart[of_one], axis=0)
-            rows.append((k, probe_index, place, is_read[mine[0]]))
-    d = design.dimension
-    return OffsetDifferences(
-        np.array([row[0] for row in rows], np.int64),
-        np.array([row[1] for row in rows], np.int64),
-        np.array([row[2] for row in rows]).reshape(-1, d),
-        np.array([row[3] for row in rows], bool).reshape(-1, d),
-    )
+        off = places_seen[mine] - nominal @ rotation.T
+        places = np.array([np.median(off[probe == each], axis=0) for each in several])
+        columns = np.eye(len(design.probes.names))[several]
+        by_probe.append(columns - columns.mean(axis=0))
+        apart.append(places - places.mean(axis=0))
+        read.append(np.tile(is_read[mine[0]], (len(several), 1)))
+    shifts = np.zeros_like(design.probes.offsets)
+    if apart:
+        columns, places, is_axis_read = (np.concatenate(each) for each in (by_probe, apart, read))
+        for axis, rows in enumerate(is_axis_read.T):
+            shifts[:, axis] = -lstsq(columns[rows], places[rows, axis], rcond=1e-9)[0]
+    return shifts

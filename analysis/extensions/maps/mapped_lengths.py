@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from ballplate.simulator.design import Tasks
 from ballplate.simulator.inputs import Target
+from ballplate.simulator.machines import Array
 from ballplate.simulator.maps import FittedMap
 
 from .corrected_points import corrected, drawn_rows, tips
@@ -59,18 +60,23 @@ def mapped_lengths(
         unit = apart / values[:, None]
         tip = tips(fitted, x, by_end)
         read = np.linalg.norm(tip[::2] - tip[1::2], axis=1)
-        of_lengths, as_drawn = (
-            None if of is None else np.einsum("md,mds->ms", unit, of[::2] - of[1::2])
-            for of in (rows, drawn)
+        root = fitted.function_root(
+            _along(unit, rows), None if drawn is None else _along(unit, drawn)
         )
-        root = fitted.function_root(of_lengths, as_drawn)
         of_readings = 2.0 * (unit**2) @ (scatter * fitted.repeatability) ** 2
         uncertainties = np.sqrt((root**2).sum(axis=1) + of_readings)
         values[np.isnan(uncertainties)] = np.nan
-        for name, target, *figures in zip(
+        for name, length_read, value, u, target in zip(
             lengths.names[some],
-            lengths.targets[some],
             *(array.tolist() for array in (read, values, uncertainties)),
+            lengths.targets[some],
             strict=True,
         ):
-            yield CorrectedLength(name, *figures, target)
+            yield CorrectedLength(name, length_read, value, u, target)
+
+
+def _along(unit: Array, of_ends: Array) -> Array:
+    """Derivatives (m, s) of lengths along unit vectors (m, d), from those of both ends (2 m, d, s)
+    in turn.
+    """
+    return np.asarray(np.einsum("md,mds->ms", unit, of_ends[::2] - of_ends[1::2]))

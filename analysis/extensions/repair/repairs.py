@@ -140,7 +140,7 @@ class Repairs:
             lines += [f"repair {k}, in the file: {edit}" for edit in repair.edits]
         return lines
 
-    def data(self) -> Data:
+    def to_dict(self) -> Data:
         """Return repairs as plain data in metres at full precision, if any are needed."""
         is_needed = bool(self.repairs or self.reason)
         return {"repairs": [each.to_dict() for each in self.repairs] if is_needed else None}

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import ClassVar, Literal
+from typing import ClassVar, Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -171,7 +172,7 @@ def read_coordinates(
     if isinstance(uncertainty, float):
         of_axes = np.full(len(axes), uncertainty)
     elif uncertainty is not None:
-        of_axes = np.array([uncertainty[axis] for axis in axes])
+        of_axes = np.array([uncertainty[axis] for axis in sorted(uncertainty)])
     names = [(layout.names[ball], axis) for ball in balls for axis in axes]
     of_item = None if of_axes is None else np.tile(of_axes, len(balls))
     uncertainties = uncertainties_of(
@@ -209,12 +210,12 @@ def read_coordinates(
     )
 
 
-def _axes(settings: CoordinatesSettings, steps: Steps, references: References) -> list[Axis] | None:
+def _axes(settings: CoordinatesSettings, steps: Steps, references: References) -> list[str] | None:
     """Return the calibrated axes, or report faults."""
     dimension, uncertainty = references.dimension, settings.standard_uncertainty
     place = (*steps, "standard_uncertainty")
     if uncertainty is None or isinstance(uncertainty, float):
-        axes = list(settings.axes or AXIS_NAMES[:dimension])
+        axes: list[Axis] = list(settings.axes or get_args(Axis)[:dimension])
         place = (*steps, "axes")
         is_once = references.require(
             len(set(axes)) == len(axes), place, "names an axis twice; name each once"
@@ -240,7 +241,7 @@ def _axes(settings: CoordinatesSettings, steps: Steps, references: References) -
 def _certified_coordinates(
     settings: CoordinatesSettings,
     balls: NDArray[np.intp],
-    axes: list[str],
+    axes: Sequence[str],
     layout: BallLayout,
     steps: Steps,
     references: References,
@@ -275,7 +276,7 @@ def _certified_coordinates(
 def _table_of_coordinates(
     settings: CoordinatesSettings,
     balls: NDArray[np.intp],
-    axes: list[str],
+    axes: Sequence[str],
     layout: BallLayout,
     steps: Steps,
     references: References,

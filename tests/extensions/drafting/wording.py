@@ -45,7 +45,6 @@ LACKS_VALUES = (
     'the data sheet lacks values; add for example --volume "900 1200 700 mm" --plate'
     ' "6 x 6, 420 mm"'
 )
-NO_DATA_SHEET = "--machine and --example take no data sheet; give only one of them"
 NO_ANSWER = "no answer for --machine-type; nothing is written"
 HALF_THE_MPE = "lengths of the corrected machine: half the MPE."
 TIPS_IN_TWO_DIMENSIONS = "tips star are not for a volume of two lengths"

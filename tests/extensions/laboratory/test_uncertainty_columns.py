@@ -145,7 +145,6 @@ def test_an_uncertainty_of_all_rows_is_that_of_a_column() -> None:
         ({"u": "=0 um"}, 'readings.columns.u: "0 um" must be above zero'),
         ({"u": "=-1 um"}, "readings.columns.u: .* must be above zero"),
         ({"ball": "=r1c1"}, "readings.columns.ball: a ball is that of a reading"),
-        ({"diameter": "=22 mm"}, "readings.columns.diameter: a diameter is that of a reading"),
     ],
 )
 def test_what_cannot_be_of_all_rows_is_refused(columns: dict[str, str], text: str) -> None:

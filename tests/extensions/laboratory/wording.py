@@ -55,7 +55,8 @@ NOTHING_IS_FILLED = "x, y, z are empty in all"
 NOR_ONE_ABOVE_IT = 'merged-en.csv:2:1: no "Position", nor one above it'
 NOT_RECOGNISED_AS_QIF_RESULTS = (
     "report: not recognised as QIF results, DMIS output, PC-DMIS report, Calypso table; "
-    "state its format with --from (qif, dmis, pcdmis, calypso)"
+    "state its format with --from (qif, dmis, pcdmis, calypso); a table needs no import: "
+    "ballplate fit reads it"
 )
 NO_CLOCK_TIMES = "no clock times, which 0.csv has"
 NO_MEASUREMENT_RESULTS = "no measurement results; is it a plan, or a model?"
@@ -126,7 +127,6 @@ THE_PROBES_ARE_NOT_IN_THE_EXPERIMENT = (
     'the probes "T1", "T2", "T3", "T4", "T5" are not in the experiment, and neither the plan nor'
 )
 THE_SHEETS_HAVE_TABLES = 'the sheets "Monday", "Tuesday" have tables; give --sheet'
-THIS_IS_A = "report: this is a table, which needs no import; ballplate fit reads it"
 THIS_IS_A_DMIS = "this is a DMIS program, not a report"
 THIS_IS_A_REPORT = "this is a report of a measuring program (DMIS output), and no table"
 TOO_FEW_BALLS_WERE_READ = "too few balls were read in z high"

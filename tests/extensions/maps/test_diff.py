@@ -192,21 +192,3 @@ def test_files_that_are_no_maps_are_refused(
     assert main(["diff", maps[0], "nowhere.yaml"]) == 3
     with pytest.raises(TypeError, match="second=3"):
         bp.diff(maps[0], 3)  # type: ignore[arg-type]
-
-
-@pytest.mark.long
-def test_experiments_with_readings_share_a_certificate(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    for name, seed in (("a", 1), ("b", 2)):
-        bp.simulate(bp.quickstart(), seed).to_csv(tmp_path / f"{name}.csv", index=False)
-        text = Path("designs/quickstart.yaml").read_text("utf-8")
-        (tmp_path / f"{name}.yaml").write_text(f"{text}readings: {{files: {name}.csv}}\n", "utf-8")
-    both = [str(tmp_path / "a.yaml"), str(tmp_path / "b.yaml")]
-    apart = printed(capsys, "diff", *both)
-    shared = printed(capsys, "diff", *both, "--shared", "certificate")
-    assert apart["shared_values"] is None and shared["shared_values"] == 4
-    pairs = zip(apart["figures"], shared["figures"], strict=True)
-    of_lengths = [(one, other) for one, other in pairs if one["kind"] == "body diagonals"]
-    for one, other in of_lengths:
-        assert other["standard uncertainty"] < 0.95 * one["standard uncertainty"]

@@ -373,14 +373,6 @@ def test_the_table_of_curves_says_where_each_runs(fitted: FittedMap, tmp_path: P
     }
 
 
-def test_no_curve_begins_or_ends_at_minus_zero(fitted: FittedMap) -> None:
-    lower, upper = np.array([-0.0, -1.1, -0.3]), np.array([1.1, -0.0, 0.7])
-    moved = replace(fitted, volume=replace(fitted.volume, lower=lower, upper=upper))
-    rows = [re.split(r"\s{2,}", line.strip()) for line in bp.curves(moved).lines()]
-    ends = {row[0]: row[3:5] for row in rows if row[0] in ("EXX", "EYY", "EZZ")}
-    assert ends == {"EXX": ["0", "1100"], "EYY": ["-1100", "0"], "EZZ": ["-300", "700"]}
-
-
 def test_commands_print_what_results_say(
     fitted: FittedMap, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

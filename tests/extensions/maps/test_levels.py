@@ -169,20 +169,3 @@ def test_one_pair_in_twenty_is_changed_by_chance(
             f" {count}, {above / count:.2%} ({low:.2%} to {high:.2%})"
         )
     assert 0.04 <= above / count <= 0.06
-
-
-@pytest.mark.long
-@pytest.mark.parametrize("is_shared", [False, True])
-def test_simulated_campaigns_are_as_linear_ones(is_shared: bool) -> None:
-    """All the way from readings: p of the map and of the plate are uniform in their mean."""
-    found = []
-    for k in range(60):
-        maps = [
-            simulated_map(small(u), 900 + 2 * k + i, 5000 + k if is_shared else None)
-            for i, u in enumerate(("0.2 um", "0.4 um"))
-        ]
-        if is_shared:
-            maps = list(with_shared_certificates(maps[0], maps[1])[:2])
-        comparison = compared(maps[0], maps[1], grid=2)
-        found.append([comparison.test.p, comparison.plates[0].test.p])  # type: ignore[union-attr]
-    assert np.abs(np.mean(found, axis=0) - 0.5).max() < 3.5 / np.sqrt(12 * len(found))

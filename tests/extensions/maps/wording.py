@@ -7,7 +7,6 @@ CARRIES_CARRIES_THE_PROBE = "FB1: x carries z carries the probe, y carries the w
 DEGREES_OF_FREEDOM_IS_ITSELF_UNCERTAIN = "degrees of freedom is itself uncertain by"
 DOES_NOT_HOLD_WHAT_CERTIFICATES_DO = "does not hold what certificates do"
 GIVE_A_FIT_WHAT = "give a fit, what its to_map"
-IS_NO_MAP_FILE = "is no map file"
 NO_CERTIFIED_VALUE_IN_COMMON = "no certified value in common"
 NO_CHANGE_IS_SHOWN = "no change is shown"
 OF_POINTS_LIE_OUTSIDE_THE_VOLUME = "1 of 3 points lie outside the volume of the map"

@@ -71,12 +71,6 @@ def test_without_a_curve_the_positions_are_drawn(found: Campaign, tmp_path: Path
     assert text == (tmp_path / "design.svg").read_text(encoding="utf-8")
 
 
-def test_the_same_campaign_gives_the_same_bytes(found: Campaign, tmp_path: Path) -> None:
-    draw_curve(found, tmp_path / "one.svg")
-    draw_curve(found, tmp_path / "two.svg")
-    assert (tmp_path / "one.svg").read_bytes() == (tmp_path / "two.svg").read_bytes()
-
-
 def test_what_is_undetermined_or_missing_is_not_drawn(found: Campaign, tmp_path: Path) -> None:
     assert "as drawn" not in texts(replace(found, drawn=math.inf), tmp_path)
     bare = replace(found, drawn=None, drawn_spent=None, target=None)
@@ -98,11 +92,3 @@ def test_a_ratio_has_no_unit(found: Campaign, tmp_path: Path) -> None:
     )
     drawn = texts(ratio, tmp_path)
     assert "best choice found" in drawn and not any("µm" in text for text in drawn)
-
-
-def test_a_budget_of_positions_is_counted(found: Campaign, tmp_path: Path) -> None:
-    curve = tuple(
-        replace(point, budget=Budget(positions=k)) for k, point in enumerate(found.curve, 2)
-    )
-    drawn = texts(replace(found, budget=Budget(positions=4), curve=curve), tmp_path)
-    assert "positions allowed" in drawn

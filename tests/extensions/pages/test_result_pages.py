@@ -249,12 +249,6 @@ def test_commands_write_pages(tmp_path: Path, capsys: pytest.CaptureFixture[str]
         main(["run", path, "--report", "a.pdf"])
 
 
-def test_names_of_files_are_escaped_once(tmp_path: Path) -> None:
-    path = tmp_path / "a&b.yaml"
-    path.write_bytes(Path("designs/certified/two-dimensions.yaml").read_bytes())
-    assert '<p class="note">a&amp;b.yaml · ' in bp.page(path)
-
-
 def test_what_has_no_page_is_refused(tmp_path: Path) -> None:
     prediction = bp.run(small())
     with pytest.raises(ValueError, match="predict it again"):
@@ -263,23 +257,3 @@ def test_what_has_no_page_is_refused(tmp_path: Path) -> None:
         bp.page(3)  # type: ignore[arg-type]
     with pytest.raises(FileNotFoundError, match=wording.THERE_IS_NO_FOLDER):
         bp.page(bp.fit(small(), bp.simulate(small())), tmp_path / "none" / "a.html")
-
-
-@pytest.mark.long
-def test_a_page_of_four_hundred_balls_in_twelve_positions_is_below_three_megabytes() -> None:
-    positions = [
-        {
-            "name": f"P{k}",
-            "plane": "zxy"[k % 3],
-            "level": f"{100 + 37 * k % 800} mm",
-            "corner": {axis: f"{53 * k % 250} mm" for axis in ("xy", "yz", "zx")[k % 3]},
-            "quarter_turns": k % 4,
-            "probes": [("down", "right", "back")[k % 3]],
-        }
-        for k in range(12)
-    ]
-    plate = {"plate": {"kind": "grid", "balls": [20, 20], "size": ["750 mm", "750 mm"]}}
-    experiment = bp.quickstart().with_(positions=positions, artefacts=plate)
-    fit = bp.fit(experiment, bp.simulate(experiment, seed=1))
-    assert len(fit.page()) < 3e6
-    assert len(page_of_design(experiment, bp.run(experiment))) < 3e6

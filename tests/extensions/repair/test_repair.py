@@ -4,6 +4,7 @@ compared with a search that tries everything.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable
 from dataclasses import replace
 from functools import cache
@@ -35,8 +36,6 @@ from ballplate.simulator.experiment.model import (
     Position,
 )
 from ballplate.simulator.experiment.pools import seconds_of
-from hypothesis import HealthCheck, given, settings
-from hypothesis import strategies as st
 
 from tests.extensions.repair import wording
 from tests.reference import dense
@@ -44,16 +43,12 @@ from tests.reference import dense
 NPL = Path("designs/npl")
 DEFICIENT = [
     ("npl/6.1.1", "B"),
-    ("npl/6.1.1", "D"),
     ("npl/6.2.1", "n=4 NDEL=7"),
-    ("npl/6.2.2", "grid n=7 NDEL=10"),
     ("hocken_borchardt/angles", "half a turn"),
     ("hocken_borchardt/angles", "shifted only"),
-    ("hocken_borchardt/angles", "half a turn, equal scales"),
     ("hurt_foss/bar-bell", "length unknown"),
     ("hurt_foss/bar-bell", "flat"),
     ("hurt_foss/bar-bell", "one axis"),
-    ("hurt_foss/bar-bell", "axes only"),
     ("hurt_foss/bryan-gauge", "radius unknown"),
 ]
 
@@ -281,17 +276,9 @@ def empirical() -> dict[str, Any]:
     return said
 
 
-def of_a_file() -> dict[str, Any]:
-    said = one_plane()
-    said["machine"]["volume"] = ["1000 mm", "800 mm", "600 mm"]
-    path = Path("designs/park/machines/gec-like.yaml").resolve()
-    said["error_model"] = {"kind": "machine", "file": str(path)}
-    return said
-
-
 TRAPS = {
     one.__name__: one
-    for one in (only_probe, one_plane, no_length, nothing_known, flat_metric, empirical, of_a_file)
+    for one in (only_probe, one_plane, no_length, nothing_known, flat_metric, empirical)
 }
 
 
@@ -317,6 +304,21 @@ def test_traps(trap: str, tmp_path: Path) -> None:
     assert check(experiment).verdict.deficiency
     assert found.repairs and not found.repairs[0].deficiency, found.lines()
     hold(TRAPS[trap](), experiment, found, tmp_path)
+    for k, repair in enumerate(found.repairs, 1):
+        (line,) = (one for one in found.lines() if one.startswith(f"repair {k}: "))
+        after = written_out(TRAPS[trap](), repair, tmp_path)
+        scale = check(after).scale
+        assert scale is not None
+        assert scale.rests_on_offsets == (wording.SCALE_RESTS_ON_PROBE_OFFSETS in line)
+        loose = re.search(r"average U6 [\d.e+-]+ µm, ([\d.e+-]+) µm with 1 µm on the exact", line)
+        assert (loose is not None) == (len(after.probes) > 1)
+        if loose is not None:
+            said = yaml.safe_load((tmp_path / "repaired.yaml").read_text(encoding="utf-8"))
+            for name in [*said["probes"]][1:]:
+                offset = {"offset": said["probes"][name], "standard_uncertainty": "1 um"}
+                said["probes"][name] = offset
+            uncertain = predict(loaded(said, tmp_path)).quantities["U6"].average
+            assert loose[1] == number(1e6 * uncertain)
 
 
 def test_an_unknown_scale_needs_a_length_or_a_probe(tmp_path: Path) -> None:
@@ -348,7 +350,7 @@ def everything(
 
 
 @pytest.mark.parametrize("kind", ChangeKind)
-@pytest.mark.parametrize("trap", ["one_plane", "no_length", "only_probe"])
+@pytest.mark.parametrize("trap", ["one_plane", "only_probe"])
 def test_single_changes_are_those_of_a_complete_search(
     trap: str, kind: ChangeKind, tmp_path: Path
 ) -> None:
@@ -397,7 +399,7 @@ def test_pairs_of_moves_are_those_of_a_complete_search(tmp_path: Path) -> None:
         assert found == pytest.approx(best[size - 1], rel=1e-6)
 
 
-@pytest.mark.parametrize("chosen", [(), (0,), (3, 40), (7, 90, 200), (250,)])
+@pytest.mark.parametrize("chosen", [(), (3, 40), (7, 90, 200)])
 def test_information_of_changes_is_that_of_the_changed_design(chosen: tuple[int, ...]) -> None:
     """The criterion of sets, moves and additions and certificates among them."""
     experiment = load(Path("designs/quickstart.yaml"))[0]
@@ -467,26 +469,21 @@ def test_a_target_that_is_missed_at_full_rank_is_met(tmp_path: Path) -> None:
     assert found.repairs[0].loosened <= mean_target(experiment)
 
 
-@pytest.mark.parametrize("variant", ["A w=0.01", "C w=0.01"])
-def test_weak_directions(variant: str, tmp_path: Path) -> None:
-    experiment = design("npl/6.1.1-weights", variant)
+def test_weak_directions(tmp_path: Path) -> None:
+    experiment = design("npl/6.1.1-weights", "A w=0.01")
     before = check(experiment).verdict
     assert not before.deficiency and before.weak
     found = repairs(experiment)
     assert found.repairs and not found.repairs[0].weak
-    hold(plain(NPL / "6.1.1-weights.yaml", variant), experiment, found, tmp_path)
+    hold(plain(NPL / "6.1.1-weights.yaml", "A w=0.01"), experiment, found, tmp_path)
 
 
 def test_nothing_to_repair() -> None:
     assert repairs(design("npl/6.1.1", "C")) == Repairs()
 
 
-@pytest.mark.parametrize(
-    "file, variant",
-    [("hurt_foss/bryan-gauge", "one plane"), ("hurt_foss/bryan-gauge", "one height")],
-)
-def test_where_nothing_helps_nothing_is_proposed(file: str, variant: str) -> None:
-    (line,) = repairs(design(file, variant)).lines()
+def test_where_nothing_helps_nothing_is_proposed() -> None:
+    (line,) = repairs(design("hurt_foss/bryan-gauge", "one plane")).lines()
     assert line.startswith(wording.NO_CHANGES_WERE_FOUND_THAT_DETERMINE)
 
 
@@ -554,14 +551,6 @@ def test_the_cheapest_of_a_pool_within_its_limits() -> None:
         assert read.seconds == (600.0 if is_offered else 855.0)
 
 
-def test_other_additions_than_the_pools_are_not_offered() -> None:
-    experiment = design("npl/6.1.1", "B")
-    found = candidates(replace(experiment, pool=pool_of(experiment, [1.0, 2.0, 3.0])))
-    assert not any(one.kind is ChangeKind.CERTIFICATE for one in found)
-    new = [one for one in found if one.subject.startswith(("candidate", "more"))]
-    assert [one.seconds for one in new] == [1.0, 2.0, 3.0]
-
-
 def test_no_position_is_moved_into_a_forbidden_box() -> None:
     experiment = design("npl/6.1.1", "B")
     free = candidates(replace(experiment, pool=pool_of(experiment, [1.0] * 3)))
@@ -588,40 +577,6 @@ def test_a_pool_of_a_file(tmp_path: Path) -> None:
     assert any(change.candidate >= 0 for change in first.changes)
     after = check(written_out(said, first, tmp_path)).verdict
     assert not after.deficiency and not after.weak
-
-
-@settings(
-    max_examples=3, deadline=None, derandomize=True, suppress_health_check=[HealthCheck.too_slow]
-)
-@given(
-    chosen=st.sets(st.integers(0, 5), min_size=1, max_size=3),
-    coefficients=st.integers(2, 3),
-    turns=st.integers(0, 3),
-    with_length=st.booleans(),
-)
-def test_whatever_is_told_holds(
-    tmp_path_factory: pytest.TempPathFactory,
-    chosen: set[int],
-    coefficients: int,
-    turns: int,
-    with_length: bool,
-) -> None:
-    folder = tmp_path_factory.mktemp("any")
-    said = small()
-    said["positions"] = [said["positions"][k] for k in sorted(chosen)]
-    said["positions"][-1]["quarter_turns"] = turns
-    said["error_model"]["position_coefficients"] = coefficients
-    said["artefacts"]["plate"]["balls"] = [3, 3]
-    said["calibration"] = said["calibration"] if with_length else []
-    experiment = loaded(said, folder)
-    found = repairs(experiment)
-    hold(said, experiment, found, folder)
-    for repair in found.repairs:
-        for one in repair.changes if len(repair.changes) > 1 else ():
-            # Nothing can be left out.
-            rest = changed(experiment, [other for other in repair.changes if other is not one])
-            left = check(rest).verdict
-            assert left.deficiency or left.weak or loosened(rest) > repair.target
 
 
 def test_suggestions_do_not_ask_for_all_candidates_in_one_design(

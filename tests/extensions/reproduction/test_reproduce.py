@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import re
 from pathlib import Path
 
 import pytest
@@ -59,13 +58,6 @@ def test_text_of_one_experiment(capsys: pytest.CaptureFixture[str]) -> None:
     rows = [line.split() for line in out.splitlines()]
     assert ["11", "U3", "average", "n=7", "NDEL=7", "30.557"] in [row[:6] for row in rows]
     assert any(row[:5] == ["11", "as", "headed,", "off", "by"] and "yes" in row for row in rows)
-
-
-def test_estimators_of_distances(capsys: pytest.CaptureFixture[str]) -> None:
-    main([*NPL, "--experiment", "6.2.7", "--trials", "3"])
-    out, _ = capsys.readouterr()
-    rows = [line for line in out.splitlines() if re.search(" [57] x [57] ", line)]
-    assert len(rows) == 10 and "rms, share below" in out
 
 
 def test_what_differs_is_seen(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:

@@ -61,19 +61,6 @@ def test_balls_move_as_differences_of_places_say(path: str, variant: str | None)
         np.testing.assert_allclose(moved_balls(at, motion, readings), expected, atol=1e-11)
 
 
-@pytest.mark.parametrize(("path", "variant"), DESIGNS[:2])
-def test_along_an_undetermined_direction_corrected_readings_go_with_the_balls(
-    path: str, variant: str | None
-) -> None:
-    _, at = laid_out(path, variant)
-    readings = at.design.readings.select(at.design.plate_readings)
-    motions = null_motions(at)
-    assert len(motions) == at.deficiency > 0
-    for motion in motions:
-        balls = moved_balls(at, motion, readings)
-        np.testing.assert_allclose(at_readings(at, motion), balls, atol=1e-11)
-
-
 def test_a_motion_has_the_size_and_the_sign_of_the_words() -> None:
     experiment, at = laid_out("designs/npl/6.1.1.yaml", "B")
     for motion, told in zip(null_motions(at), bp.check(experiment).verdict.null, strict=True):

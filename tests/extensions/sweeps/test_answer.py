@@ -58,31 +58,6 @@ def labels(result: SweepResult, row: int) -> tuple[str, ...]:
     return tuple(axis.labels[k] for axis, k in zip(result.axes, chosen, strict=True))
 
 
-def test_settings_within_the_target_are_counted_and_the_cheapest_named(tmp_path: Path) -> None:
-    result = sweep(tmp_path)
-    found = answer(result)
-    meeting = [one for one in itertools.product(SIZES, BALLS, MODELS) if average(*one) <= 0.5e-6]
-    assert found.sentences[0].startswith(f"{len(meeting)} of 12 cases meet")
-    # Of the fewest balls the smallest average.
-    size, balls, model = min(meeting, key=lambda one: (one[1], average(*one)))
-    assert f"size {size:.0f} mm, balls {balls:.0f}, model {model}: 400 obs" in found.sentences[1]
-    assert labels(result, found.best[0]) == (f"{size:.0f} mm", f"{balls:.0f}", model)
-
-
-def test_none_that_meets_the_target_is_said_with_the_nearest(tmp_path: Path) -> None:
-    found = answer(sweep(tmp_path, limit=0.0))
-    assert found.sentences[0].startswith(wording.NONE_OF_THE_SETTINGS_MEETS)
-    assert "size 500 mm, balls 6, model metric, with 40 %" in found.sentences[0]
-
-
-def test_what_is_undetermined_never_meets_the_target(tmp_path: Path) -> None:
-    """The setting of the smallest average leaves lengths undetermined."""
-    best = 2 * 2 * 2 + 2
-    found = answer(sweep(tmp_path, open_=(best,)))
-    assert wording.OF_SETTINGS_LEAVES_SOMETHING_UNDETERMINED in found.sentences
-    assert best not in found.best[: int(found.sentences[0].split()[0])]
-
-
 def test_lines_are_of_cases_that_differ_in_one_axis(tmp_path: Path) -> None:
     result = sweep(tmp_path, open_=(0,))
     value = result.figure("U6_average_m")

@@ -5,12 +5,10 @@ time.
 from __future__ import annotations
 
 import re
-import sys
 from html import unescape
 from pathlib import Path
 
 import ballplate as bp
-import pytest
 from ballplate.cli import main
 from ballplate.designs import shipped
 from ballplate.extensions.studio.document import opened
@@ -95,12 +93,6 @@ def test_figures_of_the_page_are_the_store_s(plate_sizes: Path, plate_sizes_page
     assert best[0] == ["750 mm", "4"] and len(best) == 8
 
 
-def test_same_store_same_bytes(plate_sizes: Path, plate_sizes_page: Path, tmp_path: Path) -> None:
-    again = tmp_path / "again.html"
-    assert main(["sweep", "--report", str(plate_sizes), "-o", str(again)]) == 0
-    assert again.read_bytes() == plate_sizes_page.read_bytes()
-
-
 def test_variants_with_deficient_designs(tmp_path: Path) -> None:
     base = Path("designs/npl/6.1.1.yaml").resolve().as_posix()
     text = (
@@ -171,25 +163,3 @@ def test_a_large_sweep_makes_a_small_page(tmp_path: Path) -> None:
     assert wording.CASES_NOT_SHOWN in found.texts["p"]
     assert len(cells_of(text, "cases")) == 201
     assert any("the 6 with the smallest" in one for one in found.texts["figcaption"])
-
-
-def test_the_page_needs_no_extra(
-    plate_sizes: Path, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
-) -> None:
-    monkeypatch.setitem(sys.modules, "matplotlib", None)
-    assert main(["sweep", "--report", str(plate_sizes), "-o", str(tmp_path / "a.html")]) == 0
-
-
-def test_python_writes_the_page_of_a_sweep(
-    plate_sizes: Path, plate_sizes_page: Path, tmp_path: Path
-) -> None:
-    text = bp.page(bp.stored(plate_sizes), tmp_path / "a.html")
-    assert text == plate_sizes_page.read_text(encoding="utf-8")
-    assert (tmp_path / "a.html").read_text(encoding="utf-8") == text
-
-
-def test_tables_need_no_page(plate_sizes: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(sys.modules, "ballplate.extensions.sweeps.sweep_page", None)
-    assert bp.stored(plate_sizes).to_markdown().startswith("# ")
-    with pytest.raises(ImportError):
-        bp.page(bp.stored(plate_sizes))

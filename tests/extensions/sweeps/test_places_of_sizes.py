@@ -114,15 +114,6 @@ def test_some_places_in_lengths_are_noted(tmp_path: Path) -> None:
     assert any("plates span x 0 to " in remark for remark in stays.remarks)
 
 
-def test_the_edge_is_a_size_too(tmp_path: Path) -> None:
-    edged = LENGTHS.replace("[750 mm, 750 mm]", "[700 mm, 700 mm]")
-    edged = edged.replace(": 0 mm", ": 25 mm")
-    pool = "\npool: {limits: {edge: 25 mm}}"
-    variants = "  less: {pool.limits.edge: 5 mm}\n  more: {pool.limits.edge: 25 mm}\n"
-    (less,), more = notes(tmp_path, edged + pool, variants)
-    assert "plates span x 20 to " in less and not more
-
-
 def test_sweeps_note_it_in_text_table_json_and_page(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -11,9 +11,7 @@ import pytest
 from ballplate.extensions.sweeps.fingerprint import fingerprint
 from ballplate.extensions.sweeps.load import experiment_of, load_sweep
 from ballplate.simulator.experiment.loading import load
-from ballplate.simulator.inputs.messages import ExperimentError
 
-from tests.extensions.sweeps import wording
 from tests.extensions.sweeps.support import ROOT, small_sweep
 from tests.reference.copies import copy_tree
 
@@ -33,17 +31,6 @@ def test_cells_are_what_files_of_their_own_say(tmp_path: Path) -> None:
             (own,) = load(path)
             assert fingerprint(experiment_of(sweep, number)) == fingerprint(own)
     assert load(path)[0].layouts["plate"].coordinates.max() == pytest.approx(0.7)
-
-
-def test_a_wrong_cell_is_wrong_each_time(tmp_path: Path) -> None:
-    sweep = load_sweep(small_sweep(tmp_path, 3))
-    told = []
-    for _ in range(2):
-        with pytest.raises(ExperimentError) as error:
-            experiment_of(sweep, 5)
-        told.append(str(error.value))
-        experiment_of(sweep, 0)
-    assert told[0] == told[1] and wording.ABOVE_THE_MEASURING_VOLUME in told[0]
 
 
 def test_an_experiment_stays_when_a_file_that_it_names_has_changed(tmp_path: Path) -> None:

@@ -235,21 +235,6 @@ def test_interrupted_and_resumed(
     assert 2 < stored(store) < 80
 
 
-def test_interrupted_while_workers_start(
-    tmp_path: Path, started: Callable[..., subprocess.Popen[str]]
-) -> None:
-    """The keyboard reaches the workers too, which are still loading modules."""
-    # Without data sets the sweep may be done before a busy machine comes to interrupt it.
-    path = small_sweep(tmp_path, 40, "trials: 16\n")
-    process = started(path, preexec_fn=hearing_interruptions, start_new_session=True)
-    assert wait_until(lambda: len(children(process.pid)) == 2, process)
-    time.sleep(0.1)
-    os.killpg(process.pid, signal.SIGINT)
-    _, err = process.communicate(timeout=60)
-    assert process.returncode == 130
-    assert err.startswith(wording.INTERRUPTED_FINISHED_CELLS) and err.count("\n") == 1, err
-
-
 def test_one_writer_at_a_time(
     tmp_path: Path, started: Callable[..., subprocess.Popen[str]]
 ) -> None:
@@ -260,15 +245,3 @@ def test_one_writer_at_a_time(
     assert second.returncode == 3 and wording.ANOTHER_PROCESS_IS_COMPUTING_INTO in second.stderr
     # Reading goes on meanwhile.
     assert run("sweep", "--export", store, "-o", tmp_path / "t.csv").returncode == 0
-
-
-def test_the_number_of_workers_changes_no_bit(tmp_path: Path) -> None:
-    path = small_sweep(tmp_path, 3, "trials: 16\n")
-    for workers in (1, 2):
-        assert (
-            run(
-                "sweep", path, "--workers", workers, "--store", tmp_path / f"{workers}.sqlite"
-            ).returncode
-            == 1
-        )
-    assert_same(rows(tmp_path / "1.sqlite"), rows(tmp_path / "2.sqlite"))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from pathlib import Path
 
 import pytest
@@ -123,15 +122,6 @@ def test_a_text_of_many_cases_has_the_best(tmp_path: Path) -> None:
     table = lines[lines.index("") + 2 :]
     assert [line.split()[0] for line in table] == [str(k + 1) for k in range(8)]
     assert len(result.to_frame()) == len(values)
-
-
-def test_what_a_case_leaves_undetermined_has_no_value(small: Path, tmp_path: Path) -> None:
-    axes = [axis("size", ["1 mm", "2 mm"], [1e-3, 2e-3], "m")]
-    rows = [done(k, figures(1.0 + k, is_open=k == 1)) for k in range(2)]
-    columns = dict(columns_of(made_up_result(tmp_path / "p.sqlite", "p", axes, rows), [0, 1]))
-    for name in ("U4 maximum, µm", "U4 average, µm"):
-        assert [math.isnan(one) for one in columns[name]] == [False, True]
-    assert columns["rank deficiency"] == [0, 2]
 
 
 def test_wrong_usage_is_told(

@@ -1,29 +1,24 @@
 """The wording that the tests of sweeps expect: a rewording is entered here alone."""
 
-ABOVE_THE_MEASURING_VOLUME = "above the measuring volume"
 ANOTHER_PROCESS_IS_COMPUTING_INTO = "another process is computing into it"
 ARE_THE_LIMIT_OF_A_STORE = "are the limit of a sweep"
 UNREADABLE_CELL_ITS_CONTENT = (
     "1 unreadable case, from 1 (its content has changed since it was stored); restore a copy"
 )
 DIFFERS_IN_CASE_ONLY = "differs in case only"
-WAS_DELETED = "was deleted, moved or replaced"
 HAS_THE_VARIANTS_FEW = (
     "s.yaml:2:7: base: has the variants few, many; choose one with variant: NAME, or add "
     "an axis {variants: all}"
 )
-INTERRUPTED_FINISHED_CELLS = "interrupted; finished cases are in"
 IS_NOT_RECORDED = "U6 is not recorded"
 ITS_FOLDER_CANNOT_BE_WRITTEN = "its folder cannot be written; name another with --store"
 MADE_IN_THE_STUDIO = "made in the studio"
 OF_CELLS_DONE = "0 of 4 cases done"
-NONE_OF_THE_SETTINGS_MEETS = "None of the 12 cases meets"
 NO_MORE_THAN_THIRTY = "ValueError: no more than thirty"
 NO_TARGET_TO_BE_COMPARED = "no target to be compared with"
 NO_VARIANT_IN_QUICKSTART_YAML = (
     's.yaml:3:10: variant: no variant "mny" in quickstart.yaml; did you mean "many"?'
 )
-OF_SETTINGS_LEAVES_SOMETHING_UNDETERMINED = "1 of 12 cases leaves something undetermined."
 OF_THE_LENGTHS = "25 % of the lengths"
 OUTSIDE_THE_FOLDERS_OF_THE_SWEEP = "outside the folders of the sweep"
 OUTSIDE_THE_FOLDERS_OF_THE_SWEEP_AND_ITS_BASE = "outside the folders of the sweep and its base"
@@ -34,14 +29,10 @@ THE_AXIS_CHOOSES_THE_VARIANT_ALREADY = (
     's.yaml:5:3: axes.b: the axis "a" chooses the variant already; name all variants there'
 )
 THE_CLUSTER_HAS_NO_WORKERS = "the cluster has no workers; start some with: dask worker"
-THE_EXPERIMENT_IS = "the experiment is a list; write its sections"
 THE_ONE_WITH_THE_FEWEST = "The one with the fewest"
 THE_ONLY_SETTING_DOES_NOT_MEET = "The only case does not meet"
 THE_PROCESS_THAT_COMPUTED_IT_WAS = "the process that computed it was ended"
 THE_SAME_COMMAND_CONTINUES_FROM_THERE = "the same command continues from there"
-THE_WORKER_HAS_NO_BALLPLATE = (
-    "the worker b has no ballplate, and this is ballplate 1, and 1 more differ;"
-)
 HAVE_CHANGED_WHILE_IT_RAN = "have changed while it ran"
 WHILE_THE_SWEEP_RAN = "while the sweep ran"
 THE_PLACES_ARE_LENGTHS = "the places are lengths: state `corner: {{{}}}` to follow"
