@@ -375,7 +375,7 @@ def test_init_writes_a_machine(capsys: pytest.CaptureFixture[str], tmp_path: Pat
     (message,) = capsys.readouterr().err.strip().split("\n")
     assert wording.ONLY_THE_ARM_OF_DROOPS in message
     path.write_text(path.read_text(encoding="utf-8").replace("droop: {", "# {"), encoding="utf-8")
-    assert run("map", path) == 0
+    assert run("map", "--curves", path) == 0
     assert "table of 3 points at y = 300 mm, z = 400 mm, minimum zone" in capsys.readouterr().out
 
 

@@ -91,8 +91,7 @@ OTHERS = {
         "1000,-1.5,1500.5\n"
     ),
     "spline.csv": (
-        "point,feature,nominal_x_mm,nominal_z_mm,error_um\n"
-        "1,face,10.5,0,1.5\n2,face,20.5,0,2.5\n"
+        "point,feature,nominal_x_mm,nominal_z_mm,error_um\n1,face,10.5,0,1.5\n2,face,20.5,0,2.5\n"
     ),
     "correct.csv": "probe,ball,x_mm,y_mm,z_mm\ndown,a,100.5,200,300\nlong,b,500,500,500.25\n",
 }
@@ -235,7 +234,6 @@ READERS = {
     "simulator/readings/reading_sources.py",
     "analysis/extensions/certificates/certificate_files.py",
     "analysis/extensions/maps/point_files.py",  # correct, map --at
-    "analysis/extensions/splines/compensated_points.py",  # nominal
     "analysis/extensions/splines/read_points.py",
     "analysis/extensions/laboratory/table_forms.py",  # readings that are not plain
     "analysis/extensions/reproduction/published.py",  # a table of the project's own

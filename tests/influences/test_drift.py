@@ -173,15 +173,6 @@ def test_times_of_the_file_replace_those_of_the_order(drawn: Experiment, tmp_pat
     assert np.abs(wrong.balls - one.balls).max() > 1e-8
 
 
-def test_ball_centres_are_found_where_readings_drift(drawn: Experiment, tmp_path: Path) -> None:
-    simulated = simulated_readings(drawn, seed=3)
-    centres = simulated.x + simulated.design.probes.offsets[simulated.readings.probe]
-    with (tmp_path / "centres.csv").open("w", encoding="utf-8", newline="") as stream:
-        write_readings(stream, simulated.design, simulated.readings, centres)
-    with pytest.raises(ExperimentError, match=wording.AS_BALL_CENTRES):
-        read_readings(tmp_path / "centres.csv", lay_out(drawn))
-
-
 def other_times(folder: Path) -> Experiment:
     return file_with(folder, [STATED | {"times": {"set_up": "10 h", "reading": "1 s"}}])
 
